@@ -1,5 +1,11 @@
 """Command line interface: the only code that prints and exits."""
 
-from .main import main
+import sys
+
+try:
+    from .main import main
+except KeyboardInterrupt:  # these imports take as long as a short command
+    sys.stderr.write("fracslice: stopped; nothing was written\n")
+    sys.exit(130)
 
 __all__ = ["main"]

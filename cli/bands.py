@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
+
+from .inputs import refuse_options
 
 if TYPE_CHECKING:
     import numpy as np
@@ -28,16 +30,14 @@ def announced(film: tuple[int, int], rows: int) -> str:
     )
 
 
-def check_options(path: str, options: Mapping[str, object]) -> None:
-    """Raise an error for a kind of file and for options that need the whole picture."""
+def check_options(path: str, names: Sequence[str]) -> None:
+    """Raise an error for a kind of file and for given options that need the whole picture."""
     from fracslice.export.images import BANDED, check_image
 
     reason = "expected a picture that fits into the memory; a larger one is rendered in bands"
     if check_image(path) not in BANDED:
         raise click.BadParameter(f"{path}: {reason}, as {', '.join(BANDED)}", param_hint="--output")
-    for name, value in options.items():
-        if value:
-            raise click.BadParameter(reason, param_hint=name)
+    refuse_options(names, reason)
 
 
 def render_to(

@@ -6,99 +6,75 @@ from pathlib import Path
 
 import click
 
-from .cluster import cluster_options, pooled
+from .cluster import ClusterOptions
 from .inputs import check_folder
-from .options import NAME, Positive, Whole, quiet_option, threads_option
-from .working import working
+from .options import command, option
+from .value_types import POSITIVE, Name, Whole
 
 
-@click.command(short_help="Measure run time against error, beside other programs.")
-@click.option(
-    "-o",
-    "--output",
-    type=NAME,
-    default="bench",
-    metavar="DIR",
-    help="The report's folder; bench by default.",
-)
-@click.option(
-    "--workload",
-    "workloads",
-    multiple=True,
-    metavar="NAME",
-    help="A workload to mesh, all of them by default; repeatable.",
-)
-@click.option(
-    "--resolution",
-    "resolutions",
-    type=Whole(16, 2048),
-    multiple=True,
-    metavar="N",
-    help="Voxels along the cube; 64, 128 and 256 by default; repeatable.",
-)
-@click.option(
-    "--peer",
-    "peers",
-    multiple=True,
-    metavar="NAME=COMMAND",
-    help="Another program to run beside; {workload}, {resolution} and {output} (a .ply file) are filled in.",
-)
-@click.option(
-    "--repeat",
-    type=Whole(1, 100),
-    default=3,
-    metavar="N",
-    help="Number of runs, of which the median counts; 3 by default.",
-)
-@click.option(
-    "--limit",
-    type=Positive(),
-    default=60.0,
-    metavar="SECONDS",
-    help="Skip finer resolutions of what takes longer; 60 by default.",
-)
-@cluster_options
-@threads_option
-@quiet_option
-def bench(
-    output: str,
-    workloads: tuple[str, ...],
-    resolutions: tuple[int, ...],
-    peers: tuple[str, ...],
-    repeat: int,
-    limit: float,
-    cluster: str | None,
-    shard: str | None,
-    store: str | None,
-    threads: int,
-    quiet: bool,
-) -> int:
-    """Measure run time against error of each way to a mesh, and write a report with plots.
+class BenchOptions(ClusterOptions):
+    """Options of `bench`."""
+
+    output: str = option(
+        Name("DIR"), "The report's folder; bench by default.", "-o", "--output", default="bench"
+    )
+    workloads: tuple[str, ...] = option(
+        str,
+        "A workload to mesh, all of them by default; repeatable.",
+        "--workload",
+        metavar="NAME",
+        multiple=True,
+    )
+    resolutions: tuple[int, ...] = option(
+        Whole(16, 2048),
+        "Voxels along the cube; 64, 128 and 256 by default; repeatable.",
+        "--resolution",
+        multiple=True,
+    )
+    peers: tuple[str, ...] = option(
+        str,
+        "Another program to compare with; {workload}, {resolution} and {output} (a .ply file) are filled in.",
+        "--peer",
+        metavar="NAME=COMMAND",
+        multiple=True,
+    )
+    repeat: int = option(Whole(1, 100), "Number of runs; their median counts; 3 by default.", default=3)
+    limit: float = option(
+        POSITIVE,
+        "Skip finer resolutions of a method that takes longer; 60 by default.",
+        metavar="SECONDS",
+        default=60.0,
+    )
+
+
+@command(BenchOptions, short_help="Measure run time against error, beside other programs.")
+def bench(given: BenchOptions) -> int:
+    """Measure the run time and the error of each meshing method, and write a report with plots.
 
     Workloads: sphere, torus, menger3, menger4, mandelbulb, julia. A peer writes its mesh in scene units; its
     time is that of the whole command, unless the last line it prints is a JSON object with "wall_s" and
-    "cpu_s". Needs matplotlib; what scikit-image makes is left out without it.
+    "cpu_s". Needs matplotlib; without scikit-image, its method is left out.
+
+    Examples
+    --------
+    fracslice bench -o bench --workload sphere --resolution 64
     """
+    from fracslice.bench.bench_report import require_plots, write_report
+    from fracslice.bench.measurements import BenchmarkTask, measure
     from fracslice.bench.peers import Peer
-    from fracslice.bench.report import require_plots, write_report
-    from fracslice.bench.runs import BenchmarkTask, measure
-    from fracslice.work import Work
 
     require_plots()
-    chosen = {"workloads": workloads, "resolutions": resolutions}
-    given = {name: values for name, values in chosen.items() if values}
-    others = tuple(Peer.read(text) for text in peers)
-    task = BenchmarkTask(**given, peers=others, repeats=repeat, limit_s=limit)  # type: ignore[arg-type]
-    folder = Path(output)
+    chosen = {"workloads": given.workloads, "resolutions": given.resolutions}
+    chosen = {name: values for name, values in chosen.items() if values}
+    peers = tuple(Peer.read(text) for text in given.peers)
+    task = BenchmarkTask(**chosen, peers=peers, repeats=given.repeat, limit_s=given.limit)  # type: ignore[arg-type]
+    folder = Path(given.output)
     check_folder(folder)
-    with (
-        pooled(output, threads, cluster, shard, store) as pool,
-        working(Work(threads, cluster=pool), quiet) as work,
-    ):
+    with given.working() as work:
         rows = measure(task, work)
         folder.mkdir(exist_ok=True)
         paths = write_report(rows, folder)
-    if not quiet:
+    if not given.quiet:
         click.echo(f"{paths[0]}: {len(rows)} measurements")
         for one in rows:
             if one.failed:

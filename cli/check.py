@@ -3,117 +3,103 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from .inputs import check_targets, is_model, load_model, load_scene, refuse_options
-from .layers import (
-    LAYER,
-    PIXEL_MM,
-    as_high_as_wanted,
-    ending,
-    heights,
-    html_option,
-    pixel_of,
-    printer_option,
-    write_page,
-)
-from .options import (
-    NAME,
-    job_of,
-    job_options,
-    length,
-    print_options,
-    printing_of,
-    run_options,
-    source_argument,
-)
+from fracslice.common.digits import counted, significant
+
+from .cluster import ClusterOptions
+from .inputs import BadInput, check_targets, is_model, load_model, load_scene, refuse_options
+from .layers import LAYER, PIXEL_MM, LayerOptions, layer_option, printer_option, write_page
+from .options import MeshOptions, argument, command, flag, option
 from .summary import figures, summary
-from .working import working
+from .value_types import LENGTH, Name
 
 if TYPE_CHECKING:
+    from fracslice.formulas.box import Triple
     from fracslice.kernel import Field
     from fracslice.mesh import Mesh
     from fracslice.printing.limits import Limits
-    from fracslice.scene import Print
-    from fracslice.slicing import Stack
-    from fracslice.slicing.checks import PrintReport
+    from fracslice.scene import Print, Scene
+    from fracslice.slicing import SliceJob, Stack
+    from fracslice.slicing.layer_checks import PrintReport
+    from fracslice.slicing.printers import Printer
     from fracslice.volume.sizing import Sizing
     from fracslice.work import Work
 
-OF_LAYERS = {"pixel", "machine", "picture", "html", "fix"}
+SHARED = {"cluster", "shard", "store"}
+OF_LAYERS = {*SHARED, "pixel", "machine", "picture", "html", "fix"}
 OF_MESHES = {"voxel", "resolution", "dust", "chord", "simplify"}
-OF_SCENES = {*OF_MESHES, "settings", "size"}
+OF_SCENES = {*OF_MESHES, *SHARED, "settings", "size"}
 
 ACROSS = 256
 """Layers of a model's longest side, if --layer is not given, unless they would be thinner than `LAYER`."""
 
 
-def limit(name: str, text: str) -> Callable[..., Any]:
-    """Decorator that adds a minimum thickness of 0.1 mm by default."""
-    text = f"Minimum thickness of {text}; 0.1mm by default."
-    return click.option(f"--{name}", callback=length, default="0.1mm", metavar="LENGTH", help=text)
+def limit(text: str) -> Any:
+    """Declare a minimum thickness of 0.1 mm by default."""
+    return option(LENGTH, f"Minimum thickness of {text}; 0.1mm by default.", default="0.1mm")
 
 
-@click.command(short_help="Say whether a model, or a scene's mesh or layers, would print.")
-@source_argument("MODEL|SCENE")
-@click.option("--json", "as_json", is_flag=True, help="Print all figures as JSON.")
-@click.option("--layer", callback=heights, metavar="LENGTH[..LENGTH]", help="Check layers of this height.")
-@click.option(
-    "--pixel",
-    callback=length,
-    metavar="LENGTH",
-    help="With layers: pixel size; the printer's by default, or 0.05mm.",
-)
-@printer_option('With layers: the printer it has to fit; "list" shows all.')
-@click.option(
-    "--picture",
-    type=NAME,
-    callback=ending(".png"),
-    metavar="FILE.png",
-    help="With layers: draw the worst layers.",
-)
-@html_option
-@click.option("--fix", is_flag=True, help="With layers: mend what can be mended, and check again.")
-@limit("wall", "walls")
-@limit("floor", "floors and roofs")
-@print_options
-@job_options
-@run_options
-@click.pass_context
-def check(
-    context: click.Context, /, source: str, as_json: bool, threads: int, quiet: bool, **options: Any
-) -> int:
+class CheckOptions(LayerOptions, MeshOptions, ClusterOptions):
+    """Options of `check`."""
+
+    source: str = argument("MODEL|SCENE")
+    as_json: bool = flag("Print all figures as JSON.", "--json")
+    layer: Any = layer_option("Check layers of this height.")
+    pixel: float | None = option(LENGTH, "With layers: pixel size; the printer's by default, or 0.05mm.")
+    machine: Printer | None = printer_option(
+        'With layers: the printer that the object must fit; "list" shows all.'
+    )
+    picture: str | None = option(Name("FILE.png", ".png"), "With layers: draw the worst layers.")
+    fix: bool = flag("With layers: mend what can be mended, and check again.")
+    wall: float = limit("walls")
+    floor: float = limit("floors and roofs")
+
+    @property
+    def beside(self) -> str:
+        """File beside which pieces are kept by default."""
+        return self.source
+
+    @property
+    def limits(self) -> Limits:
+        """Minimum thicknesses of walls and floors."""
+        from fracslice.printing.limits import Limits
+
+        return Limits(wall=self.wall, floor=self.floor)
+
+
+@command(CheckOptions, short_help="Say whether a model, or a scene's mesh or layers, would print.")
+def check(given: CheckOptions) -> int:
     """Say whether a model file, or the mesh or the layers of a scene, would print as it is.
 
     The layers of a model are always checked, those of a scene with --layer. Each problem comes with its
     layer, its place in mm from the middle of the object and above its lowest point, and the option that mends
     it. Exit status: 1 if it would not print.
-    """
-    numbers: dict[str, Any]
-    if is_model(source):
-        refuse_options(context, OF_SCENES, "only for scenes, and a model was given")
-        with working(threads, quiet) as work:
-            numbers, lines, problems = of_model(source, options, work)
-    elif options["layer"] is not None:
-        refuse_options(context, OF_MESHES, "only for meshes, and --layer checks layers")
-        scene = load_scene(source, options["settings"])
-        with working(threads, quiet) as work:
-            from fracslice.volume.sizing import sizing
 
-            size = sizing(scene, options["size"], options["scale"], work)
-            how = printing_of(scene, options)
-            numbers, lines, problems = of_layers(source, scene.root, size, how, options, work)
+    Examples
+    --------
+    fracslice check part.stl --printer sl1s
+    fracslice check mandelbulb --size 60mm --layer 0.05mm --html summary.html
+    fracslice check my.xml --layer 0.05mm --fix
+    """
+    if is_model(given.source):
+        refuse_options(OF_SCENES, "only for scenes, and a model was given")
+        checked = of_model
+    elif given.layer is not None:
+        refuse_options(OF_MESHES, "only for meshes, and --layer checks layers")
+        checked = of_scene
     else:
-        refuse_options(context, OF_LAYERS, "only with --layer")
-        with working(threads, quiet) as work:
-            numbers, lines, problems = of_mesh(source, options, work)
+        refuse_options(OF_LAYERS, "only with --layer")
+        checked = of_mesh
+    with given.working() as work:
+        numbers, lines, problems = checked(given, work)
     import json
 
-    click.echo(json.dumps(numbers, indent=2) if as_json else os.linesep.join(filter(None, lines)))
+    click.echo(json.dumps(numbers, indent=2) if given.as_json else os.linesep.join(filter(None, lines)))
     return 1 if problems else 0
 
 
@@ -121,53 +107,64 @@ Checked = tuple[dict[str, Any], list[str], Sequence[object]]
 """Figures, lines of text, and problems."""
 
 
-def of_mesh(source: str, options: dict[str, Any], work: Work) -> Checked:
+def of_mesh(given: CheckOptions, work: Work) -> Checked:
     """Check the mesh of a scene."""
     from fracslice.jobs.mesh import make_mesh
-    from fracslice.printing.checks import check_solid
+    from fracslice.printing.solid_checks import check_solid
 
-    scene = load_scene(source, options["settings"])
-    result = make_mesh(scene, job_of(scene, **options), work)
-    solid = check_solid(result.root, result.bricks, result.place.scale, limits_of(options), work)
+    scene = load_scene(given.source, given.settings)
+    result = make_mesh(scene, given.job(scene), work)
+    solid = check_solid(result.root, result.bricks, result.place.scale, given.limits, work)
     problems = (*result.report.problems, *solid.thin)
     hint = "" if problems else "; --layer looks at islands, cups, traps, overhangs and necks, too"
     numbers = result.report.as_dict() | {"solid": solid.as_dict()}
-    return numbers, [summary(source, result.report), solid.unseen, verdict(problems) + hint], problems
+    return numbers, [summary(given.source, result.report), solid.unseen, verdict(problems) + hint], problems
 
 
-def of_model(source: str, options: dict[str, Any], work: Work) -> Checked:
+def of_scene(given: CheckOptions, work: Work) -> Checked:
+    """Check the layers of a scene."""
+    from fracslice.volume.sizing import sizing
+
+    scene = load_scene(given.source, given.settings)
+    size = sizing(scene, given.size, given.scale, work)
+    return of_layers(scene, size, given.printing(scene.printing), given, work)
+
+
+def of_model(given: CheckOptions, work: Work) -> Checked:
     """Check the mesh of a model and, if it is closed, its layers."""
     from fracslice.mesh.check import check_mesh
     from fracslice.mesh.field import MeshField
     from fracslice.scene import Print
     from fracslice.volume.sizing import UP, Sizing
 
-    mesh = placed(load_model(source), options)
+    mesh = placed(load_model(given.source), given.up, given.scale)
     report = check_mesh(mesh, threads=work.threads)
-    line, numbers = f"{source}: {figures(report)}", report.as_dict()
+    line, numbers = f"{given.source}: {figures(report)}", report.as_dict()
     if not report.watertight:
         return numbers, [line], report.problems
-    size = longest(mesh)
-    height = max(size / ACROSS, float(LAYER[:-2]))
-    options = options | {
-        "layer": options["layer"] or (height, None),
-        "pixel": options["pixel"] or (None if options["machine"] else max(height, PIXEL_MM)),
-    }
-    given = {name: value for name, value in options.items() if name in Print.kinds() and value is not None}
-    options = options | {"up": UP}
-    how = Sizing(size, 1.0), Print(**given)
-    layers, lines, problems = of_layers(source, MeshField(mesh), *how, options, work)
+    size, thinnest = longest(mesh), float(LAYER[:-2])
+    if size <= thinnest and given.layer is None:
+        raise BadInput(f"{given.source}: {size:.3g} mm long, less than a layer: expected a model in mm")
+    height = max(size / ACROSS, thinnest)
+    layered = given.but(
+        layer=given.layer or (height, None),
+        pixel=given.pixel or (None if given.machine else max(height, PIXEL_MM)),
+        up=UP,
+    )
+    layers, lines, problems = of_layers(
+        MeshField(mesh), Sizing(size, 1.0), given.printing(Print()), layered, work
+    )
     return numbers | {"layers": layers}, [line, *lines], (*report.problems, *problems)
 
 
-def placed(mesh: Mesh, options: dict[str, Any]) -> Mesh:
-    """Mesh turned and scaled as the options say."""
+def placed(mesh: Mesh, up: Triple, scale: Triple) -> Mesh:
+    """Mesh turned and scaled."""
     from fracslice.formulas.algebra import product
     from fracslice.volume.sizing import SAME, UP, orientation
 
-    if options["up"] == UP and options["scale"] == SAME:
+    if up == UP and scale == SAME:
         return mesh
-    return replace(mesh, vertices=product(mesh.vertices, orientation(options["up"], options["scale"])))
+    return replace(mesh, vertices=product(mesh.vertices, orientation(up, scale)))
 
 
 def longest(mesh: Mesh) -> float:
@@ -175,50 +172,64 @@ def longest(mesh: Mesh) -> float:
     return float((mesh.vertices.max(0) - mesh.vertices.min(0)).max())
 
 
-def of_layers(
-    source: str, root: Field, size: Sizing, how: Print, options: dict[str, Any], work: Work
-) -> Checked:
+def of_layers(of: Scene | Field, size: Sizing, how: Print, given: CheckOptions, work: Work) -> Checked:
     """Check the layers of an object; with --fix, mend it and check it again."""
     from fracslice.printing.problems import mended
     from fracslice.scene import Print
 
-    check_targets(source, options["picture"], options["html"])
-    numbers, lines, problems = examined(source, root, size, how, options, work)
-    settings = mended(problems) if options["fix"] else {}
+    check_targets(given.source, given.picture, given.html)
+    numbers, lines, problems = examined(given.source, of, size, how, given, work)
+    settings = mended(problems) if given.fix else {}
     if not settings:
         return numbers, lines, problems
     flags = " ".join(f"--{name} {value}" for name, value in settings.items())
     if smaller := settings.pop("size", None):
         size = replace(size, side=float(smaller[:-2]) / max(size.factors), unit=None)
     values = {name: Print.kinds()[name].read(text) for name, text in settings.items()}
-    after, again, left = examined(f"with {flags}", root, size, replace(how, **values), options, work)
+    after, again, left = examined(f"with {flags}", of, size, replace(how, **values), given, work)
     return {"before": numbers, "flags": flags, "after": after}, [*lines, *again], left
 
 
 def examined(
-    name: str, root: Field, size: Sizing, how: Print, options: dict[str, Any], work: Work
+    name: str, of: Scene | Field, size: Sizing, how: Print, given: CheckOptions, work: Work
 ) -> tuple[dict[str, Any], list[str], list[Any]]:
     """Check the layers of an object once."""
-    from fracslice.slicing import SliceJob, plan_stack
-    from fracslice.slicing.checks import check_layers
-    from fracslice.slicing.problems import misfit
+    from fracslice.scene import Scene
+    from fracslice.slicing import SliceJob, adapted, plan_stack
+    from fracslice.slicing.layer_checks import check_layers
+    from fracslice.slicing.layer_problems import misfit
 
-    machine, pixel = options["machine"], pixel_of(options)
-    sides = size.side, options["layer"][0], pixel, options["up"], how, size.factors, size.unit
-    stack = plan_stack(root, SliceJob(*sides), work)
+    machine, (layer, most) = given.machine, given.layer
+    sides = size.side, layer, given.pixels, given.up, how, size.factors, size.unit
+    job, root = SliceJob(*sides), of.root if isinstance(of, Scene) else of
+    stack = plan_stack(root, job, work)
     if machine and (unfit := misfit(stack, machine)):
         return (
             {"size": stack.size, "fits": False, "problems": [str(unfit)]},
             [f"{name}: would not print: {unfit}"],
             [unfit],
         )
-    stack = as_high_as_wanted(stack, options, work)
-    report = check_layers(stack, limits_of(options), machine, work)
-    if options["picture"]:
-        draw(stack, report, options["picture"], work)
-    if options["html"]:
-        write_page(stack, report, [figures_of(report)], name, options["html"], work)
+    if work.cluster and isinstance(of, Scene):
+        stack, report = shared_check(of, job, given, work)
+    else:
+        stack = stack if most is None else adapted(stack, most, work)
+        report = check_layers(stack, given.limits, machine, work)
+    if given.picture:
+        draw(stack, report, given.picture, work)
+    if given.html:
+        write_page(stack, report, [figures_of(report)], name, given.html, work)
     return report.as_dict(), described(name, report), report.problems
+
+
+def shared_check(scene: Scene, job: SliceJob, given: CheckOptions, work: Work) -> tuple[Stack, PrintReport]:
+    """Check the layers of a scene by the pool of the work."""
+    from fracslice.jobs.slice_checks import check_run
+    from fracslice.jobs.slice_recipe import SliceRecipe
+    from fracslice.scene.writer import to_xml
+
+    recipe = SliceRecipe(to_xml(scene), scene.name, job, given.layer[1], printer=given.machine)
+    run = recipe.run(work)
+    return run.stack, check_run(run, given.limits)
 
 
 def draw(stack: Stack, report: PrintReport, path: str, work: Work) -> None:
@@ -230,13 +241,6 @@ def draw(stack: Stack, report: PrintReport, path: str, work: Work) -> None:
         worst_layers(stack, report.worst, file, work)
 
 
-def limits_of(options: dict[str, Any]) -> Limits:
-    """Minimum thicknesses of walls and floors."""
-    from fracslice.printing.limits import Limits
-
-    return Limits(wall=options["wall"], floor=options["floor"])
-
-
 def described(name: str, report: PrintReport) -> list[str]:
     """Summary of a print report: figures, a line for each problem, and thin features that layers may miss."""
     return [f"{name}: {figures_of(report)}, {verdict(report.problems)}", report.solid.unseen]
@@ -245,7 +249,8 @@ def described(name: str, report: PrintReport) -> list[str]:
 def figures_of(report: PrintReport) -> str:
     """Layers, size, volume and weight of a print report."""
     size = " x ".join(f"{s:.2f}" for s in report.size)
-    return f"{report.layers} layers, {size} mm, {report.volume / 1000:.3g} ml, {report.weight_g:.3g} g"
+    ml, g = significant(report.volume / 1000), significant(report.weight_g)
+    return f"{counted(report.layers, 'layer')}, {size} mm, {ml} ml, {g} g"
 
 
 def verdict(problems: Sequence[object]) -> str:

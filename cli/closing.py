@@ -7,6 +7,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from fracslice.common.digits import counted, significant
+
 if TYPE_CHECKING:
     import numpy as np
 
@@ -55,6 +57,8 @@ class Closing:
         Their volume, mm3.
     bodies : int
         Connected components.
+    bridge : float
+        Minimum diameter of struts.
     """
 
     volume: float
@@ -70,38 +74,41 @@ class Closing:
     cavities: int = 0
     trapped: float = 0.0
     bodies: int = 1
+    bridge: float = 0.0
 
     def lines(self) -> Iterator[str]:
         """Iterate over the lines, each with the option that mends what it names."""
         ml = self.volume / 1000
         amount = [
             millilitres(self.volume),
-            f"{ml * self.density:.3g} g of {self.material} ({self.density:g} g/ml)",
+            f"{significant(ml * self.density)} g of {self.material} ({self.density:g} g/ml)",
         ]
         if self.layers is not None:
-            amount.append(f"{self.layers} layers")
+            amount.append(counted(self.layers, "layer"))
         if self.seconds is not None:
             amount.append(duration(self.seconds))
         if self.cost:
             amount.append(f"cost {self.cost:.2f}")
         yield ", ".join(amount)
         if self.drains:
-            places = " and ".join(" ".join(f"{x:.1f}" for x in place) for place in self.drains)
+            places = " and ".join(
+                " ".join(f"{round(x, 1) + 0.0:.1f}" for x in place) for place in self.drains
+            )
             yield f"drain holes of {self.drain:g} mm leave the hollow at {places} mm"
         if self.cavities and self.trapped * SEALED > self.volume:
             sealed = "a sealed cavity" if self.cavities == 1 else f"{self.cavities} sealed cavities"
             mend = "--cavities fill, or --drain 3mm for a hollow"
             yield f"{millilitres(self.trapped)} trapped in {sealed}: {mend}"
         if self.bodies > 1:
-            yield f"{self.bodies} loose bodies: --bridge 1mm, or --keep largest"
+            yield f"{self.bodies} loose bodies: --bridge {max(self.bridge, 1):.2g}mm, or --keep largest"
         if self.contact * FLAT < self.volume / self.height:
             base = max(self.height / 50, 0.5)
-            yield f"does not stand flat, {self.contact:.2g} mm2 on the plate: --base {base:.2g}mm"
+            yield f"does not stand flat, {significant(self.contact, 2)} mm2 on the plate: --base {base:.2g}mm"
 
 
 def millilitres(volume: float) -> str:
     """Volume in millilitres, mm3 given; in mm3 below a hundredth of one."""
-    return f"{volume / 1000:.3g} ml" if volume >= 10 else f"{volume:.2g} mm3"
+    return f"{significant(volume / 1000)} ml" if volume >= 10 else f"{significant(volume, 2)} mm3"
 
 
 def duration(seconds: float) -> str:
@@ -124,6 +131,8 @@ def of_mesh(result: MeshResult, material: str, price: float | None) -> Closing:
     price : float or None
         Price of a kilogram.
     """
+    from fracslice.meshjob import JOINING  # imports the formulas, which --help does not need
+
     report = result.report
     mesh, grams = report.mesh, report.mesh.volume_mm3 / 1000 * DENSITIES[material]
     return Closing(
@@ -138,6 +147,7 @@ def of_mesh(result: MeshResult, material: str, price: float | None) -> Closing:
         cavities=mesh.cavities,
         trapped=report.cavities_mm3,
         bodies=mesh.components,
+        bridge=JOINING * report.voxel_mm,
     )
 
 

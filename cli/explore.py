@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import click
 
 from .inputs import check_folder, check_targets, load_scene
-from .options import Whole, output_option, run_options, source_argument
-from .sizes import pixels
-from .working import working
+from .options import SceneOptions, argument, command, option, output
+from .sizes import PIXELS
+from .value_types import Whole
 
 if TYPE_CHECKING:
     import numpy as np
@@ -22,65 +22,53 @@ if TYPE_CHECKING:
     from fracslice.work import Work
 
 
-@click.command(short_help="Show variations of SCENE on a contact sheet.")
-@source_argument("SCENE")
-@output_option("FILE.png", "The contact sheet.")
-@click.option("--count", type=Whole(1, 400), default=16, show_default=True, metavar="N", help="Pictures.")
-@click.option(
-    "--seed",
-    type=Whole(0, 2**31),
-    default=0,
-    show_default=True,
-    metavar="N",
-    help="Of the changes.",
-)
-@click.option(
-    "--spread",
-    type=click.FloatRange(0, 4, min_open=True),
-    default=0.3,
-    show_default=True,
-    metavar="X",
-    help="Size of the changes: 1 doubles or halves a number in a typical case.",
-)
-@click.option("--from", "parent", metavar="FILE.xml", help="Vary this scene of an earlier sheet instead.")
-@click.option(
-    "--size", callback=pixels, default="240x180", show_default=True, metavar="WxH", help="Of a picture."
-)
-@click.option("--samples", type=Whole(1, 1000), default=8, show_default=True, metavar="N", help="Per pixel.")
-@run_options
-def explore(
-    source: str,
-    output: str,
-    count: int,
-    seed: int,
-    spread: float,
-    parent: str | None,
-    size: tuple[int, int],
-    samples: int,
-    settings: tuple[str, ...],
-    threads: int,
-    quiet: bool,
-) -> None:
+class ExploreOptions(SceneOptions):
+    """Options of `explore`."""
+
+    source: str = argument("SCENE")
+    output: str = output("FILE.png", "The contact sheet.", ".png")
+    count: int = option(Whole(1, 400), "Number of pictures; 16 by default.", default=16)
+    seed: int = option(Whole(0, 2**31), "Seed of the changes; 0 by default.", default=0)
+    spread: float = option(
+        click.FloatRange(0, 4, min_open=True),
+        "Size of the changes: 1 doubles or halves a number in a typical case; 0.3 by default.",
+        metavar="X",
+        default=0.3,
+    )
+    parent: str | None = option(
+        str, "Scene of an earlier sheet to vary instead of SCENE.", "--from", metavar="FILE.xml"
+    )
+    size: tuple[int, int] = option(
+        PIXELS, "Pixels of each picture, across and down; 240x180 by default.", default="240x180"
+    )
+    samples: int = option(Whole(1, 1000), "Samples per pixel; 8 by default.", default=8)
+
+
+@command(ExploreOptions, short_help="Show variations of SCENE on a contact sheet.")
+def explore(given: ExploreOptions) -> None:
     """Show variations of SCENE on a contact sheet, and write the scene of each beside it.
 
     The first picture is SCENE itself. In the others the numbers of its elements are changed at random within
     their ranges; materials, transforms, boxes and the view stay. Picture 7 of sheet.png is sheet/07.xml,
     which --from takes. Nothing is written before all pictures are done.
+
+    Examples
+    --------
+    fracslice explore mandelbox -o sheet.png --spread 0.5
+    fracslice explore mandelbox -o next.png --from sheet/07.xml --seed 1
     """
     from fracslice.scene.variation import varied
 
-    target = Path(output)
-    if target.suffix.lower() != ".png":
-        raise click.UsageError(f"{output}: expected a .png file")
-    check_targets(source, output)
+    target, count = Path(given.output), given.count
+    check_targets(given.source, given.output)
     check_folder(target.with_suffix(""))
-    scene = load_scene(parent or source, settings)
-    scenes = [scene, *(varied(scene, (seed, k), spread) for k in range(1, count))]
-    with working(threads, quiet) as work:
-        pictures = [rendered(one, size, samples, k / count, work) for k, one in enumerate(scenes)]
+    scene = load_scene(given.parent or given.source, given.settings)
+    scenes = [scene, *(varied(scene, (given.seed, k), given.spread) for k in range(1, count))]
+    with given.working() as work:
+        pictures = [rendered(one, given.size, given.samples, k / count, work) for k, one in enumerate(scenes)]
     write(target, scenes, pictures)
-    if not quiet:
-        click.echo(f"{output}: {count} variations; their scenes are in {target.with_suffix('')}")
+    if not given.quiet:
+        click.echo(f"{given.output}: {count} variations; their scenes are in {target.with_suffix('')}")
 
 
 def rendered(scene: Scene, size: tuple[int, int], samples: int, before: float, work: Work) -> np.ndarray:

@@ -3,57 +3,29 @@
 from __future__ import annotations
 
 import functools
+import math
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from decimal import Decimal
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 import click
 
 from fracslice.errors import SharedError
 
 from .inputs import load_scene
+from .options import SceneOptions
+
+R = TypeVar("R", bound=SceneOptions)
 
 MOST = 10_000
 """Greatest number of members."""
 
-_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)"
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _RANGE = re.compile(rf"(?P<name>[^=]+)=\s*({_NUMBER})\s*\.\.\s*({_NUMBER})\s*(?::\s*({_NUMBER})\s*)?")
-
-
-@dataclass(frozen=True)
-class Member:
-    """Member of a family.
-
-    Attributes
-    ----------
-    settings : tuple of str
-        Values of --set, without ranges.
-    suffix : str
-        End of the names of its files, such as "-power2.5"; empty without a range.
-    """
-
-    settings: tuple[str, ...]
-    suffix: str
-
-    def named(self, path: str) -> str:
-        """Name of a file of this member.
-
-        Parameters
-        ----------
-        path : str
-            Name without the value.
-
-        Returns
-        -------
-        str
-            The name with the value before its extension.
-        """
-        return suffixed(path, self.suffix)
 
 
 def suffixed(path: str, suffix: str) -> str:
@@ -61,19 +33,17 @@ def suffixed(path: str, suffix: str) -> str:
     return str(Path(path).with_name(Path(path).stem + suffix + Path(path).suffix)) if suffix else path
 
 
-def members(settings: Sequence[str]) -> list[Member]:
+def members(settings: Sequence[str]) -> list[tuple[tuple[str, ...], str]]:
     """Members of the ranges among settings, such as mandelbulb.power=2..9:0.5; the last range changes first.
 
+    Each has its settings, and the end of the names of its files, such as "-power2.5"; empty without a range.
     Raises `click.UsageError` for an empty range, or too many members.
     """
     choices = [list(_values(setting)) for setting in settings]
-    count = functools.reduce(lambda n, values: n * len(values), choices, 1)
+    count = math.prod(map(len, choices))
     if count > MOST:
         raise click.UsageError(f"--set: expected at most {MOST} outputs, and these ranges make {count}")
-    return [
-        Member(tuple(text for text, _ in chosen), "".join(suffix for _, suffix in chosen))
-        for chosen in product(*choices)
-    ]
+    return [(tuple(text for text, _ in c), "".join(suffix for _, suffix in c)) for c in product(*choices)]
 
 
 def _values(setting: str) -> Iterator[tuple[str, str]]:
@@ -93,32 +63,24 @@ def _values(setting: str) -> Iterator[tuple[str, str]]:
         yield f"{name}={value}", f"-{name.rpartition('.')[2]}{value}"
 
 
-def families(*names: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Decorator of a command that runs once for each member of a family.
+def families(*names: str) -> Callable[[Callable[[R], int | None]], Callable[[R], int]]:
+    """Decorator of a command that runs once for each member of a family; its exit status is the greatest.
 
-    Parameters
-    ----------
-    *names : str
-        Options that name output files; they get the values of the member.
-
-    Returns
-    -------
-    callable
-        Decorator. The exit status is the greatest one.
+    names: options of output files, which get the values of the member.
     """
 
-    def decorated(command: Callable[..., Any]) -> Callable[..., Any]:
+    def decorated(command: Callable[[R], int | None]) -> Callable[[R], int]:
         @functools.wraps(command)
-        def run(*arguments: Any, **options: Any) -> int:
-            family = members(options["settings"])
+        def run(given: R) -> int:
+            family = members(given.settings)
             if len(family) == 1:
-                return command(*arguments, **{**options, "settings": family[0].settings}) or 0
-            names_of_values = re.findall(r"-([a-z_]+)", family[0].suffix)
+                return command(given) or 0
+            names_of_values = re.findall(r"-([a-z_]+)", family[0][1])
             if len(set(names_of_values)) < len(names_of_values):
                 raise click.UsageError("--set: expected ranges of attributes with different names")
-            for member in family:  # refuse a value before the first output is made
-                load_scene(options["source"], member.settings)
-            return max(_status(command, arguments, options, member, names) for member in family)
+            for settings, _ in family:  # refuse a value before the first output is made
+                load_scene(vars(given)["source"], settings)
+            return max(_status(command, given, *member, names) for member in family)
 
         return run
 
@@ -126,12 +88,13 @@ def families(*names: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
 
 
 def _status(
-    command: Callable[..., Any], arguments: Any, options: dict[str, Any], member: Member, names: Sequence[str]
+    command: Callable[[R], int | None], given: R, settings: tuple[str, ...], suffix: str, names: Sequence[str]
 ) -> int:
     """Exit status of one member."""
-    own = {name: member.named(options[name]) for name in names if options[name] is not None}
+    files = {name: vars(given)[name] for name in names}
+    own = {name: suffixed(file, suffix) for name, file in files.items() if file is not None}
     with going_on(own["output"]):
-        return command(*arguments, **{**options, "settings": member.settings, **own}) or 0
+        return command(given.but(settings=settings, **own)) or 0
     return 0
 
 

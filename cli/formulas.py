@@ -6,6 +6,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from .inputs import BadInput, check_targets
+from .options import CommandOptions, argument, command, option
+from .value_types import Name
+
 if TYPE_CHECKING:
     from fracslice.formulas import Node
 
@@ -13,34 +17,49 @@ SIDE = 320
 """Pixels along a side of a formula's picture."""
 
 
-@click.command()
-@click.argument("name", required=False)
-@click.option("--check", "file", metavar="FILE", help="Examine the formulas of a Python file; it is run.")
-@click.option("--picture", metavar="FILE.png", help="Write a picture of the examined formulas, side by side.")
-def formulas(name: str | None, file: str | None, picture: str | None) -> None:
+class FormulaOptions(CommandOptions):
+    """Options of `formulas`."""
+
+    name: str | None = argument("[NAME]", required=False)
+    file: str | None = option(
+        str, "Examine the formulas of a Python file; it is run.", "--check", metavar="FILE"
+    )
+    picture: str | None = option(
+        Name("FILE.png", ".png"), "Write a picture of the examined formulas, side by side."
+    )
+
+
+@command(FormulaOptions)
+def formulas(given: FormulaOptions) -> None:
     """List the elements of a scene with their sources, or describe the element NAME.
 
     --check compares the back ends with the reference and the derivative of a step with differences, and looks
     for points that break the formula's bound or lie outside its box; exit status 1 if there are any.
+
+    Examples
+    --------
+    fracslice formulas mandelbulb
+    fracslice formulas --check own.py --picture own.png
     """
     from fracslice.errors import KernelError
     from fracslice.scene import manual
 
-    if file is None:
-        if picture is not None:
+    if given.file is None:
+        if given.picture is not None:
             raise click.UsageError("--picture: expected --check FILE")
-        click.echo(manual.overview() if name is None else manual.page(name))
+        click.echo(manual.overview() if given.name is None else manual.page(given.name))
         return
     from fracslice.formulas.plugins import run_file
     from fracslice.kernel.trial import trial
 
-    trials = [(formula.name, trial(formula)) for formula in run_file(file)]
+    check_targets(given.file, given.picture)
+    trials = [(formula.name, trial(formula)) for formula in run_file(given.file)]
     for formula, result in trials:
         click.echo("\n".join([f"{formula}:", *(f"  {line}" for line in result.lines)]))
     if not trials:
-        raise KernelError(f"{file}: registers no formulas")
-    if picture is not None:
-        draw([result.root for _, result in trials], picture)
+        raise BadInput(f"{given.file}: registers no formulas")
+    if given.picture is not None:
+        draw([result.root for _, result in trials], given.picture)
     if any(result.faults for _, result in trials):
         raise KernelError("faults were found")
 

@@ -61,20 +61,14 @@ def load_model(source: str) -> Mesh:
         raise BadInput(str(error)) from error
 
 
-def refuse_options(context: click.Context, names: Container[str], why: str) -> None:
+def refuse_options(names: Container[str], why: str) -> None:
     """Raise a usage error for a given option that has no effect here."""
+    context = click.get_current_context()
     for option in context.command.params:
         name = str(option.name)
         given = context.get_parameter_source(name) == click.core.ParameterSource.COMMANDLINE
         if given and name in names:
             raise click.UsageError(f"{option.opts[-1]}: {why}")
-
-
-def refuse_scene_options(context: click.Context) -> None:
-    """Raise a usage error for a given option that applies to scenes only."""
-    names = {str(option.name) for option in context.command.params}
-    of_both = {"source", "as_json", "threads", "quiet"}
-    refuse_options(context, names - of_both, "only for scenes, and a model was given")
 
 
 def check_targets(source: str, *targets: str | None) -> None:

@@ -3,40 +3,34 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from .options import NAME, length, parsed
+from .options import PreparationOptions, option
+from .value_types import LENGTH, Name, Parsed, read_length
 
 if TYPE_CHECKING:
     from fracslice.slicing import Stack
-    from fracslice.slicing.checks import PrintReport
+    from fracslice.slicing.layer_checks import PrintReport
     from fracslice.slicing.printers import Printer
     from fracslice.work import Work
 
 LAYER, PIXEL_MM = "0.05mm", 0.05
 
 
-def shift(_: click.Context, __: click.Parameter, text: str) -> float:
+def read_shift(text: str) -> float:
     """Parse a length, zero or negative ones included, into mm."""
     from fracslice.scene.lengths import Shift
 
-    distance: float = parsed(text, Shift(0.0, ""))
-    return distance
+    return float(Shift(0.0, "").read(text))
 
 
-def heights(
-    context: click.Context, option: click.Parameter, text: str | None
-) -> tuple[float, float | None] | None:
+def read_heights(text: str) -> tuple[float, float | None]:
     """Parse a layer height into mm, or the minimum and maximum of adaptive layers."""
-    if text is None:
-        return None
-    low, _, high = text.partition("..")
-    least = length(context, option, low)
-    assert least is not None
-    return least, length(context, option, high) if ".." in text else None
+    low, dots, high = text.partition("..")
+    return read_length(low), read_length(high) if dots else None
 
 
 def printer(context: click.Context, _: click.Parameter, name: str | None) -> Printer | None:
@@ -51,38 +45,34 @@ def printer(context: click.Context, _: click.Parameter, name: str | None) -> Pri
     context.exit()
 
 
-def ending(*endings: str) -> Callable[..., str | None]:
-    """Callback that checks the extension of a file."""
-
-    def checked(_: click.Context, __: click.Parameter, path: str | None) -> str | None:
-        if path is not None and not path.lower().endswith(endings):
-            raise click.BadParameter(f"{path}: expected a file name that ends in {' or '.join(endings)}")
-        return path
-
-    return checked
+def layer_option(text: str, **settings: Any) -> Any:
+    """Declare --layer, a height or a range of heights."""
+    return option(Parsed(read_heights, "LENGTH[..LENGTH]"), text, **settings)
 
 
-def pixel_of(options: dict[str, Any]) -> tuple[float, float]:
-    """Pixel size, mm: that of --pixel or of --printer, which exclude each other."""
-    pixel, machine = options["pixel"], options["machine"]
-    if pixel is not None and machine is not None:
-        raise click.UsageError("--pixel and --printer: expected one of them")
-    return (pixel, pixel) if pixel else machine.pixel if machine else (PIXEL_MM, PIXEL_MM)
+def printer_option(text: str) -> Any:
+    """Declare --printer, looked up before missing options are reported."""
+    return option(str, text, "--printer", metavar="NAME|FILE", callback=printer, is_eager=True)
 
 
-def printer_option(text: str) -> Callable[..., Any]:
-    """Decorator that adds --printer, parsed before missing options are reported. text: its help."""
-    names = "--printer", "machine"
-    return click.option(*names, callback=printer, is_eager=True, metavar="NAME|FILE", help=text)
+class LayerOptions(PreparationOptions):
+    """Options of layers."""
 
+    layer: tuple[float, float | None]
+    machine: Printer | None
+    pixel: float | None = option(LENGTH, "Pixel size; the printer's by default, or 0.05mm.")
+    html: str | None = option(
+        Name("FILE.html", ".html"),
+        "Write a page: figures, problems, pictures of the worst layers, cross-section over height.",
+    )
 
-html_option = click.option(
-    "--html",
-    type=NAME,
-    callback=ending(".html"),
-    metavar="FILE.html",
-    help="Write a page: figures, problems, pictures of the worst layers, cross-section over height.",
-)
+    @property
+    def pixels(self) -> tuple[float, float]:
+        """Pixel size, mm: that of --pixel or of --printer, which exclude each other."""
+        pixel, machine = self.pixel, self.machine
+        if pixel is not None and machine is not None:
+            raise click.UsageError("--pixel and --printer: expected one of them")
+        return (pixel, pixel) if pixel else machine.pixel if machine else (PIXEL_MM, PIXEL_MM)
 
 
 def write_page(
@@ -99,11 +89,3 @@ def write_page(
         worst_layers(stack, report.worst, picture, work)
         problems = [str(problem) for problem in report.problems]
         file.write(page(title, lines, problems, stack.tops, np.array(report.areas), picture.getvalue()))
-
-
-def as_high_as_wanted(stack: Stack, options: dict[str, Any], work: Work) -> Stack:
-    """Adaptive layers if a range of heights is given; otherwise the stack itself."""
-    from fracslice.slicing import adapted
-
-    most = options["layer"][1]
-    return stack if most is None else adapted(stack, most, work)

@@ -6,13 +6,15 @@ Exit status: 0 success; 1 failure; 2 bad input or usage; 128 + n when stopped by
 from __future__ import annotations
 
 import builtins
+import errno
 import gc
 import os
+import signal
 import sys
 import warnings
 from collections.abc import Sequence
 from importlib import import_module
-from typing import NoReturn, TextIO
+from typing import Any, NoReturn, TextIO
 
 import click
 
@@ -30,7 +32,7 @@ from fracslice.errors import (
 )
 from fracslice.version import __version__
 
-from .working import StoppedError
+from .working import NOTHING, StoppedError
 
 NAMES = (
     "animate",
@@ -48,27 +50,34 @@ NAMES = (
 )
 """Commands: functions in modules of their names, with an underscore behind the name of a builtin."""
 
-FEWEST = 50_000
-"""New objects between two garbage collections; the modules of a command are about four times as many."""
+FEWEST = 500_000
+"""New objects between two garbage collections; the modules of a command have fewer."""
 
 BAD_INPUT = (DeviceError, SceneError, RenderError, VolumeError, ExportError, SliceError, BenchError)
 FAILED, USAGE, INTERRUPTED = 1, 2, 130
 
 
 class Commands(click.Group):
-    """Commands that are imported when they are asked for: all of them take a tenth of a small job."""
+    """Group that imports a command when it runs: importing all takes a tenth of a small job."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names of all commands."""
         return list(NAMES)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """The command of a name, with the options of all commands."""
+        """The command of a name."""
         if cmd_name in NAMES and cmd_name not in self.commands:
             module = import_module(f".{cmd_name}", __package__)
             name = f"{cmd_name}_" if hasattr(builtins, cmd_name) else cmd_name
-            self.add_command(with_formulas(getattr(module, name)))
+            self.add_command(getattr(module, name))
         return super().get_command(ctx, cmd_name)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a command; Ctrl-C, also during its imports, raises `StoppedError`."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            raise StoppedError(signal.SIGINT, NOTHING) from None
 
 
 @click.group(
@@ -89,37 +98,18 @@ def commands(context: click.Context) -> None:
         context.exit(USAGE)
 
 
-def run_formulas(context: click.Context, option: click.Parameter, files: Sequence[str]) -> None:
-    """Run the files of --formulas before the scene is read."""
-    for file in files:
-        from fracslice.formulas.plugins import run_file
-
-        run_file(file)
-
-
-def with_formulas(command: click.Command) -> click.Command:
-    """Add the option --formulas to a command."""
-    command.params.append(
-        click.Option(
-            ["--formulas"],
-            metavar="FILE",
-            multiple=True,
-            is_eager=True,
-            expose_value=False,
-            callback=run_formulas,
-            help="A Python file that registers formulas of your own; it is run. Repeatable.",
-        )
-    )
-    return command
-
-
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run one command and exit with its status."""
+    from fracslice.common.memory import keep_freed_memory
+
     # The products of matrices here are small: threads of OpenBLAS would only take time to start.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    # Modules are no garbage: looking for it among them takes a fifth of a small job.
+    # Modules are no garbage: looking for it among them, at last at the exit, takes a fifth of a small job.
     gc.set_threshold(FEWEST)
-    sys.exit(run(arguments))
+    keep_freed_memory()
+    status = run(arguments)
+    gc.freeze()
+    sys.exit(status)
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
@@ -151,7 +141,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except FracsliceError as error:
         return say(str(error), USAGE if isinstance(error, BAD_INPUT) else FAILED)
     except (KeyboardInterrupt, click.Abort):
-        return say("stopped; nothing was written", INTERRUPTED)
+        return say(f"stopped; {NOTHING}", INTERRUPTED)
     except MemoryError:
         return say("out of memory: a coarser voxel or a smaller picture needs less", FAILED)
     except BrokenPipeError:
@@ -159,7 +149,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return FAILED
     except OSError as error:
-        return say(f"{error.filename or 'error'}: {error.strerror or error}", FAILED)
+        status = USAGE if error.errno == errno.ENAMETOOLONG else FAILED
+        return say(f"{error.filename or 'error'}: {error.strerror or error}", status)
 
 
 def show_warning(

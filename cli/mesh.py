@@ -5,29 +5,17 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from .closing import DENSITIES, of_mesh
-from .cluster import cluster_options, pooled
+from .cluster import ClusterOptions
 from .families import MOST, families, going_on, suffixed
 from .inputs import check_folder, check_targets, load_scene, refuse_options
-from .options import (
-    NAME,
-    job_of,
-    job_options,
-    moment,
-    output_option,
-    price_option,
-    print_options,
-    quiet_option,
-    set_option,
-    source_argument,
-    threads_option,
-)
+from .options import MeshOptions, argument, command, flag, option, output
 from .summary import summary
-from .working import working
+from .value_types import AMOUNT, SECONDS, Name
 
 if TYPE_CHECKING:
     from fracslice.jobs.mesh_result import MeshResult
@@ -41,124 +29,93 @@ GRID = ".vdb"
 COLOURS = ("material", "point", "axes", "planes", "sphere", "steps", "direction")
 
 
-@click.command()
-@source_argument("SCENE")
-@output_option(
-    "FILE",
-    "An .stl, .3mf, .ply, .obj or .glb file; or .vdb, for the samples of the field.",
-)
-@print_options
-@job_options
-@set_option
-@click.option(
-    "--time",
-    "seconds",
-    callback=moment,
-    metavar="TIME",
-    help="Mesh the scene of this time of its <animation>, such as 2.5s.",
-)
-@click.option(
-    "--every",
-    callback=moment,
-    metavar="TIME",
-    help="Mesh the scene every so often, such as 0.5s, from the begin to the end of its <animation>.",
-)
-@click.option("--report", type=NAME, metavar="FILE.json", help="Write the figures that prove the mesh.")
-@click.option("--picture", type=NAME, metavar="FILE.png", help="Write a shaded picture of the mesh.")
-@click.option(
-    "--implicit",
-    is_flag=True,
-    help="Write the formula instead of triangles: an .3mf file for programs with the implicit extension.",
-)
-@click.option(
-    "--cache",
-    type=NAME,
-    metavar="FOLDER",
-    help="Keep samples and surface in this folder, for further jobs of the same scene and voxel.",
-)
-@click.option(
-    "--device",
-    type=click.Choice(["cpu", "cuda", "auto"]),
-    default="cpu",
-    help="The device that evaluates the field; cpu by default. auto: the GPU, if there is one.",
-)
-@click.option(
-    "--colour",
-    type=click.Choice(COLOURS),
-    help="Colour the vertices of a .ply, .glb or .3mf file: as the scene's materials, or by a property of "
-    "the orbit. PLY and GLB hold the property itself, too.",
-)
-@cluster_options
-@click.option(
-    "--material",
-    type=click.Choice(list(DENSITIES)),
-    default="resin",
-    help="Material of the weight in the summary; resin by default.",
-)
-@price_option("kilogram")
-@threads_option
-@quiet_option
-@click.pass_context
+class MeshFileOptions(ClusterOptions, MeshOptions):
+    """Options of `mesh`."""
+
+    source: str = argument("SCENE")
+    output: str = output(
+        "FILE", "An .stl, .3mf, .ply, .obj or .glb file; or .vdb, for the samples of the field."
+    )
+    seconds: float | None = option(
+        SECONDS, "Mesh the scene at this time of its <animation>, such as 2.5s.", "--time"
+    )
+    every: float | None = option(
+        SECONDS,
+        "Mesh the scene at this interval, such as 0.5s, from the start to the end of its <animation>.",
+    )
+    report: str | None = option(Name("FILE.json", ".json"), "Write the figures and the accuracy of the mesh.")
+    picture: str | None = option(Name("FILE.png", ".png"), "Write a shaded picture of the mesh.")
+    implicit: bool = flag(
+        "Write the formula instead of triangles: an .3mf file for programs with the implicit extension."
+    )
+    cache: str | None = option(
+        Name("FOLDER"),
+        "Keep samples and surface in this folder, for further jobs of the same scene and voxel.",
+    )
+    device: str = option(
+        click.Choice(["cpu", "cuda", "auto"]),
+        "The device that evaluates the field; cpu by default. auto: the GPU, if there is one.",
+        default="cpu",
+    )
+    colour: str | None = option(
+        click.Choice(COLOURS),
+        "Colour the vertices of a .ply, .glb or .3mf file: as the scene's materials, or by a property of "
+        "the orbit. PLY and GLB hold the property itself, too.",
+    )
+    material: str = option(
+        click.Choice(list(DENSITIES)),
+        "Material of the weight in the summary; resin by default.",
+        default="resin",
+    )
+    price: float | None = option(AMOUNT, "Price of a kilogram.")
+
+    def job(self, scene: Scene) -> MeshJob:
+        """Mesh job of a scene, with colours."""
+        return replace(super().job(scene), colour=self.colour)
+
+
+@command(MeshFileOptions)
 @families("output", "report", "picture")
-def mesh(
-    context: click.Context,
-    /,
-    source: str,
-    output: str,
-    settings: tuple[str, ...],
-    seconds: float | None,
-    every: float | None,
-    report: str | None,
-    picture: str | None,
-    implicit: bool,
-    cache: str | None,
-    device: str,
-    colour: str | None,
-    cluster: str | None,
-    shard: str | None,
-    store: str | None,
-    material: str,
-    price: float | None,
-    threads: int,
-    quiet: bool,
-    **options: Any,
-) -> int:
+def mesh(given: MeshFileOptions) -> int:
     """Make a printable mesh of SCENE, and print a summary.
 
     Exit status: 1 if the mesh would not print; the file is written. A mesh
     that does not fit in memory is made piece after piece if it goes to an .stl file.
+
+    Examples
+    --------
+    fracslice mesh mandelbulb -o bulb.stl --size 8cm --voxel 0.25mm
+    fracslice mesh geode -o geode.3mf --thickness 0.8mm --bridge 1.5mm
+    fracslice mesh menger-sponge -o sponge.stl --set menger.level=1..3
     """
     from fracslice.kernel.devices import chosen
-    from fracslice.work import Work
 
-    check_outputs(source, output, report, picture)
-    if Path(output).suffix.lower() == GRID:
+    check_outputs(given)
+    if Path(given.output).suffix.lower() == GRID:
         names = {"chord", "simplify", "colour", "cluster", "shard", "store"}
-        refuse_options(context, names, "only for meshes, and a .vdb file holds samples")
-    if implicit:
-        refuse_what_needs_triangles(context, output)
-    scenes = moments(load_scene(source, settings), seconds, every)
-    how = Work(threads, store=store_in(cache), device=chosen(device))
+        refuse_options(names, "only for meshes, and a .vdb file holds samples")
+    if given.implicit:
+        refuse_what_needs_triangles(given.output)
+    scenes = moments(load_scene(given.source, given.settings), given.seconds, given.every)
     problems = False
-    with (
-        pooled(output, threads, cluster, shard, store) as pool,
-        working(replace(how, cluster=pool), quiet) as work,
-    ):
+    with given.working(store=store_in(given.cache), device=chosen(given.device)) as work:
         for suffix, scene in scenes:
-            file, *others = (path and suffixed(path, suffix) for path in (output, picture, report))
-            with going_on(str(file)):
-                if implicit:
-                    write_formula(scene, job_of(scene, **options), str(file), work, quiet)
-                    continue
-                job = replace(job_of(scene, **options), colour=colour)
-                result = made(scene, job, str(file), others[0], work)
-                if others[1] is not None:
-                    write_report(result.report, others[1])
-                if not quiet:
-                    click.echo(summary(str(file), result.report))
-                    click.echo(os.linesep.join(of_mesh(result, material, price).lines()))
-                problems |= bool(result.report.problems)
+            files = {name: vars(given)[name] for name in ("output", "report", "picture")}
+            own = given.but(**{name: file and suffixed(file, suffix) for name, file in files.items()})
+            with going_on(own.output):
+                problems |= (write_formula if given.implicit else write_mesh)(scene, own, work)
     return 1 if problems else 0
+
+
+def write_mesh(scene: Scene, given: MeshFileOptions, work: Work) -> bool:
+    """Make the mesh, the report and the picture; True if the mesh would not print."""
+    result = made(scene, given, work)
+    if given.report is not None:
+        write_report(result.report, given.report)
+    if not given.quiet:
+        click.echo(summary(given.output, result.report))
+        click.echo(os.linesep.join(of_mesh(result, given.material, given.price).lines()))
+    return bool(result.report.problems)
 
 
 def moments(scene: Scene, seconds: float | None, every: float | None) -> list[tuple[str, Scene]]:
@@ -179,27 +136,29 @@ def moments(scene: Scene, seconds: float | None, every: float | None) -> list[tu
     return [(f"-{time:g}s", timeline.at(time)) for time in times]
 
 
-def refuse_what_needs_triangles(context: click.Context, output: str) -> None:
+def refuse_what_needs_triangles(output: str) -> None:
     """Raise a usage error for a file other than .3mf, or an option without effect on a formula."""
     if Path(output).suffix.lower() != ".3mf":
         raise click.UsageError(f"{output}: expected a file name that ends in .3mf, for --implicit")
     names = {"chord", "simplify", "colour", "dust", "report", "picture", "cache", "device", "material"}
-    refuse_options(
-        context, names | {"price", "cluster", "shard", "store"}, "only for meshes, and --implicit makes none"
-    )
+    names |= {"price", "cluster", "shard", "store"}
+    refuse_options(names, "only for meshes, and --implicit makes none")
 
 
-def write_formula(scene: Scene, job: MeshJob, output: str, work: Work, quiet: bool) -> None:
-    """Write the formula of a scene, and print its size."""
+def write_formula(scene: Scene, given: MeshFileOptions, work: Work) -> bool:
+    """Write the formula of a scene, and print its size. A formula has no problems."""
     from fracslice.jobs.implicit import make_implicit
 
-    made = make_implicit(scene, job, output, work)
+    made = make_implicit(scene, given.job(scene), given.output, work)
     for note in made.notes:
         click.echo(note, err=True)
-    if not quiet:
+    if not given.quiet:
         size = " x ".join(f"{side:.2f}" for side in made.box.size)
         kilobytes = made.path.stat().st_size / 1e3
-        click.echo(f"{output}: a formula of {made.operations} operations, {kilobytes:.1f} kB, {size} mm")
+        click.echo(
+            f"{given.output}: a formula of {made.operations} operations, {kilobytes:.1f} kB, {size} mm"
+        )
+    return False
 
 
 def store_in(folder: str | None) -> Store | None:
@@ -213,12 +172,13 @@ def store_in(folder: str | None) -> Store | None:
     return Store(Path(folder))
 
 
-def made(scene: Scene, job: MeshJob, output: str, picture: str | None, work: Work) -> MeshResult:
+def made(scene: Scene, given: MeshFileOptions, work: Work) -> MeshResult:
     """Make the mesh and write it, or its samples, and the picture."""
     from fracslice.export import write
     from fracslice.jobs.mesh import make_mesh
     from fracslice.jobs.mesh_writing import metadata
 
+    job, output, picture = given.job(scene), given.output, given.picture
     if picture is None and Path(output).suffix.lower() != GRID:
         return make_mesh(scene, job, work, path=output)
     result = make_mesh(scene, job, work)
@@ -234,17 +194,15 @@ def made(scene: Scene, job: MeshJob, output: str, picture: str | None, work: Wor
     return result
 
 
-def check_outputs(source: str, output: str, report: str | None, picture: str | None) -> None:
+def check_outputs(given: MeshFileOptions) -> None:
     """Check before any work is done that the output files can be written."""
     from fracslice.export import FORMATS
 
-    for path, ending in ((report, ".json"), (picture, ".png")):
-        if path is not None and Path(path).suffix.lower() != ending:
-            raise click.UsageError(f"{path}: expected a file name that ends in {ending}")
-    if Path(output).suffix.lower() not in (*FORMATS, GRID):
-        raise click.UsageError(f"{output}: unknown kind of file; known are {', '.join([*FORMATS, GRID])}")
-    check_targets(source, output, report, picture)
-    if picture is not None:
+    if Path(given.output).suffix.lower() not in (*FORMATS, GRID):
+        known = ", ".join([*FORMATS, GRID])
+        raise click.UsageError(f"{given.output}: unknown kind of file; known are {known}")
+    check_targets(given.source, given.output, given.report, given.picture)
+    if given.picture is not None:
         from fracslice.viewer import need_pyvista
 
         need_pyvista()

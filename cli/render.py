@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Iterator
@@ -13,172 +14,146 @@ import click
 from fracslice.errors import Cancelled, SharedError
 
 from .bands import announced, check_options, light_of, render_to
-from .cluster import cluster_options, pooled
+from .cluster import ClusterOptions
 from .families import families
 from .inputs import check_folder, check_targets, load_scene
-from .options import NAME, Whole, device_option, output_option, run_options, samples_option, source_argument
-from .sizes import duration, part, pixels
-from .working import KeptError, working
+from .options import DEVICE, SAMPLES, SceneOptions, argument, command, flag, option, output
+from .sizes import DURATION, PART, PIXELS
+from .value_types import Name, Whole
+from .working import KeptError
 
 if TYPE_CHECKING:
     import numpy as np
 
     from fracslice.rendering import Pass, Renderer
     from fracslice.scene import Scene
-
-
-@click.command(short_help="Render a picture of SCENE.")
-@source_argument("SCENE")
-@output_option(
-    "FILE",
-    "A .png, .jpg or .webp file, or .exr or .tif for linear floats.",
-)
-@samples_option
-@click.option(
-    "--size",
-    callback=pixels,
-    metavar="WxH",
-    help="Pixels across and down; the scene's by default, or 1280x720.",
-)
-@click.option(
-    "--crop",
-    callback=part,
-    metavar="X,Y,W,H",
-    help="Render only this part: left, top, width and height in pixels.",
-)
-@click.option(
-    "--seed",
-    type=Whole(0, 2**31 - 1),
-    default=0,
-    metavar="N",
-    help="Number of the random samples; 0 by default.",
-)
-@click.option(
-    "--layers", is_flag=True, help="Add depth, normal, position, albedo and samples to the .exr file."
-)
-@click.option("--denoise", is_flag=True, help="Remove the noise that is left.")
-@device_option
-@click.option(
-    "--time",
-    "limit",
-    callback=duration,
-    metavar="TIME",
-    help="Stop after this time: 10s, 2min or 1h.",
-)
-@click.option(
-    "--bits",
-    type=click.Choice(["8", "16"]),
-    default="8",
-    help="Bits per channel of a PNG; 8 by default.",
-)
-@click.option("--pass-images", type=NAME, metavar="DIR", help="Write the picture of every pass there.")
-@click.option(
-    "--state",
-    type=NAME,
-    metavar="FILE.npz",
-    help="Resume from this file if it exists, and save to it after every pass.",
-)
-@click.option("--watch", is_flag=True, help="Show the picture in a window while it is rendered.")
-@cluster_options
-@run_options
-@families("output", "state", "pass_images")
-def render(
-    source: str,
-    output: str,
-    samples: int | None,
-    size: tuple[int, int] | None,
-    crop: tuple[int, int, int, int] | None,
-    seed: int,
-    layers: bool,
-    denoise: bool,
-    device: str,
-    limit: float | None,
-    bits: str,
-    pass_images: str | None,
-    state: str | None,
-    watch: bool,
-    cluster: str | None,
-    shard: str | None,
-    store: str | None,
-    settings: tuple[str, ...],
-    threads: int,
-    quiet: bool,
-) -> None:
-    """Render a picture of SCENE, as its camera, lights and materials say."""
-    from fracslice.export.images import check_image
-    from fracslice.rendering import Renderer
-    from fracslice.rendering.bands import rows_of_bands
-    from fracslice.rendering.layers import layers as rendered_layers
-    from fracslice.rendering.sequence import SampleRange
     from fracslice.work import Work
 
-    if check_image(output) != ".exr" and layers:
-        raise click.BadParameter("expected an .exr file as --output, which holds them", param_hint="--layers")
-    check_targets(source, output, state)
-    if pass_images:
-        check_folder(Path(pass_images))
-    scene, start = load_scene(source, settings), time.monotonic()
-    if denoise and scene.view.shading.mode != "light":
-        raise click.BadParameter('expected a scene with shading mode="light"', param_hint="--denoise")
-    film = size or (scene.view.film.width, scene.view.film.height)
-    if crop is None and (rows := rows_of_bands(film)) < film[1]:
-        whole = {"--layers": layers, "--denoise": denoise, "--time": limit, "--pass-images": pass_images}
-        whole |= {"--watch": watch, "--state": state, "--cluster": cluster, "--shard": shard}
-        check_options(output, whole)
-        click.echo(announced(film, rows), err=True)
-        with working(threads, quiet) as work:
-            made = work, device, SampleRange(seed=seed), samples, int(bits)
-            line = render_to(output, scene, film, rows, *made, text_of(scene))
-        if not quiet:
+
+class RenderOptions(ClusterOptions, SceneOptions):
+    """Options of `render`."""
+
+    source: str = argument("SCENE")
+    output: str = output("FILE", "A .png, .jpg or .webp file, or .exr or .tif for linear floats.")
+    samples: int | None = SAMPLES
+    size: tuple[int, int] | None = option(
+        PIXELS, "Pixels across and down; the scene's by default, or 1280x720."
+    )
+    crop: tuple[int, int, int, int] | None = option(
+        PART, "Render only this part: left, top, width and height in pixels."
+    )
+    seed: int = option(Whole(0, 2**31 - 1), "Seed of the random samples; 0 by default.", default=0)
+    layers: bool = flag("Add depth, normal, position, albedo and samples to the .exr file.")
+    denoise: bool = flag("Remove the noise that is left.")
+    device: str = DEVICE
+    limit: float | None = option(DURATION, "Stop after this time: 10s, 2min or 1h.", "--time")
+    bits: str = option(click.Choice(["8", "16"]), "Bits per channel of a PNG; 8 by default.", default="8")
+    pass_images: str | None = option(Name("DIR"), "Write the picture of every pass there.")
+    state: str | None = option(
+        Name("FILE.npz"), "Resume from this file if it exists, and save to it after every pass."
+    )
+    watch: bool = flag("Show the picture in a window while it is rendered.")
+
+
+@command(RenderOptions, short_help="Render a picture of SCENE.")
+@families("output", "state", "pass_images")
+def render(given: RenderOptions) -> None:
+    """Render a picture of SCENE, as its camera, lights and materials say.
+
+    Examples
+    --------
+    fracslice render mandelbulb -o bulb.png --size 1920x1080 --samples 64
+    fracslice render my.xml -o my.exr --time 2min --layers
+    """
+    from fracslice.kernel.devices import for_picture
+    from fracslice.rendering import Renderer
+    from fracslice.rendering.bands import rows_of_bands
+    from fracslice.rendering.picture_layers import layers
+    from fracslice.rendering.sequence import SampleRange
+
+    scene, start = checked_scene(given), time.monotonic()
+    film = given.size or (scene.view.film.width, scene.view.film.height)
+    if given.crop is None and (rows := rows_of_bands(film)) < film[1]:
+        line = in_bands(given, scene, film, rows)
+        if not given.quiet:
             click.echo(f"{line}, {time.monotonic() - start:.1f} s")
         return
-    with (
-        pooled(output, threads, cluster, shard, store) as pool,
-        working(Work(threads, cluster=pool), quiet) as work,
-    ):
-        renderer = Renderer(scene.root, scene.view, size, work, device, SampleRange(seed=seed), crop)
-        aside = None if pool is None or state else pool.pieces.path(f"{renderer.key}.npz")
-        state = state or aside
-        if state and Path(state).exists():
-            renderer.resume(state)
-        first = pool is None or pool.first
-
-        def write(path: str | Path, done: Pass, bits: str) -> str:
-            save(path, done, scene, bits, threads)
-            return described(path, renderer, done)
-
-        try:
-            passes = timed(renderer, samples, limit)
-            for done in shown(passes, renderer, scene.name) if watch else passes:
-                rate = f"{reached(done)}, {done.rate / 1e6:.2f} M samples/s"
-                work.progress(rate, fraction(done, renderer, samples))
-                if pass_images:
-                    Path(pass_images).mkdir(exist_ok=True)
-                    write(Path(pass_images) / f"pass{done.number:04}.png", done, "8")
-                if state and first:
-                    save_state(renderer, state)
-            if limit and state and first:
-                save_state(renderer, state)  # of a pass that the limit interrupted
-        except Cancelled:
-            kept = renderer.seen()
-            if not first or not kept.samples:
-                raise
-            if state:
-                save_state(renderer, state)
-            raise KeptError(write(output, kept, bits)) from None
-    if not first:
+    with given.working() as work:
+        sequence, pool = SampleRange(seed=given.seed), work.cluster
+        samples = given.samples or scene.view.film.samples
+        device = for_picture(given.device, given.crop[2:] if given.crop else film, samples)
+        renderer = Renderer(scene.root, scene.view, given.size, work, device, sequence, given.crop)
+        aside = None if pool is None or given.state else pool.pieces.path(f"{renderer.key}.npz")
+        render_passes(renderer, scene, given.but(state=given.state or aside), work)
+    if pool and not pool.first:
         raise SharedError("the samples are made; shard 1 writes the file")
-    more = rendered_layers(renderer) if layers else None
-    done = without_noise(renderer) if denoise else renderer.seen()
-    save(output, done, scene, bits, threads, more)
+    more = layers(renderer) if given.layers else None
+    done = without_noise(renderer) if given.denoise else renderer.seen()
+    save(given.output, done, scene, given.bits, given.threads, more)
     if pool and aside:
         Path(aside).unlink(missing_ok=True)
-        if not shard:
+        if not given.shard:
             pool.pieces.tidy()
-    if not quiet:
+    if not given.quiet:
         took = time.monotonic() - start
         about = f"{renderer.setup.precision}, {renderer.device}, {took:.1f} s"
-        click.echo(f"{described(output, renderer, done)}, {about}")
+        click.echo(f"{described(given.output, renderer, done)}, {about}")
+
+
+def checked_scene(given: RenderOptions) -> Scene:
+    """The scene; raise an error for files that cannot be written and for options that do not fit it."""
+    from fracslice.export.images import check_image
+
+    if check_image(given.output) != ".exr" and given.layers:
+        raise click.BadParameter("expected an .exr file as --output, which holds them", param_hint="--layers")
+    if given.bits == "16" and check_image(given.output) != ".png":
+        raise click.BadParameter("expected a .png file as --output", param_hint="--bits")
+    check_targets(given.source, given.output, given.state)
+    if given.pass_images:
+        check_folder(Path(given.pass_images))
+    scene = load_scene(given.source, given.settings)
+    if given.denoise and scene.view.shading.mode != "light":
+        raise click.BadParameter('expected a scene with shading mode="light"', param_hint="--denoise")
+    return scene
+
+
+def in_bands(given: RenderOptions, scene: Scene, film: tuple[int, int], rows: int) -> str:
+    """Render a picture larger than the memory; return the line on it."""
+    from fracslice.rendering.sequence import SampleRange
+
+    whole = ("layers", "denoise", "limit", "pass_images", "watch", "state", "cluster", "shard")
+    check_options(given.output, whole)
+    click.echo(announced(film, rows), err=True)
+    with given.working() as work:
+        made = work, given.device, SampleRange(seed=given.seed), given.samples, int(given.bits)
+        return render_to(given.output, scene, film, rows, *made, text_of(scene))
+
+
+def render_passes(renderer: Renderer, scene: Scene, given: RenderOptions, work: Work) -> None:
+    """Render pass after pass, from --state and into it; a cancelled picture is written as it is."""
+    state, first, samples = given.state, work.cluster is None or work.cluster.first, given.samples
+    if state and Path(state).exists():
+        renderer.resume(state)
+    try:
+        passes = timed(renderer, samples, given.limit)
+        for done in shown(passes, renderer, scene.name) if given.watch else passes:
+            rate = f"{reached(done)}, {done.rate / 1e6:.2f} M samples/s"
+            work.progress(rate, fraction(done, renderer, samples))
+            if given.pass_images:
+                Path(given.pass_images).mkdir(exist_ok=True)
+                save(Path(given.pass_images) / f"pass{done.number:04}.png", done, scene, "8", given.threads)
+            if state and first:
+                save_state(renderer, state)
+        if given.limit and state and first:
+            save_state(renderer, state)  # of a pass that the limit interrupted
+    except Cancelled:
+        kept = renderer.seen()
+        if not first or not kept.samples:
+            raise
+        if state:
+            save_state(renderer, state)
+        save(given.output, kept, scene, given.bits, given.threads)
+        raise KeptError(described(given.output, renderer, kept)) from None
 
 
 def shown(passes: Iterator[Pass], renderer: Renderer, name: str) -> Iterator[Pass]:
@@ -228,9 +203,10 @@ def timed(renderer: Renderer, samples: int | None, limit: float | None) -> Itera
 
 
 def reached(done: Pass) -> str:
-    """Samples per pixel and error of a pass, as text."""
+    """Samples per pixel of a pass and its error, which less than a sample does not tell, as text."""
     samples = f"{done.samples:.1f}" if done.samples >= 1 else f"{done.samples:.1g}"
-    return f"{samples} samples a pixel, error {done.error:.2g}"
+    error = f"error {done.error:.2g}" if math.isfinite(done.error) else "error unknown"
+    return f"{samples} samples a pixel, {error}"
 
 
 def fraction(done: Pass, renderer: Renderer, samples: int | None) -> float:

@@ -4,10 +4,17 @@ from __future__ import annotations
 
 import click
 
+from .options import CommandOptions, command
 
-@click.command(short_help="List the scenes that ship with fracslice.")
-def scenes() -> None:
-    """List the scenes that ship with fracslice; each name can stand for a SCENE."""
+
+@command(CommandOptions, short_help="List the scenes that ship with fracslice.")
+def scenes(_: CommandOptions) -> None:
+    """List the scenes that ship with fracslice; each name can stand for a SCENE.
+
+    Examples
+    --------
+    fracslice scenes
+    """
     from fracslice.scene import library
 
     names = library.names()

@@ -2,44 +2,38 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import click
-
-from .inputs import is_model, load_model, load_scene, refuse_scene_options
-from .options import job_of, job_options, print_options, run_options, source_argument
-from .working import working
+from .inputs import is_model, load_model, load_scene, refuse_options
+from .options import MeshOptions, argument, command
 
 
-@click.command()
-@source_argument("MODEL|SCENE")
-@print_options
-@job_options
-@run_options
-@click.pass_context
-def show(
-    context: click.Context,
-    /,
-    source: str,
-    settings: tuple[str, ...],
-    threads: int,
-    quiet: bool,
-    **options: Any,
-) -> None:
+class ShowOptions(MeshOptions):
+    """Options of `show`."""
+
+    source: str = argument("MODEL|SCENE")
+
+
+@command(ShowOptions)
+def show(given: ShowOptions) -> None:
     """Open a window on a model file, or on the mesh of a scene.
 
     All options but --threads and --quiet are for scenes.
+
+    Examples
+    --------
+    fracslice show my.3mf
+    fracslice show my.xml --resolution 128
     """
     from fracslice import viewer
 
-    if is_model(source):
-        refuse_scene_options(context)
-        viewer.show(load_model(source))
+    if is_model(given.source):
+        names = {*vars(given), "formulas"} - {"source", "threads", "quiet"}
+        refuse_options(names, "only for scenes, and a model was given")
+        viewer.show(load_model(given.source))
         return
     from fracslice.jobs.mesh import make_mesh
 
-    scene = load_scene(source, settings)
+    scene = load_scene(given.source, given.settings)
     viewer.need_screen()  # before the mesh, which may take minutes
-    with working(threads, quiet) as work:
-        mesh = make_mesh(scene, job_of(scene, **options), work).mesh
+    with given.working() as work:
+        mesh = make_mesh(scene, given.job(scene), work).mesh
     viewer.show(mesh)

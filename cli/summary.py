@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from fracslice.common.digits import counted
+
 if TYPE_CHECKING:
     from fracslice.jobs.report import Report
-    from fracslice.mesh.check import MeshReport
+    from fracslice.mesh.mesh_report import MeshReport
 
 
 def summary(path: str, report: Report) -> str:
@@ -29,7 +31,7 @@ def figures(mesh: MeshReport) -> str:
     """Figures and printability of a mesh, in one line."""
     (x0, y0, z0), (x1, y1, z1) = mesh.bbox_mm
     size = f"{x1 - x0:.2f} x {y1 - y0:.2f} x {z1 - z0:.2f} mm"
-    bodies = f"{mesh.components} {'body' if mesh.components == 1 else 'bodies'}"
+    triangles, bodies = counted(mesh.triangles, "triangle"), counted(mesh.components, "body", "bodies")
     verdict = f"would not print: {', '.join(mesh.problems)}" if mesh.problems else "watertight, manifold"
     volume = f"{mesh.volume_mm3 / 1000:.2f} cm3" if mesh.volume_mm3 >= 1000 else f"{mesh.volume_mm3:.2f} mm3"
-    return f"{mesh.triangles:,} triangles, {size}, {volume}, {bodies}, {verdict}"
+    return f"{triangles}, {size}, {volume}, {bodies}, {verdict}"

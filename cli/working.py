@@ -18,9 +18,12 @@ if TYPE_CHECKING:
 
 Progress = Callable[[str, float], None]
 
+NOTHING = "nothing was written"
+"""What most commands leave when they are stopped."""
+
 
 class KeptError(Cancelled):
-    """The work was cancelled, and what there is was written; the message names it."""
+    """Cancelled work whose partial result was written; the message names it."""
 
 
 class StoppedError(FracsliceError):
@@ -32,13 +35,13 @@ class StoppedError(FracsliceError):
         Exit status by the shell's convention, 128 + the signal's number; 130 for Ctrl-C.
     """
 
-    def __init__(self, number: int, kept: str = "nothing was written") -> None:
+    def __init__(self, number: int, kept: str) -> None:
         super().__init__(f"stopped; {kept}")
         self.status = 128 + number
 
 
 @contextmanager
-def working(how: int | Work, quiet: bool) -> Iterator[Work]:
+def working(how: int | Work, quiet: bool, kept: str = NOTHING) -> Iterator[Work]:
     """Work that shows its progress on a terminal and is cancelled by SIGINT and SIGTERM.
 
     Parameters
@@ -47,6 +50,8 @@ def working(how: int | Work, quiet: bool) -> Iterator[Work]:
         Number of threads, or a record to copy.
     quiet : bool
         True for no progress bar.
+    kept : str, optional
+        What a cancelled command leaves, for the message.
 
     Yields
     ------
@@ -60,7 +65,7 @@ def working(how: int | Work, quiet: bool) -> Iterator[Work]:
     from fracslice.work import Work
 
     like = Work(how) if isinstance(how, int) else how
-    with _bar(quiet) as progress, _cancelled_by_signals() as cancel:
+    with _bar(quiet) as progress, _cancelled_by_signals(kept) as cancel:
         yield replace(like, progress=progress, cancel=cancel)
 
 
@@ -76,8 +81,10 @@ def _bar(quiet: bool) -> Iterator[Progress]:
     columns = (TextColumn("{task.description:>10}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         tasks = {}
+        preparing = bar.add_task("preparing", total=None)  # the first run of a scene compiles for a second
 
         def progress(stage: str, done: float) -> None:
+            bar.update(preparing, visible=False)
             if stage not in tasks:
                 tasks[stage] = bar.add_task(stage, total=1.0)
             bar.update(tasks[stage], completed=done)
@@ -86,7 +93,7 @@ def _bar(quiet: bool) -> Iterator[Progress]:
 
 
 @contextmanager
-def _cancelled_by_signals() -> Iterator[threading.Event]:
+def _cancelled_by_signals(kept: str) -> Iterator[threading.Event]:
     """Event set by the first SIGINT or SIGTERM; the second one raises KeyboardInterrupt at once."""
     cancel = threading.Event()
     received: list[int] = []
@@ -103,7 +110,7 @@ def _cancelled_by_signals() -> Iterator[threading.Event]:
     except KeptError as error:
         raise StoppedError(received[0] if received else signal.SIGINT, str(error)) from None
     except Cancelled:
-        raise StoppedError(received[0] if received else signal.SIGINT) from None
+        raise StoppedError(received[0] if received else signal.SIGINT, kept) from None
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -94,6 +94,7 @@ _WHERE = {
 register(
     compiler="fracslice.kernel.tree",
     orbits="fracslice.kernel.orbits",
+    orbit_samples="fracslice.kernel.orbit_samples",
     growth="fracslice.kernel.growth",
     orbit_signs="fracslice.kernel.orbit_signs",
     distances="fracslice.api.distances",
@@ -116,4 +117,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__getattr__("__all__")})
+    return sorted({*(name for name in globals() if name.startswith("__")), *__getattr__("__all__")})

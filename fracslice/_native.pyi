@@ -6,7 +6,7 @@ Arrays are C-contiguous and laid out as in `fracslice.volume.bricks.Bricks`. Lon
 from collections.abc import Callable
 from typing import Any
 
-from numpy import bool_, float32, float64, int32, int64, uint8
+from numpy import bool_, float32, float64, int16, int32, int64, uint8
 from numpy.typing import NDArray
 
 from .kernel.machine import Function
@@ -133,6 +133,48 @@ def climb(
 ) -> NDArray[float64]:
     """Extreme points of a solid in given directions; call `fracslice.volume.climbing.climb`."""
 
+def surface_error(
+    field: Entry,
+    points: NDArray[float64],
+    scale: float,
+    offset: Point,
+    steps: NDArray[float64],
+    step: float,
+    voxel: float,
+    threads: int = 0,
+) -> NDArray[float64]:
+    """Distances of points from a surface; call `fracslice.volume.accuracy.surface_error`."""
+
+class ProjectionLoops:
+    """Compiled loops that project points to a surface; keeps its arguments alive.
+
+    Parameters
+    ----------
+    lanes : int
+        Segments come in multiples of it.
+    lead, guess, find, aim : Loop
+        Loops of `fracslice.mesh.root_loops`: `lead` and `find` in float32, `find` and `aim` in float64.
+    field : Entry
+        The same float64 field.
+    steps : tuple of int
+        Steps for all segments, and for those that have not converged by then.
+    """
+
+    def __init__(
+        self, lanes: int, lead: Loop, guess: Loop, find: Loop, aim: Loop, field: Entry, steps: tuple[int, int]
+    ) -> None: ...
+
+def project(
+    points: NDArray[float64],
+    first: int,
+    last: int,
+    loops: ProjectionLoops,
+    trust_regions: Callable[[NDArray[int64], NDArray[bool_]], NDArray[float64]],
+    voxel: float,
+    threads: int = 0,
+) -> None:
+    """Project points `first` to `last` - 1, in place; call `fracslice.mesh.projection.project`."""
+
 class RootLoops:
     """Compiled loops that locate crossings on grid edges; keeps its arguments alive.
 
@@ -183,22 +225,18 @@ class Cells:
     def crossings_before(self, layer: int) -> int:
         """Number of crossings in the bricks before a layer."""
 
-    def segments(self, begin: int, end: int, origin: Point, voxel: float) -> NDArray[float64]:
+    def edges(self, begin: int, end: int) -> NDArray[int16]:
         """Grid edges that the surface crosses.
 
         Parameters
         ----------
         begin, end : int
             Crossings `begin` to `end` - 1, in the order of the vertices of `marching_cubes`.
-        origin : tuple of float
-            Position of the grid's origin, scene units.
-        voxel : float
-            Spacing of the grid, scene units.
 
         Returns
         -------
-        ndarray of float64, shape (6, n)
-            Start of each edge and the vector to its end, scene units.
+        ndarray of int16, shape (n, 4)
+            Lower grid point and axis of each edge.
 
         Raises
         ------
@@ -220,8 +258,12 @@ class Cells:
 
         Parameters
         ----------
-        begin, end, origin, voxel
-            As in `segments`.
+        begin, end : int
+            As in `edges`.
+        origin : tuple of float
+            Position of the grid's origin, scene units.
+        voxel : float
+            Spacing of the grid, scene units.
         loops : RootLoops
             Compiled loops over the field.
         t : ndarray of float64, shape (n,)
@@ -325,10 +367,17 @@ def edge_topology(
 
 def corners_by_vertex(
     triangles: NDArray[int32], vertices: int, threads: int = 0
-) -> tuple[NDArray[int64], NDArray[int64]]: ...
+) -> tuple[NDArray[int64], NDArray[int64]]:
+    """First corner of each vertex, [n + 1]; corners by vertex: corner k of triangle t is 3 t + k."""
+
 def connected_components(
     triangles: NDArray[int32], vertices: int, threads: int = 0
-) -> tuple[NDArray[int32], int]: ...
+) -> tuple[NDArray[int32], int]:
+    """Component of each vertex, numbered by first vertices, -1 if unused; and their number.
+
+    Triangles with a common vertex are connected.
+    """
+
 def component_sizes(
     vertices: NDArray[float64],
     triangles: NDArray[int32],

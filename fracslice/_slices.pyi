@@ -192,3 +192,19 @@ class Slab:
 
 def encoded(image: NDArray[uint8], encoding: Encoding) -> bytes:
     """Encode an image of any strides."""
+
+def filtered(rows: NDArray[uint8], pixel: int) -> bytes:
+    """Filter rows of bytes, each by the PNG filter with the smallest sum of absolute differences.
+
+    Parameters
+    ----------
+    rows : uint8 [n + 1, width]
+        The row above the first one, and n rows.
+    pixel : int
+        Bytes of a pixel.
+
+    Returns
+    -------
+    bytes
+        n rows of 1 + `width` bytes: the number of the filter, and the filtered row.
+    """

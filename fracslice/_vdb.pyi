@@ -3,7 +3,7 @@
 Arrays are C-contiguous and laid out as in `fracslice.volume.bricks.Bricks`. Long calls release the GIL.
 """
 
-from numpy import float32, int32, uint32
+from numpy import float32, int32
 from numpy.typing import NDArray
 
 Point = tuple[float, float, float]
@@ -27,27 +27,10 @@ class Grid:
     def to_bricks(self) -> tuple[list[float], float, NDArray[int32], NDArray[float32], NDArray[int32]]:
         """Origin, voxel, ijk, values and index. Raises ValueError unless voxels are axis-aligned cubes."""
 
-    def mesh(self, adaptivity: float = 0.0) -> tuple[NDArray[float32], NDArray[uint32], NDArray[uint32]]:
-        """Dual contouring by OpenVDB: points [n, 3], triangles [m, 3], quads [k, 4]."""
-
     def redistance(self) -> Grid:
         """Signed distance field of the same surface, by fast sweeping (Zhao, 2004). Raises ValueError."""
 
     def offset(self, distance: float) -> Grid:
         """Signed distances of the surface, offset outwards by `distance`, scene units. Raises ValueError."""
 
-    def surfaces(self) -> list[Grid]:
-        """One grid per connected component of the surface, the largest first."""
-
     name: str
-    @property
-    def metadata(self) -> dict[str, str]: ...
-    @property
-    def background(self) -> float: ...
-    @property
-    def active_voxels(self) -> int: ...
-    @property
-    def leaves(self) -> int: ...
-    @property
-    def memory(self) -> int:
-        """Memory in bytes."""

@@ -28,6 +28,10 @@ class TooLargeError(VolumeError):
     """Job that needs more memory than is available."""
 
 
+class EmptyError(VolumeError):
+    """Scene of which no sample is inside."""
+
+
 class MeshError(FracsliceError):
     """Failure to build, read or repair a mesh."""
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from .common.digits import significant
 from .errors import SceneError
 from .formulas.material import TRAPS
-from .formulas.parameters import Choice, Number, Vector, validate
+from .formulas.parameters import Choice, Number, Vector
+from .formulas.records import attribute, validate
 from .scene import Print, Scene
 from .scene.lengths import Length, Percent
 
@@ -19,10 +21,19 @@ COLOURS = ("material", *TRAPS)
 COARSEST, FINEST = 8, 16384
 """Limits of the voxels along the longest side."""
 
+TOLERANCE = 0.25
+"""Maximum tolerance of simplification, relative to the longest side."""
+
 DUST = 1e-5
 """Default maximum volume of dust, relative to the whole object: crumbs at the rim of a fractal of finite
 depth. No strut is built to dust either.
 """
+
+JOINING = 3
+"""Diameter of struts and minimum thickness of walls that join bodies at any position in the grid, voxels."""
+
+PIECES = 0.05
+"""Minimum fraction of the material in bodies thinner than a voxel for a note on thin walls."""
 
 
 @dataclass(frozen=True)
@@ -63,22 +74,24 @@ class MeshJob:
         For invalid values.
     """
 
-    size_mm: float | None = None
-    voxel_mm: float | None = None
-    resolution: float | None = None
-    dust_mm3: float | None = None
+    size_mm: float | None = attribute(Length, None, "a length")
+    voxel_mm: float | None = attribute(Length, None, "a length")
+    resolution: float | None = attribute(
+        Number, None, "voxels along the longest side", least=COARSEST, most=FINEST
+    )
+    dust_mm3: float | None = attribute(Number, None, "a volume", least=0)
     printing: Print | None = None
-    chord_mm: float | None = None
-    simplify_mm: float | None = None
-    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    colour: str | None = None
+    chord_mm: float | None = attribute(Length, None, "a length")
+    simplify_mm: float | None = attribute(Length, None, "a length")
+    up: tuple[float, float, float] = attribute(Vector, (0.0, 0.0, 1.0), "a direction", nonzero=True)
+    scale: tuple[float, float, float] = attribute(Percent, (1.0, 1.0, 1.0), "compensation of shrinkage")
+    colour: str | None = attribute(Choice, None, "colours of vertices", COLOURS)
     proved: bool = False
 
     def __post_init__(self) -> None:
         if self.voxel_mm is not None and self.resolution is not None:
             raise SceneError("voxel and resolution: expected one of them")
-        validate(self, _KINDS, SceneError)
+        validate(self, SceneError)
 
     def how(self, scene: Scene) -> Print:
         """Changes for printing.
@@ -95,13 +108,15 @@ class MeshJob:
         """
         return scene.printing if self.printing is None else self.printing
 
-    def dust(self, volume: float) -> float:
+    def dust(self, volume: float, crumb: float = 0.0) -> float:
         """Volume below which a body is removed.
 
         Parameters
         ----------
         volume : float
             Volume of the object, mm3.
+        crumb : float, optional
+            Volume of the largest crumb, which is dust by default, mm3.
 
         Returns
         -------
@@ -113,9 +128,12 @@ class MeshJob:
         SceneError
             If the limit exceeds the volume of the object.
         """
-        dust = DUST * volume if self.dust_mm3 is None else self.dust_mm3
+        dust = max(DUST * volume, crumb) if self.dust_mm3 is None else self.dust_mm3
         if dust > volume:
-            raise SceneError(f"dust {dust:.4g}mm3: expected at most the object's volume, {volume:.4g}mm3")
+            most = significant(volume)
+            raise SceneError(
+                f"dust {significant(dust)} mm3: expected at most the object's volume, {most} mm3"
+            )
         return dust
 
     def voxels(self, size: float) -> float:
@@ -134,8 +152,12 @@ class MeshJob:
         Raises
         ------
         SceneError
-            If the voxel is too coarse or too fine for the size.
+            If the voxel is too coarse or too fine for the size, or the tolerance of simplification too large.
         """
+        if self.simplify_mm is not None and self.simplify_mm > (most := TOLERANCE * size):
+            raise SceneError(
+                f"simplify {self.simplify_mm:g}mm: expected at most {most:.4g}mm for an object of {size:g}mm"
+            )
         if self.voxel_mm is None:
             return RESOLUTION if self.resolution is None else self.resolution
         if not COARSEST <= size / self.voxel_mm <= FINEST:
@@ -144,13 +166,3 @@ class MeshJob:
                 f"voxel {self.voxel_mm:g}mm: expected {low:.4g}mm to {high:.4g}mm for an object of {size:g}mm"
             )
         return size / self.voxel_mm
-
-
-_KINDS = {
-    **dict.fromkeys(("size_mm", "voxel_mm", "chord_mm", "simplify_mm"), Length(None, "a length")),
-    "resolution": Number(None, "voxels along the longest side", least=COARSEST, most=FINEST),
-    "dust_mm3": Number(None, "a volume", least=0),
-    "up": Vector((0.0, 0.0, 1.0), "a direction", nonzero=True),
-    "colour": Choice(None, "colours of vertices", COLOURS),
-    "scale": Percent((1.0, 1.0, 1.0), "compensation of shrinkage"),
-}

@@ -16,7 +16,7 @@ from .common.cache_files import Kept
 from .common.keys import key, program
 from .errors import ExportError, VolumeError
 from .kernel import Field
-from .kernel.objects import toolchain
+from .kernel.host import toolchain
 
 Arrays = Mapping[str, np.ndarray]
 

@@ -7,11 +7,10 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cache
+from functools import partial
 from itertools import islice
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from .errors import Cancelled, SceneError
 
@@ -31,8 +30,11 @@ def _mark() -> None:
     _HERE.is_worker = True
 
 
-_POOL = ThreadPoolExecutor(256, "fracslice", initializer=_mark)
+POOL = ThreadPoolExecutor(256, "fracslice", initializer=_mark)
 """Worker threads, started on demand and kept: starting a thread takes longer than many tasks."""
+
+_CALLED = 2
+"""Threads that each thread of `Work.map` calls: quick tasks are done before many are called."""
 
 _AHEAD = 2
 """Results of `Work.ordered` in memory, times the number of threads."""
@@ -79,9 +81,15 @@ class Work:
             from .cluster import Workers
 
             object.__setattr__(self, "cluster", Workers.of(self.cluster))
-        from .formulas.parameters import Count, validate  # imports NumPy, which --help does not need
+        from .formulas.parameters import Count  # imports NumPy, which --help does not need
+        from .formulas.records import validated
 
-        validate(self, {"threads": Count(1, "how many", least=1, most=1024)}, SceneError)
+        kind = Count(1, "how many", least=1, most=1024)
+        object.__setattr__(self, "threads", validated("threads", self.threads, kind, SceneError))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle and copy without progress, cancellation and pool, which belong to a process."""
+        return partial(Work, self.threads, store=self.store, device=self.device), ()
 
     def check(self) -> None:
         """Raise `Cancelled` if cancellation was requested.
@@ -157,7 +165,7 @@ class Work:
                 # Callbacks come after `result`, late on a busy machine: ask the futures.
                 running = sum(not future.done() for future in ahead)
                 free = min(self.threads - running, _AHEAD * self.threads - len(ahead))
-                begun = [_POOL.submit(task, item) for item in islice(waiting, max(free, 0))]
+                begun = [POOL.submit(task, item) for item in islice(waiting, max(free, 0))]
                 ahead.extend(begun)
             for future in begun:
                 future.add_done_callback(fill)
@@ -201,83 +209,38 @@ class Work:
                 self.check()
                 task(item)
             return
-        queue = iter(items)
-        lock = threading.Lock()
+        lock, queue = threading.Lock(), deque(items)
+        most, helpers = min(self.threads, len(items)) - 1, list[Future[None]]()
 
         def drain() -> None:
-            nonlocal queue
             try:
+                with lock:  # one item is for this thread
+                    for _ in range(min(_CALLED, most - len(helpers), len(queue) - 1)):
+                        helpers.append(POOL.submit(drain))
                 while not self.cancel.is_set():
                     with lock:
-                        item = next(queue, None)
-                    if item is None:
-                        return
+                        if not queue:
+                            return
+                        item = queue.popleft()
                     task(item)
             except BaseException:
-                queue = iter(())
+                with lock:
+                    queue.clear()
                 raise
 
-        helpers = [_POOL.submit(drain) for _ in range(min(self.threads, len(items)) - 1)]
         try:
             drain()
         except KeyboardInterrupt:
             self.cancel.set()
             raise
         finally:
+            with lock:
+                queue.clear()  # what is left of cancelled work calls no more helpers
             begun = [helper for helper in helpers if not helper.cancel()]
             wait(begun)
         for helper in begun:
             helper.result()
         self.check()
-
-
-@contextmanager
-def in_background(task: Callable[[], R], threads: int) -> Iterator[Callable[[], R]]:
-    """Run a task in another thread during a block; without other threads, when its result is asked for.
-
-    Parameters
-    ----------
-    task
-        Function without arguments.
-    threads
-        Number of threads of the job.
-
-    Yields
-    ------
-    callable
-        Waits for the task and returns its result.
-    """
-    if threads == 1:
-        yield cache(task)
-        return
-    begun = _POOL.submit(task)
-    try:
-        yield begun.result
-    finally:
-        begun.cancel()
-        wait([begun])
-
-
-def ahead(items: Iterator[T]) -> Iterator[T]:
-    """Compute each item in another thread while the consumer uses the one before.
-
-    Parameters
-    ----------
-    items
-        Items other than None.
-
-    Yields
-    ------
-    object
-        The same items.
-    """
-    coming = _POOL.submit(next, items, None)
-    try:
-        while (item := coming.result()) is not None:
-            coming = _POOL.submit(next, items, None)
-            yield item
-    finally:
-        wait([coming])
 
 
 def chunks(count: int, size: int) -> list[slice]:

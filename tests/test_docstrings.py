@@ -39,6 +39,31 @@ def test_no_two_public_classes_have_one_name(trees: dict[Path, ast.Module]) -> N
     assert [name for name, count in public.items() if count > 1] == []
 
 
+TWINS = {
+    "arrays", "camera", "cells", "cpu", "cuda", "cuda_loops", "definitions", "field", "film", "identity",
+    "implicit", "intrinsics", "machine", "model", "orbits", "tree",
+}  # fmt: skip
+"""Modules of one name in two packages: mostly two sides of one thing, such as a formula and its kernel."""
+
+
+def test_no_further_modules_have_one_name(trees: dict[Path, ast.Module]) -> None:
+    library = Counter(path.stem for path in trees if "cli" not in path.parts and path.stem[0] != "_")
+    assert {name for name, count in library.items() if count > 1} == TWINS
+
+
+def test_the_library_imports_itself_relatively(trees: dict[Path, ast.Module]) -> None:
+    absolute = [
+        f"{path.relative_to(ROOT)}:{node.lineno}"
+        for path, tree in trees.items()
+        if "cli" not in path.parts
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom)
+        and not node.level
+        and (node.module or "").split(".")[0] == "fracslice"
+    ]
+    assert not absolute
+
+
 def test_every_name_in_backticks_exists(trees: dict[Path, ast.Module]) -> None:
     known = {part for path in trees for part in (path.stem, *path.parent.parts)}
     known |= set(re.findall(r"\w+", NATIVE)) | set(dir(builtins)) | {"docs", "md"}

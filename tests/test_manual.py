@@ -118,7 +118,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         write(shapes.cube(), tmp_path / name)
     (tmp_path / "my.ini").write_text("")
     (tmp_path / "own.py").write_text(OWN)
-    for name in ("registry._REGISTRY", "plugins._FILES"):
+    for name in ("registry.FORMULAS", "plugins._FILES"):
         monkeypatch.setattr(
             f"fracslice.formulas.{name}", dict(pkgutil.resolve_name(f"fracslice.formulas.{name}"))
         )
@@ -139,7 +139,7 @@ def test_commands_are_understood(line: str, folder: Path, monkeypatch, capfd) ->
         "slicing.plan_stack",
         "rendering.Renderer",
         "animation.Timeline",
-        "bench.runs.measure",
+        "bench.measurements.measure",
         "viewer.fly",
         "cluster.connected",
     ):

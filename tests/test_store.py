@@ -92,6 +92,7 @@ def test_what_is_kept_follows_from_the_program(
 
     before = keys.program()
     monkeypatch.setattr(Path, "read_bytes", edited)
+    monkeypatch.setenv("FRACSLICE_CACHE", str(tmp_path / "cache"))
     keys.program.cache_clear()
     after = keys.program()
     monkeypatch.undo()
@@ -123,7 +124,7 @@ def test_a_folder_that_others_can_write_is_not_used(tmp_path: Path) -> None:
             store.get(("x",), lambda: made.append(1) or {"a": np.arange(5)})
         (tmp_path / "kept").chmod(mode)
     assert len(made) == 1
-    with pytest.warns(FracsliceWarning, match="others can write in this folder: what is kept in"):
+    with pytest.warns(FracsliceWarning, match="others can write in this folder: the files in"):
         store.get(("x",), lambda: made.append(1) or {"a": np.arange(6)})
     assert len(made) == 2
     (tmp_path / "kept").chmod(0o700)
@@ -153,3 +154,27 @@ def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(VolumeError, match="file/cache: Not a directory"):
         make_mesh(BULB, MeshJob(resolution=16), replace(Work(), store=Store(tmp_path / "file" / "cache")))
+
+
+def test_files_of_the_program_are_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And again when one of them changes, even to as many bytes."""
+    package, hashed, texts = tmp_path / "package", [], keys.texts
+    (package / "inner").mkdir(parents=True)
+    for name in ("a.py", "inner/b.py", "inner/c.txt"):
+        (package / name).write_text("1")
+    monkeypatch.setenv("FRACSLICE_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(keys, "PACKAGE", package)
+    monkeypatch.setattr(keys, "texts", lambda *paths: hashed.append(paths) or texts(*paths))
+
+    def program() -> str:
+        return str(keys.program.__wrapped__())
+
+    before = program()
+    assert program() == before
+    assert len(hashed) == 1
+    assert {path.name for path in hashed[0]} >= {"a.py", "b.py", "version.py"}
+    (package / "inner" / "c.txt").write_text("2")
+    assert program() == before
+    (package / "inner" / "b.py").write_text("2")
+    assert program() != before
+    assert len(hashed) == 2

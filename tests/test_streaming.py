@@ -112,7 +112,7 @@ def test_tips_are_in_streamed_meshes(pieces: None, tmp_path: Path) -> None:
 def test_a_mesh_that_is_only_in_its_file_is_reported_so(pieces: None, tmp_path: Path) -> None:
     made = make_mesh(sphere(), size="30mm", resolution=64, path=tmp_path / "x.stl")
     assert repr(made) == (
-        f"<Result of {made.report.mesh.triangles} triangles, {made.report.mesh.vertices} vertices, "
+        f"<Result of {made.report.mesh.triangles:,} triangles, {made.report.mesh.vertices:,} vertices, "
         "only in its file>"
     )
     with pytest.raises(TooLargeError, match="it is in the file"):

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from fracslice import MeshJob, Work
-from fracslice.bench.runs import BenchmarkTask
+from fracslice.bench.measurements import BenchmarkTask
 from fracslice.errors import FracsliceError
 from fracslice.export.resins import Resin
 from fracslice.formulas import Node, names, sphere

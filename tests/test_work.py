@@ -10,8 +10,10 @@ from contextlib import suppress
 
 import pytest
 
+import fracslice.work
+from fracslice.background import ahead, in_background
 from fracslice.errors import Cancelled
-from fracslice.work import Work, ahead, in_background
+from fracslice.work import Work
 
 
 @pytest.mark.parametrize("threads", [1, 2, 7])
@@ -41,6 +43,22 @@ def test_an_error_is_raised_and_ends_the_work(threads: int) -> None:
 def test_several_threads_work_at_once() -> None:
     meeting = threading.Barrier(3, timeout=20)
     Work(3).map(lambda _: meeting.wait() and None, range(3))
+
+
+def test_as_many_threads_as_asked_for_work_at_once() -> None:
+    """Though each of them calls only a few others."""
+    meeting = threading.Barrier(16, timeout=20)
+    Work(16).map(lambda _: meeting.wait() and None, range(16))
+
+
+def test_quick_tasks_call_few_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Calling one takes longer than such a task."""
+    called: list[int] = []
+    pool, submit = fracslice.work.POOL, fracslice.work.POOL.submit
+    monkeypatch.setattr(pool, "submit", lambda task: called.append(1) or submit(task))
+    for _ in range(20):
+        Work(64).map(lambda _: None, range(64))
+    assert len(called) < 20 * 16
 
 
 def test_maps_within_maps() -> None:

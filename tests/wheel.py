@@ -1,6 +1,7 @@
 """The installed wheel at work, with no OpenVDB or oneTBB from outside it: ``python tests/wheel.py``."""
 
 import json
+import re
 import subprocess
 import sys
 import tempfile
@@ -9,16 +10,11 @@ from pathlib import Path
 import fracslice._native
 import fracslice._vdb
 
-OWN = '''from fracslice.formulas import Number, orbit
-from fracslice.formulas.verbs import ball, fold
+PAGE = Path(__file__).resolve().parents[1] / "docs/tasks/formula.md"
+OWN = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)[:2]
+"""Programs of the page on formulas: one of a field, one of a step."""
 
-
-@orbit(scale=Number(-1.7, "how much each step enlarges"))
-def own_box(w, c, scale):
-    """A Mandelbox (Lowe 2010)."""
-    return scale * ball(fold(w, 1.0), 0.5) + c
-'''
-SCENE = '<scene version="1"><solid size="4cm"><own_box iterations="3"/></solid></scene>'
+SCENE = '<scene version="1"><solid size="4cm"><{}/></solid></scene>'
 
 with tempfile.TemporaryDirectory() as folder:
     program = [
@@ -33,12 +29,16 @@ with tempfile.TemporaryDirectory() as folder:
     ]
     subprocess.run([*program, "-o", "a.stl", "--report", "a.json"], cwd=folder, check=True)
     report = json.loads(Path(folder, "a.json").read_text())
-    Path(folder, "own.py").write_text(OWN)
-    Path(folder, "own.xml").write_text(SCENE)
-    subprocess.run([*program[:3], "formulas", "--check", "own.py"], cwd=folder, check=True)
-    own = ["mesh", "own.xml", "--formulas", "own.py", "-o", "own.stl", "--resolution", "32", "--quiet"]
-    subprocess.run([*program[:3], *own], cwd=folder, check=True)
-    assert Path(folder, "own.stl").stat().st_size > 10_000
+    for name, text in zip(("coral", "own_box"), OWN, strict=True):
+        Path(folder, "own.py").write_text(text)
+        Path(folder, "own.xml").write_text(SCENE.format(name))
+        subprocess.run([sys.executable, "own.py"], cwd=folder, check=True)
+        assert Path(folder, f"{name}.stl").stat().st_size > 10_000
+        Path(folder, "own.py").write_text(text.partition("\nmake_mesh(")[0])
+        subprocess.run([*program[:3], "formulas", "--check", "own.py"], cwd=folder, check=True)
+        own = ["mesh", "own.xml", "--formulas", "own.py", "-o", "own.stl", "--resolution", "32", "--quiet"]
+        subprocess.run([*program[:3], *own], cwd=folder, check=True)
+        assert Path(folder, "own.stl").stat().st_size > 10_000
 assert report["watertight"] and report["manifold"] and report["triangles"] > 1000, report
 maps = Path("/proc/self/maps")
 lines = maps.read_text().splitlines() if maps.exists() else []

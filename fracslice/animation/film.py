@@ -12,10 +12,11 @@ from ..common.keys import key, program
 from ..errors import RenderError
 from ..export import application
 from ..export.images import encoded_image
-from ..formulas.parameters import Number, validated
+from ..formulas.parameters import Number
+from ..formulas.records import validated
 from ..formulas.registry import Node
 from ..rendering import Renderer, develop, picture
-from ..rendering.layers import layers
+from ..rendering.picture_layers import layers
 from ..rendering.sequence import SampleRange
 from ..rendering.setup import default_lights
 from ..scene.model import Scene

@@ -3,24 +3,33 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
 from ..cluster import Shard
+from ..common.digits import counted
 from ..common.files import replacing, reported
 from ..common.keys import key
 from ..errors import RenderError, SharedError
-from ..kernel.objects import toolchain
+from ..kernel.devices import chosen
+from ..kernel.host import toolchain
 from ..scene.reader import reads
 from ..scene.writer import to_xml
 from ..work import Work
 from .film import FilmJob
 from .timeline import Timeline
 
+AT_ONCE, MOST_PIXELS = 4, 1 << 25
+"""Frames that this process makes at once, and pixels of them together."""
+
 JOURNAL = "film.json"
-"""File in the folder that says whose frames these are."""
+"""File in the folder with the key of the film."""
+
+UNFINISHED = ".f*.part"
+"""Files of frames, or the journal, that are being written; see `replacing`."""
 
 
 @dataclass(frozen=True)
@@ -115,34 +124,46 @@ def write_frames(job: FilmJob, numbers: Sequence[int], folder: Path, resume: boo
     """
     if isinstance(work.cluster, Shard) and not work.cluster.first:
         count = work.cluster.share(FrameTask.all(job, numbers), work)
-        raise SharedError(f"{count} frames are made; shard 1 writes them")
+        raise SharedError(f"this shard made {counted(count, 'frame')}; shard 1 writes them")
     _claim(job, folder, resume)
     missing = [number for number in numbers if not (resume and job.path(folder, number).exists())]
-    for number, data in zip(missing, _files(job, missing, work), strict=True):
+
+    def write(number: int, data: bytes) -> None:
         with replacing(job.path(folder, number)) as file:
             file.write(data)
+
+    if work.cluster is None:
+        _write_here(job, missing, write, work)
+    elif missing:
+        tasks = FrameTask.all(job, missing)
+        for number, data in zip(missing, work.cluster.results(tasks, work, "frames"), strict=True):
+            write(number, data)
+        work.cluster.finished(tasks[0].job)
     return [job.path(folder, number) for number in numbers]
 
 
-def _files(job: FilmJob, numbers: Sequence[int], work: Work) -> Iterator[bytes]:
-    """Files of frames, in order, made here or by the pool of the work."""
-    if (pool := work.cluster) is None:
-        alone = replace(work, progress=lambda *_: None)
-        for done, number in enumerate(numbers):
-            work.progress("frames", done / len(numbers))
-            yield job.file(number, alone)
-        work.progress("frames", 1.0)
-        return
-    tasks = FrameTask.all(job, numbers)
-    yield from pool.results(tasks, work, "frames")
-    if tasks:
-        pool.finished(tasks[0].job)
+def _write_here(
+    job: FilmJob, numbers: Sequence[int], write: Callable[[int, bytes], None], work: Work
+) -> None:
+    """Make frames in this process, some at once: the end of one frame does not keep all threads busy."""
+    at_once = min(AT_ONCE, work.threads, max(1, MOST_PIXELS // math.prod(job.size)))
+    if chosen(job.device) != "cpu":
+        at_once = 1
+    own = replace(work, threads=work.threads // at_once, progress=lambda *_: None)
+    crew = replace(work, threads=at_once)
+    for done, _ in enumerate(crew.ordered(lambda number: write(number, job.file(number, own)), numbers), 1):
+        work.progress("frames", done / len(numbers))
 
 
 def _claim(job: FilmJob, folder: Path, resume: bool) -> None:
-    """Make the folder this film's; frames of an earlier film are removed, unless it is to be resumed."""
+    """Make the folder this film's; frames of an earlier film are removed, unless it is to be resumed.
+
+    A process that was killed leaves the unfinished file that it was writing; it is removed.
+    """
     journal = folder / JOURNAL
     if journal.exists():
+        for path in folder.glob(UNFINISHED):
+            path.unlink(missing_ok=True)
         known = json.loads(journal.read_text())["key"]
         if known == job.key:
             return

@@ -13,9 +13,9 @@ from ..errors import SceneError
 from ..formulas.parameters import Number, Vector
 from ..scene.animation import Animation, Track
 from ..scene.model import Scene
-from ..scene.values import kind_of
+from ..scene.overrides import kind_of
 from .clearance import kept_clear
-from .curves import CURVES, eased
+from .motion_curves import CURVES, eased
 
 AUTOMATIC = {"camera.eye": "path", "transform.rotate": "rotation"}
 """Curves of attributes that are not plain numbers."""
@@ -45,7 +45,9 @@ class Timeline:
     def animation(self) -> Animation:
         """The scene's animation."""
         if self.scene.animation is None:
-            raise SceneError(f"{self.scene.name}: expected an <animation> in the scene")
+            raise SceneError(
+                f"{self.scene.name}: expected an <animation> in the scene; animate --fly TIME makes one"
+            )
         return self.scene.animation
 
     @cached_property

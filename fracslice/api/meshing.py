@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Unpack
 
+from ..common.digits import counted
 from ..jobs.mesh import make_mesh as make_mesh_job
 from ..jobs.mesh_result import MeshResult
 from ..mesh import Mesh
@@ -43,11 +44,15 @@ class Result(Mesh):
     def __init__(self, made: MeshResult) -> None:
         object.__setattr__(self, "made", made)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Result, (self.made,)
+
     def __repr__(self) -> str:
         if self.made.whole is not None:
             return super().__repr__()
         made = self.report.mesh
-        return f"<Result of {made.triangles} triangles, {made.vertices} vertices, only in its file>"
+        counts = f"{counted(made.triangles, 'triangle')}, {counted(made.vertices, 'vertex', 'vertices')}"
+        return f"<Result of {counts}, only in its file>"
 
     @property
     def mesh(self) -> Mesh:

@@ -37,7 +37,7 @@ class PrintOptions(TypedDict, total=False):
     """Print preparation: the fields of `Print`."""
 
     cavities: Literal["keep", "fill"] | None
-    keep: Literal["all", "largest"] | None
+    keep: int | Literal["all", "largest"] | None
     bridge: Length | None
     gap: Length | None
     thickness: Length | None
@@ -68,13 +68,15 @@ def work_of(options: WorkOptions | Options, work: Work | None = None) -> Work:
     Raises
     ------
     TypeError
-        If progress is not callable.
+        If progress is not callable, or cancel is not an event.
     """
     given = _given(options, WorkOptions)
     if "device" in given:
         given["device"] = chosen(given["device"])
     if not callable(given.get("progress", print)):
         raise TypeError(f"progress={given['progress']!r}: expected a callable (stage, share)")
+    if not isinstance(given.get("cancel") or threading.Event(), threading.Event):
+        raise TypeError(f"cancel={given['cancel']!r}: expected a threading.Event")
     return replace(work or Work(), **given)
 
 

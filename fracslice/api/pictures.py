@@ -9,8 +9,12 @@ from typing import Any, Unpack
 
 import numpy as np
 
+from ..errors import RenderError
 from ..formulas import Node
+from ..formulas.records import validated
+from ..kernel.devices import for_picture
 from ..rendering import Renderer
+from ..rendering.progressive import SIZE
 from ..scene.view import Camera, Film, Light, View
 from .options import WorkOptions, keywords, work_of
 from .sources import Source, resolve
@@ -63,7 +67,7 @@ def render(
     cancel : threading.Event, optional
         Setting it stops the work with `Cancelled`.
     device : {"cpu", "cuda", "auto"}, optional
-        Device that traces the rays; by default the GPU, if there is one.
+        Device that traces the rays; by default the GPU, if there is one and starting it pays.
 
     Returns
     -------
@@ -86,12 +90,21 @@ def render(
     >>> picture.shape, picture.dtype.name
     ((48, 64, 3), 'uint8')
     """
+    if not isinstance(camera, Camera | None):
+        raise TypeError(f"camera={camera!r}: expected a Camera")
+    if lights is not None and not (
+        isinstance(lights, Sequence) and all(isinstance(lamp, Light) for lamp in lights)
+    ):
+        raise TypeError(f"lights={lights!r}: expected a sequence of Light")
     what, work = resolve(shape), work_of(options)
     root, view = (what, View(film=FILM)) if isinstance(what, Node) else (what.root, what.view)
     given: dict[str, Any] = {"camera": camera, "lights": None if lights is None else tuple(lights)}
     view = replace(view, **{name: value for name, value in given.items() if value is not None})
-    renderer = Renderer(root, view, size, work, options.get("device") or "auto")
     most = view.film.samples if samples is None else samples
+    most = validated("samples", most, Film.kinds()["samples"], RenderError)
+    film = validated("size", size or (view.film.width, view.film.height), SIZE, RenderError)
+    device = for_picture(options.get("device") or "auto", film, most)
+    renderer = Renderer(root, view, size, work, device)
     seen = renderer.seen()
     for seen in renderer.passes(most):
         work.progress("rendering", min(seen.samples / most, 1.0))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Generic, TypeVar, Unpack, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.digits import counted
 from ..common.extras import lacking
 from ..errors import SliceError
 from ..scene import parse_length
@@ -53,7 +54,7 @@ class Layers(Sequence[T_co], Generic[T_co]):
 
     def __repr__(self) -> str:
         x, y, z = self.stack.size
-        return f"<{type(self).__name__}: {len(self)} layers of {x:.6g} x {y:.6g} x {z:.6g} mm>"
+        return f"<{type(self).__name__}: {counted(len(self), 'layer')} of {x:.6g} x {y:.6g} x {z:.6g} mm>"
 
     @overload
     def __getitem__(self, index: int) -> T_co: ...
@@ -107,7 +108,7 @@ class Slices(Layers[NDArray[np.uint8]]):
         """
         if reason := lacking("shapely", "polygons need"):
             raise SliceError(reason)
-        return Layers(self.stack, self.chosen, lambda layer: as_polygons(layer.contours), self.work)
+        return Layers(self.stack, self.chosen, _polygons, self.work)
 
     @property
     def contours(self) -> Layers[Contours]:
@@ -190,6 +191,10 @@ def slice_layers(
 
 def _coverage(layer: Layer) -> NDArray[np.uint8]:
     return _frozen(layer.coverage)
+
+
+def _polygons(layer: Layer) -> MultiPolygon:
+    return as_polygons(layer.contours)
 
 
 def _contours(layer: Layer) -> Contours:

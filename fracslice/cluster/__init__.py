@@ -1,12 +1,15 @@
 """One job on several machines: tasks are made by workers, and their results are files that all can reach."""
 
 from .arrays import Files, packed, unpacked
-from .pieces import Contents, Pool, ResultFolder, Task
+from .connection import connected
+from .pool import Pool, Task
+from .result_folder import PAGE, Contents, ResultFolder
 from .shards import Shard
-from .workers import HIDDEN, Workers, connected
+from .workers import HIDDEN, Workers
 
 __all__ = [
     "HIDDEN",
+    "PAGE",
     "Contents",
     "Files",
     "Pool",

@@ -27,7 +27,7 @@ class Identity:
     @classmethod
     def here(cls) -> Identity:
         """Identity of this process."""
-        from ..kernel.objects import toolchain
+        from ..kernel.host import toolchain
 
         return cls(__version__, platform.python_version(), program(), toolchain())
 

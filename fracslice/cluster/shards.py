@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from ..errors import ClusterError
-from .pieces import Pool, ResultFolder, Task, run
+from .pool import Pool, Task, run
+from .result_folder import ResultFolder
 
 if TYPE_CHECKING:
     from ..work import Work
@@ -121,8 +122,10 @@ class Shard(Pool):
             missing = [index for index in missing if index not in there]
             if there:
                 last = time.monotonic()
-            elif time.monotonic() - last > self.patience:
-                run(tasks[missing[self.number % len(missing)]], self.pieces, work)
+            elif missing and time.monotonic() - last > self.patience:
+                index = missing.pop(self.number % len(missing))
+                run(tasks[index], self.pieces, work)
+                yield index
             elif missing:
                 work.check()
                 work.cancel.wait(POLL)

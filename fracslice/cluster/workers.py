@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import os
+import pickle
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from secrets import token_hex
 from typing import TYPE_CHECKING, Any
 
 from ..common.cache_files import warn
-from ..common.extras import lacking
+from ..common.memory import keep_freed_memory
 from ..errors import ClusterError
 from .identity import Identity
-from .pieces import Pool, ResultFolder, Task, run
+from .pool import Pool, Task, run
+from .result_folder import ResultFolder
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -27,19 +29,22 @@ HIDDEN = ".fracslice-pieces"
 POLL, CONNECT = 0.05, 20.0
 """Seconds between two looks for results, and until a scheduler answers."""
 
-SELDOM = {
-    "distributed.admin.tick.interval": "1s",
-    "distributed.admin.system-monitor.interval": "5s",
-    "distributed.worker.profile.enabled": False,
-}
-"""Dask's measures of itself, which take 5 % of a processor for each local worker at their defaults."""
+
+TASK = """try:
+    from fracslice.cluster.workers import on_worker
+except ImportError as error:
+    from distributed import get_worker
+    raise ImportError(get_worker().address, str(error)) from None
+on_worker(*__import__("pickle").loads(arguments))
+"""
+"""Text of a task: a worker that cannot unpickle what it receives would end."""
 
 
 class UnfitWorkerError(ClusterError):
     """Worker that would make other bytes: its address, and the difference."""
 
 
-def on_worker(task: Task, pieces: ResultFolder, expected: Identity) -> None:
+def on_worker(pickled: bytes, pieces: ResultFolder, expected: Identity) -> None:
     """Make the result of a task on a worker, in one thread.
 
     Nothing is returned: a value would have to be fetched from a worker that may be gone. Exceptions travel
@@ -47,8 +52,8 @@ def on_worker(task: Task, pieces: ResultFolder, expected: Identity) -> None:
 
     Parameters
     ----------
-    task : Task
-        The task.
+    pickled : bytes
+        The task; another fracslice may lack its class, so the identity is compared first.
     pieces : ResultFolder
         Where its result belongs.
     expected : Identity
@@ -65,7 +70,8 @@ def on_worker(task: Task, pieces: ResultFolder, expected: Identity) -> None:
 
     if difference := Identity.here().difference(expected):
         raise UnfitWorkerError(get_worker().address, difference)
-    run(task, pieces, Work(threads=1))
+    keep_freed_memory()  # Dask starts workers with MALLOC_TRIM_THRESHOLD_=65536
+    run(pickle.loads(pickled), pieces, Work(threads=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,8 +175,9 @@ class _Attempt:
         for index in indices:
             task = self.tasks[index]
             key = f"{task.name}-{task.job[:8]}{self.token}{self.count:x}"
+            arguments = pickle.dumps((pickle.dumps(task), self.pool.pieces, self.expected))
             future = self.pool.client.submit(
-                on_worker, task, self.pool.pieces, self.expected, key=key, pure=False, **where
+                exec, TASK, {"arguments": arguments}, key=key, pure=False, **where
             )
             self.futures[future] = index
             self.queue.add(future)
@@ -208,7 +215,7 @@ class _Attempt:
             if error is None:
                 yield index
                 continue
-            if isinstance(error, UnfitWorkerError):
+            if isinstance(error, UnfitWorkerError | ImportError) and len(error.args) == 2:
                 self.refuse(*error.args)
             elif type(error).__name__ != "KilledWorker":
                 raise ClusterError(f"{self.tasks[index].name}: {error or type(error).__name__}") from error
@@ -218,60 +225,3 @@ class _Attempt:
         """Remember a worker that makes other bytes; warn once."""
         self.refused.add(address)
         warn(f"worker {address} is not used: {difference}")
-
-
-@contextmanager
-def connected(where: str, store: str, threads: int = 1) -> Iterator[Workers]:
-    """Connect to a scheduler, or start workers here.
-
-    Parameters
-    ----------
-    where : str
-        Address of a scheduler, such as "tcp://host:8786"; or "local" or "local:4" for processes here.
-    store : str
-        Folder of the results, see `Pieces`.
-    threads : int
-        Threads of all local workers together.
-
-    Yields
-    ------
-    Workers
-
-    Raises
-    ------
-    ClusterError
-        If Dask is not installed, the text is malformed, or no scheduler answers.
-    """
-    if reason := lacking("distributed", "clusters need"):
-        raise ClusterError(reason)
-    from distributed import Client
-
-    kind, _, count = where.partition(":")
-    with ExitStack() as stack:
-        if kind == "local":
-            if count and not 1 <= int(count if count.isdigit() else 0) <= 1024:
-                raise ClusterError(f"{where!r}: expected local, local:N or the address of a scheduler")
-            scheduler = stack.enter_context(_local(int(count or threads), threads))
-        else:
-            scheduler = where
-        try:
-            client = Client(scheduler, timeout=CONNECT, set_as_default=False)
-        except (OSError, ValueError) as error:
-            raise ClusterError(f"{where}: no scheduler answers: {error}") from None
-        yield Workers(stack.enter_context(client), ResultFolder(store))
-
-
-@contextmanager
-def _local(workers: int, threads: int) -> Iterator[Any]:
-    """Cluster of processes here, which share some threads."""
-    import dask
-    from distributed import LocalCluster
-
-    each = max(1, threads // workers)
-    with (
-        dask.config.set(SELDOM),
-        LocalCluster(
-            n_workers=workers, threads_per_worker=each, memory_limit=None, dashboard_address=None
-        ) as cluster,
-    ):
-        yield cluster

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import warnings
 from collections.abc import Callable
@@ -11,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import BinaryIO, TypeVar
 
-from ..errors import FracsliceWarning
+from ..errors import ExportError, FracsliceWarning
 from .files import replacing, reported
 from .private import OWNER_ONLY, NotPrivateError, opened, private_folder
 
@@ -83,6 +84,40 @@ class Kept:
         ):
             write(file)
 
+    def cached(self, name: str, make: Callable[[], bytes]) -> bytes:
+        """Read a cached file with a checksum; without one, or if it is damaged, make and cache its contents.
+
+        Parameters
+        ----------
+        name : str
+            File name.
+        make : callable
+            Returns the contents.
+
+        Returns
+        -------
+        bytes
+            Contents.
+        """
+        data = self.get(name, _checked)
+        if data is None:
+            data = make()
+            self.put_checked(name, data)
+        return data
+
+    def put_checked(self, name: str, data: bytes) -> None:
+        """Replace a cached file of `cached`; ignore a folder that cannot be written.
+
+        Parameters
+        ----------
+        name : str
+            File name.
+        data : bytes
+            Contents.
+        """
+        with suppress(ExportError):
+            self.put(name, lambda file: file.write(hashlib.sha256(data).digest() + data))
+
     def _read(self, name: str, read: Callable[[BinaryIO], T], here: int | None) -> T:
         with opened(self.folder / name, "rb", folder=here) as file:
             return read(file)
@@ -93,10 +128,16 @@ class Kept:
             with private_folder(self.folder) as here:
                 return use(here)
         except NotPrivateError as error:
-            warn(f"{error}: what is kept in {self.folder} is not used")
+            warn(f"{error}: the files in {self.folder} are not used")
         except OSError:
             pass
         return None
+
+
+def _checked(file: BinaryIO) -> bytes | None:
+    """Contents after their checksum; None if they do not match."""
+    digest, data = file.read(hashlib.sha256().digest_size), file.read()
+    return data if hashlib.sha256(data).digest() == digest else None
 
 
 @cache

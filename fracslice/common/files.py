@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from secrets import token_hex
 from typing import BinaryIO
 
 from ..errors import ExportError
@@ -18,6 +19,9 @@ from .private import NO_LINK
 
 FLUSH_S = 0.05
 """Seconds between two flushes of a file that is being written; small ones are complete before the first."""
+
+LARGE = 1 << 26
+"""Bytes of a replaced file that another thread releases."""
 
 
 @contextmanager
@@ -39,7 +43,7 @@ def reported(path: str | Path) -> Iterator[None]:
     except OSError as error:
         reason = error.strerror or str(error)
         if error.errno in (errno.ENOSPC, errno.EDQUOT):
-            reason = "the disk is full; nothing was written"
+            reason = "the disk is full; the file was not written"
         elif error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
             reason = "not allowed to write there"
         raise ExportError(f"{path}: {reason}") from error
@@ -106,12 +110,41 @@ def replacing(path: str | Path, mode: int | None = None) -> Iterator[BinaryIO]:
                 file.flush()
                 os.chmod(part, _permissions(target) if mode is None else mode)
                 os.fsync(handle)
-            os.replace(part, target)
+            _replace(part, target)
         except BaseException:
             with suppress(FileNotFoundError):
                 os.unlink(part)
             raise
-        _flush_folder(target.parent)
+
+
+def linked(source: str, path: str | Path) -> None:
+    """Give a complete file another name atomically; copy it where the file system cannot link it.
+
+    Parameters
+    ----------
+    source
+        The file.
+    path
+        Its other name.
+
+    Raises
+    ------
+    ExportError
+        For an error of the file system.
+    """
+    target = check_target(path)
+    part = str(target.with_name(f".{target.name[:100]}.{token_hex(8)}.part"))
+    try:
+        with open(source, "rb") as file:
+            os.link(source, part)
+            os.chmod(part, _permissions(target))
+            os.fsync(file.fileno())
+        _replace(part, target)
+    except OSError:
+        with suppress(FileNotFoundError):
+            os.unlink(part)
+        with replacing(path) as file, open(source, "rb") as whole:
+            appended(whole, file)
 
 
 def appended(source: BinaryIO, target: BinaryIO) -> int:
@@ -202,6 +235,25 @@ def _permissions(target: Path) -> int:
     mask = os.umask(0o077)  # the umask cannot be read without setting it
     os.umask(mask)
     return target.stat().st_mode & 0o7777 if target.exists() else 0o666 & ~mask
+
+
+def _replace(part: str, target: Path) -> None:
+    """Move a file to its name; another thread releases a large one that had it."""
+    old = _held(target)
+    try:
+        os.replace(part, target)
+        _flush_folder(target.parent)
+    finally:
+        if old is not None:
+            threading.Thread(target=os.close, args=(old,)).start()
+
+
+def _held(target: Path) -> int | None:
+    """Open a large file before it is replaced. It is released when closed, a third of a second per GB."""
+    with suppress(OSError):
+        if os.name == "posix" and target.stat().st_size >= LARGE:
+            return os.open(target, os.O_RDONLY)
+    return None
 
 
 def _flush_folder(folder: Path) -> None:

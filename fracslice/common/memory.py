@@ -4,7 +4,30 @@ from __future__ import annotations
 
 import os
 import sys
+from functools import cache
 from pathlib import Path
+
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
+"""Parameters of glibc's ``mallopt``."""
+
+KEPT, LARGEST = 32 << 20, 4 << 20
+"""Freed bytes that stay with the process, and the largest block among them."""
+
+
+@cache
+def keep_freed_memory() -> None:
+    """Let glibc reuse freed memory instead of returning it to the system at once.
+
+    Laying pages anew takes an eighth of the CPU time of a mesh. Other C libraries are left as they are.
+    """
+    if sys.platform != "linux":
+        return
+    import ctypes
+
+    library = ctypes.CDLL(None)
+    if hasattr(library, "mallopt"):
+        library.mallopt(M_TRIM_THRESHOLD, KEPT)
+        library.mallopt(M_MMAP_THRESHOLD, LARGEST)
 
 
 def peak_rss_mb() -> float:

@@ -29,3 +29,27 @@ def quantile(values: np.ndarray, share: float) -> float:
     if math.isnan(ordered[-1]):
         return math.nan
     return float(ordered[low] + (ordered[high] - ordered[low]) * (rank - low))
+
+
+def weighted_quantiles(values: np.ndarray, weights: np.ndarray, *shares: float) -> list[float]:
+    """Return values below which these shares of the weight lie.
+
+    Parameters
+    ----------
+    values : ndarray
+        Values; at least one.
+    weights : ndarray
+        Their weights.
+    *shares : float
+        Shares, 0 to 1.
+
+    Returns
+    -------
+    list of float
+        One of the values for each share.
+    """
+    order = np.argsort(values, kind="stable")
+    upto = np.cumsum(weights[order])
+    at = np.searchsorted(upto, np.array(shares) * upto[-1])
+    quantiles: list[float] = values[order][np.minimum(at, len(values) - 1)].tolist()
+    return quantiles

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import BinaryIO
 
-from fracslice.common.files import check_target, flushing, replacing
-from fracslice.errors import ExportError
-from fracslice.export import glb, obj, ply, stl, threemf
-from fracslice.mesh.model import Mesh
-from fracslice.version import __version__
+from ..common.files import check_target, flushing, replacing
+from ..errors import ExportError
+from ..mesh.model import Mesh
+from ..version import __version__
 
 __all__ = ["FORMATS", "application", "check_format", "check_target", "flushing", "replacing", "write"]
 
 Write = Callable[[Mesh, BinaryIO, Mapping[str, str]], None]
+
+
+def _writer(module: str) -> Write:
+    """Writer of a module, which is imported at its first use: a job writes one format."""
+    return lambda *arguments: import_module(f".{module}", __name__).write(*arguments)
 
 
 def _in_order(write: Write) -> Write:
@@ -25,11 +30,11 @@ def _in_order(write: Write) -> Write:
 
 
 FORMATS: dict[str, Write] = {
-    ".stl": stl.write,
-    ".3mf": _in_order(threemf.write),
-    ".ply": _in_order(ply.write),
-    ".obj": _in_order(obj.write),
-    ".glb": _in_order(glb.write),
+    ".stl": _writer("stl"),
+    ".3mf": _in_order(_writer("threemf")),
+    ".ply": _in_order(_writer("ply")),
+    ".obj": _in_order(_writer("obj")),
+    ".glb": _in_order(_writer("glb")),
 }
 
 

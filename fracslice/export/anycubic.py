@@ -10,8 +10,8 @@ import struct
 from itertools import accumulate
 from typing import BinaryIO
 
-from fracslice._slices import Encoding
-from fracslice.export.prints import PrintData, PrintFormat, by_pixels, rgb565
+from .._slices import Encoding
+from .prints import PrintData, PrintFormat, by_pixels, rgb565
 
 PREVIEW = 224, 168
 """Width and height of the preview, pixels."""

@@ -10,14 +10,13 @@ from collections.abc import Iterator
 from itertools import chain
 from typing import BinaryIO
 
-from PIL import Image
-
-from fracslice.errors import ExportError
-from fracslice.export import png
-from fracslice.export.jobs import SliceRun
-from fracslice.export.prints import PrintData, PrintFormat
-from fracslice.export.ranges import Encode
-from fracslice.version import __version__
+from ..errors import ExportError
+from ..version import __version__
+from . import png
+from .colour_png import write_png
+from .jobs import SliceRun
+from .prints import PrintData, PrintFormat
+from .ranges import Encode
 
 MOST_MEMBERS = 65_535
 
@@ -76,7 +75,7 @@ def _archive(file: BinaryIO, members: Iterator[tuple[str, bytes]]) -> None:
 
 def _preview(job: PrintData, width: int, height: int) -> bytes:
     file = io.BytesIO()
-    Image.fromarray(job.preview(width, height)).save(file, "PNG", compress_level=1)
+    write_png(file, (height, width, 3), [job.preview(width, height)], 8, {}, job.run.work, level=1)
     return file.getvalue()
 
 
@@ -140,77 +139,93 @@ def _settings(job: PrintData) -> dict[str, object]:
     }
 
 
+META = {
+    "FormatVersion": 2,
+    "Distro": "generic",
+    "Program": "fracslice",
+    "Version": __version__,
+    "OS": "any",
+    "Arch": "any",
+    "Profile": True,
+}
+"""Contents of the file meta.json of a .nanodlp archive."""
+
+
 def _plate(job: PrintData) -> dict[str, object]:
     """Contents of the JSON files of a .nanodlp archive. Heights are in micrometres."""
-    resin, (rows, columns), heights = job.resin, job.run.screen.shape, 1000 * job.heights
+    heights = 1000 * job.heights
     (x, y, z), (width, height) = job.run.stack.size, job.printer.pixel
-    areas, created = job.areas.tolist(), int(job.run.created.timestamp())
-    uneven = heights.max() - heights.min() > 1e-6
     box = {"XMin": -x / 2, "XMax": x / 2, "YMin": -y / 2, "YMax": y / 2, "ZMin": 0.0, "ZMax": z}
+    uneven = heights.max() - heights.min() > 1e-6
     varying = {
         "CureTimes": job.exposures.tolist(),
         "DynamicThickness": heights.tolist() if uneven else [],
     }
     size = {"XRes": 1000 * width, "YRes": 1000 * height, "ZRes": float(heights.max())}
     return {
-        "meta": {
-            "FormatVersion": 2,
-            "Distro": "generic",
-            "Program": "fracslice",
-            "Version": __version__,
-            "OS": "any",
-            "Arch": "any",
-            "Profile": True,
-        },
-        "plate": {
-            "PlateID": 1,
-            "ProfileID": 1,
-            "Path": job.run.metadata.get("Title", "fracslice"),
-            "CreatedDate": created,
-            "Updated": created,
-            "PrintTime": round(job.seconds),
-            "PrintEst": round(job.seconds),
-            "LayersCount": job.layers,
-            "TotalSolidArea": float(job.areas @ heights),
-            "MultiMaterial": False,
-            **size,
-            **varying,
-            **box,
-        },
-        "slicer": {
-            "Type": "stl",
-            "PWidth": columns,
-            "PHeight": rows,
-            "Thickness": float(heights.max()),
-            "SupportDepth": float(heights[0]),
-            "SupportLayerNumber": resin.bottom_layers,
-            "XPixelSize": 1000 * width,
-            "YPixelSize": 1000 * height,
-            "ImageMirror": int(job.mirrored),
-            "LayerCount": job.layers,
-            "Boundary": box,
-            **varying,
-        },
-        "profile": {
-            "ResinID": 1,
-            "ProfileID": 1,
-            "Title": resin.name,
-            "Depth": float(heights.max()),
-            "SupportDepth": float(heights[0]),
-            "SupportLayerNumber": resin.bottom_layers,
-            "TransitionalLayer": resin.transition_layers,
-            "CureTime": resin.exposure,
-            "SupportCureTime": resin.bottom_exposure,
-            "WaitHeight": resin.lift,
-            "SupportWaitHeight": resin.lift,
-            "WaitBeforePrint": resin.wait,
-            "SupportWaitBeforePrint": resin.wait,
-            "ResinPrice": resin.price,
-        },
+        "meta": META,
+        "plate": {**_job(job), **size, **varying, **box},
+        "slicer": {**_screen(job), "Boundary": box, **varying},
+        "profile": _profile(job),
         "info": [
             {"TotalSolidArea": area, "LayerNumber": k, "LayerHeight": float(height)}
-            for k, (area, height) in enumerate(zip(areas, heights, strict=True))
+            for k, (area, height) in enumerate(zip(job.areas.tolist(), heights, strict=True))
         ],
+    }
+
+
+def _job(job: PrintData) -> dict[str, object]:
+    """Name, date, duration and layers, for plate.json."""
+    created = int(job.run.created.timestamp())
+    return {
+        "PlateID": 1,
+        "ProfileID": 1,
+        "Path": job.run.metadata.get("Title", "fracslice"),
+        "CreatedDate": created,
+        "Updated": created,
+        "PrintTime": round(job.seconds),
+        "PrintEst": round(job.seconds),
+        "LayersCount": job.layers,
+        "TotalSolidArea": float(job.areas @ (1000 * job.heights)),
+        "MultiMaterial": False,
+    }
+
+
+def _screen(job: PrintData) -> dict[str, object]:
+    """Pixels and layers, for slicer.json."""
+    (rows, columns), (width, height) = job.run.screen.shape, job.printer.pixel
+    return {
+        "Type": "stl",
+        "PWidth": columns,
+        "PHeight": rows,
+        "Thickness": float(1000 * job.heights.max()),
+        "SupportDepth": float(1000 * job.heights[0]),
+        "SupportLayerNumber": job.resin.bottom_layers,
+        "XPixelSize": 1000 * width,
+        "YPixelSize": 1000 * height,
+        "ImageMirror": int(job.mirrored),
+        "LayerCount": job.layers,
+    }
+
+
+def _profile(job: PrintData) -> dict[str, object]:
+    """Exposure and motion of the resin, for profile.json."""
+    resin = job.resin
+    return {
+        "ResinID": 1,
+        "ProfileID": 1,
+        "Title": resin.name,
+        "Depth": float(1000 * job.heights.max()),
+        "SupportDepth": float(1000 * job.heights[0]),
+        "SupportLayerNumber": resin.bottom_layers,
+        "TransitionalLayer": resin.transition_layers,
+        "CureTime": resin.exposure,
+        "SupportCureTime": resin.bottom_exposure,
+        "WaitHeight": resin.lift,
+        "SupportWaitHeight": resin.lift,
+        "WaitBeforePrint": resin.wait,
+        "SupportWaitBeforePrint": resin.wait,
+        "ResinPrice": resin.price,
     }
 
 

@@ -15,10 +15,10 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from fracslice._slices import Encoding
-from fracslice.export.jobs import SliceRun
-from fracslice.export.prints import PrintData, PrintFormat, by_pixels, rgb565
-from fracslice.slicing import Layer
+from .._slices import Encoding
+from ..slicing import Layer
+from .jobs import SliceRun
+from .prints import PrintData, PrintFormat, by_pixels, rgb565
 
 CTB, CBDDLP = 0x12FD0086, 0x12FD0019
 LEVELS = 4

@@ -9,10 +9,11 @@ from typing import BinaryIO
 
 import numpy as np
 
-from fracslice.work import Work, chunks
+from .._slices import filtered
+from ..work import Work, chunks
 
 STRIP, LEVEL = 32, 6
-"""Rows that are stored as one, and the level of compression of a PNG."""
+"""Rows that are stored as one, and the level of compression of a picture."""
 ZLIB = b"\x78\x9c"
 """Header of a zlib stream (RFC 1950)."""
 
@@ -22,8 +23,8 @@ def levels(shown: np.ndarray, bits: int) -> np.ndarray:
 
     Parameters
     ----------
-    shown : ndarray of float
-        Values in [0, 1].
+    shown : ndarray of float, or of uint8
+        Values in [0, 1]; or levels, which are returned.
     bits : {8, 16}
         Bits of a level.
 
@@ -31,6 +32,8 @@ def levels(shown: np.ndarray, bits: int) -> np.ndarray:
     -------
     ndarray of uint8, or of uint16, big-endian
     """
+    if shown.dtype == np.uint8:
+        return shown
     quantised = np.round(np.clip(shown, 0, 1) * np.float64(2**bits - 1))
     return np.asarray(quantised, ">u2" if bits == 16 else np.uint8)
 
@@ -42,6 +45,7 @@ def write_png(
     bits: int,
     text: Mapping[str, str],
     work: Work | None = None,
+    level: int = LEVEL,
 ) -> None:
     """Write a PNG file (ISO/IEC 15948) with filtered rows, sRGB and text chunks.
 
@@ -53,26 +57,28 @@ def write_png(
         Writable binary file.
     shape : tuple of int
         Height, width, and 3 or 4 channels of the picture.
-    bands : iterable of ndarray, float [rows, width, channels]
-        sRGB in [0, 1], and unassociated alpha, from the top; all but the last have a multiple of `STRIP`
-        rows.
+    bands : iterable of ndarray, float or uint8 [rows, width, channels]
+        sRGB in [0, 1] or as levels of 8 bits, and unassociated alpha, from the top; all but the last have a
+        multiple of `STRIP` rows.
     bits : {8, 16}
         Bits per channel.
     text : mapping of str to str
         Keywords and texts of the metadata.
     work : Work, optional
         Threads; one by default.
+    level : int
+        Level of compression, 1 to 9.
     """
     height, width, channels = shape
     header = struct.pack(">IIBBBBB", width, height, bits, 6 if channels == 4 else 2, 0, 0, 0)
     file.write(b"\x89PNG\r\n\x1a\n" + _chunk(b"IHDR", header) + _chunk(b"sRGB", b"\0"))
     for keyword, value in text.items():
         file.write(_chunk(b"iTXt", f"{keyword}\0\0\0\0\0{value}".encode()))
-    start, checksum, above = ZLIB, 1, np.zeros((1, width, channels))
-    done = 0
+    start, checksum, above = ZLIB, 1, np.zeros((1, width, channels), np.uint8)
+    done, how = 0, (bits, level, work or Work(1))
     for band in bands:
         done += len(band)
-        for data, blocks in _compressed(np.concatenate([above, band]), bits, done == height, work or Work(1)):
+        for data, blocks in _compressed(np.concatenate([above, band]), done == height, *how):
             checksum = zlib.adler32(data, checksum)
             file.write(_chunk(b"IDAT", start + blocks))
             start = b""
@@ -80,35 +86,21 @@ def write_png(
     file.write(_chunk(b"IDAT", struct.pack(">I", checksum)) + _chunk(b"IEND", b""))
 
 
-def _compressed(shown: np.ndarray, bits: int, last: bool, work: Work) -> list[tuple[bytes, bytes]]:
+def _compressed(
+    shown: np.ndarray, last: bool, bits: int, level: int, work: Work
+) -> list[tuple[bytes, bytes]]:
     """Filtered rows of the strips of a band after its first row, which is that above it; and the same as
     blocks of a deflate stream that end at a byte."""
     height, pixel = len(shown) - 1, shown.shape[2] * bits // 8
 
     def compressed(rows: slice) -> tuple[bytes, bytes]:
         part = levels(shown[rows.start : rows.stop + 1], bits)
-        data = _filtered(part.reshape(len(part), -1).view(np.uint8), pixel)[1:].tobytes()
-        packer = zlib.compressobj(LEVEL, zlib.DEFLATED, -zlib.MAX_WBITS)
+        data = filtered(np.ascontiguousarray(part).reshape(len(part), -1).view(np.uint8), pixel)
+        packer = zlib.compressobj(level, zlib.DEFLATED, -zlib.MAX_WBITS)
         end = zlib.Z_FINISH if last and rows.stop == height else zlib.Z_FULL_FLUSH
         return data, packer.compress(data) + packer.flush(end)
 
     return work.collect(compressed, chunks(height, STRIP))
-
-
-def _filtered(rows: np.ndarray, pixel: int) -> np.ndarray:
-    """Filter rows of bytes, each by the PNG filter with the smallest sum of absolute differences."""
-    value = rows.astype(np.int16)
-    above = np.vstack([np.zeros_like(value[:1]), value[:-1]])
-    left = np.pad(value, ((0, 0), (pixel, 0)))[:, : value.shape[1]]
-    corner = np.pad(above, ((0, 0), (pixel, 0)))[:, : value.shape[1]]
-    guess = left + above - corner
-    a, b, c = abs(guess - left), abs(guess - above), abs(guess - corner)
-    paeth = np.where((a <= b) & (a <= c), left, np.where(b <= c, above, corner))
-    tried = np.stack(
-        [value - p for p in (np.zeros_like(value), left, above, (left + above) // 2, paeth)]
-    ).astype(np.uint8)
-    best = np.abs(tried.view(np.int8).astype(np.int32)).sum(2).argmin(0)
-    return np.hstack([best[:, None].astype(np.uint8), tried[best, np.arange(len(rows))]])
 
 
 def _chunk(kind: bytes, data: bytes) -> bytes:

@@ -11,8 +11,9 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from fracslice.errors import ExportError
-from fracslice.mesh.model import Mesh
+from ..common.srgb import to_linear
+from ..errors import ExportError
+from ..mesh.model import Mesh
 
 TO_METRES_Y_UP = 0.001 * np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1000]])
 GREY = {"baseColorFactor": [204, 204, 199, 255], "metallicFactor": 0.0, "roughnessFactor": 0.7}
@@ -59,7 +60,5 @@ def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
 
 def _linear(colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Colours in linear light, as glTF defines them."""
-    share = colours / 255
-    light = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
-    encoded: NDArray[np.uint8] = np.rint(255 * light).astype(np.uint8)
+    encoded: NDArray[np.uint8] = np.rint(255 * to_linear(colours / 255)).astype(np.uint8)
     return encoded

@@ -8,9 +8,9 @@ from __future__ import annotations
 import struct
 from typing import BinaryIO
 
-from fracslice._slices import Encoding
-from fracslice.export.prints import PrintData, PrintFormat, by_pixels, rgb565
-from fracslice.version import __version__
+from .._slices import Encoding
+from ..version import __version__
+from .prints import PrintData, PrintFormat, by_pixels, rgb565
 
 MAGIC = b"\x07\0\0\0DLP\0"
 DELIMITER = b"\r\n"
@@ -29,7 +29,8 @@ def _assemble(job: PrintData, file: BinaryIO) -> None:
     file.write(_header(job))
     for index, picture in enumerate(job):
         file.write(_layer(job, index, len(picture)))
-        file.write(picture + DELIMITER)
+        file.write(picture)
+        file.write(DELIMITER)
     file.write(END)
 
 

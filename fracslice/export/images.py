@@ -8,10 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from fracslice.common.files import replacing
-from fracslice.errors import ExportError
-from fracslice.work import Work
-
+from ..common.files import replacing
+from ..errors import ExportError
+from ..work import Work
 from .colour_png import levels, write_png
 from .scanlines import write_exr, write_tiff
 

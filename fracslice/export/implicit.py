@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fracslice.common.files import replacing
-from fracslice.export.threemf import CORE_NAMES, HEAD, mesh_element, package
-from fracslice.mesh.model import Mesh
+from ..common.files import replacing
+from ..mesh.model import Mesh
+from .packages import HEAD, package
+from .threemf import CORE_NAMES, mesh_element
 
 if TYPE_CHECKING:
-    from fracslice.formulas.box import Box
-    from fracslice.kernel.graph import Operation
+    from ..formulas.box import Box
+    from ..kernel.graph import Operation
 
 LEVEL = 9
 ELEMENTS = {

@@ -11,16 +11,16 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from fracslice.common.keys import key, program
-from fracslice.errors import SliceError
-from fracslice.export.ranges import Recipe
-from fracslice.export.resins import Resin
-from fracslice.kernel.objects import toolchain
-from fracslice.mesh.model import Mesh
-from fracslice.slicing import Slicer, Stack
-from fracslice.slicing.raster import Screen
-from fracslice.slicing.sublayers import COUNTS, MeanSlicer
-from fracslice.work import Work
+from ..common.keys import key, program
+from ..errors import SliceError
+from ..kernel.host import toolchain
+from ..mesh.model import Mesh
+from ..slicing import Slicer, Stack
+from ..slicing.raster import Screen
+from ..slicing.sublayers import COUNTS, MeanSlicer
+from ..work import Work
+from .ranges import Recipe
+from .resins import Resin
 
 EPOCH = datetime(1980, 1, 1)
 """Date of files by default, so that equal jobs give equal bytes."""

@@ -10,12 +10,12 @@ from functools import partial
 from pathlib import Path
 from typing import BinaryIO
 
-from fracslice.common.files import put, replacing
-from fracslice.errors import ExportError
-from fracslice.export.jobs import SliceRun
-from fracslice.export.ranges import Encode, begin, encoded_layers
-from fracslice.export.resuming import Journal, journal, resumable_folder
-from fracslice.slicing import Layer
+from ..common.files import put, replacing
+from ..errors import ExportError
+from ..slicing import Layer
+from .jobs import SliceRun
+from .ranges import Encode, begin, encoded_layers
+from .resuming import Journal, journal, resumable_folder
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ class FileFormat(LayerFormat):
     Attributes
     ----------
     assemble : callable
-        Writes the encoded layers of a run, and what is around them, to an open file.
+        Writes the encoded layers of a run, with the format's header and trailer, to an open file.
     """
 
     assemble: Callable[[SliceRun, Iterable[bytes], BinaryIO], None]
@@ -128,7 +128,8 @@ class FileFormat(LayerFormat):
 class FolderFormat(LayerFormat):
     """Format of a folder with a file for each layer, 00000.png, ...; the name is their extension.
 
-    The folder must be new, empty, or left by an interrupted job, which resumes after its last complete layer.
+    The folder must be new, empty, or left by an interrupted job, which resumes at its first layer that is
+    missing or incomplete: layers are written by the threads that encode them, in any order.
 
     Attributes
     ----------
@@ -144,8 +145,16 @@ class FolderFormat(LayerFormat):
     def write(self, run: SliceRun, path: Path) -> None:
         encode, name = self.encoder_for(run, path), f"{{:05d}}.{self.name}".format
         with resumable_folder(path, run.key(self.name), name, self.is_whole) as start:
-            for index, data in enumerate(encoded_layers(run, self.name, encode, start), start):
-                put(f"{path}/{name(index)}", data)
+
+            def make(layer: Layer) -> None:
+                put(f"{path}/{name(layer.index)}", encode(layer))
+
+            if run.work.cluster is None:
+                for _ in run.slicer.map(make, range(start, run.layers)):
+                    pass
+            else:
+                for index, data in enumerate(encoded_layers(run, self.name, encode, start), start):
+                    put(f"{path}/{name(index)}", data)
             for other, data in self.others(run).items():
                 with replacing(path / other) as file:
                     file.write(data)

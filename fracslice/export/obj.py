@@ -8,7 +8,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from fracslice.mesh.model import Mesh
+from ..mesh.model import Mesh
 
 
 def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:

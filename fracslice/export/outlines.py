@@ -11,9 +11,9 @@ from typing import BinaryIO
 import numpy as np
 from isal.isal_zlib import crc32
 
-from fracslice.export.jobs import SliceRun
-from fracslice.export.layerformats import FileFormat, FolderFormat
-from fracslice.slicing import Contours, Layer
+from ..slicing import Contours, Layer
+from .jobs import SliceRun
+from .layerformats import FileFormat, FolderFormat
 
 MICRON = 0.001
 """Unit of Common Layer Interface files, mm."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import BinaryIO
 
-from fracslice.mesh.model import Mesh
+from ..mesh.model import Mesh
 
 
 def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:

@@ -7,9 +7,9 @@ import struct
 import numpy as np
 from isal.isal_zlib import crc32
 
-from fracslice._slices import Encoding, encoded
-from fracslice.export.jobs import SliceRun
-from fracslice.slicing import Layer
+from .._slices import Encoding, encoded
+from ..slicing import Layer
+from .jobs import SliceRun
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
 from typing import BinaryIO
 
@@ -14,17 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageOps
 
-from fracslice._slices import Encoding
-from fracslice.common.files import flushing, replacing
-from fracslice.errors import ExportError
-from fracslice.export.jobs import SliceRun
-from fracslice.export.layerformats import LayerFormat
-from fracslice.export.ranges import Encode
-from fracslice.export.resins import Resin
-from fracslice.export.resuming import Journal
-from fracslice.slicing import Layer
-from fracslice.slicing.printers import Printer
-from fracslice.work import in_background
+from .._slices import Encoding
+from ..background import ahead, in_background
+from ..common.files import flushing, replacing
+from ..errors import ExportError
+from ..slicing import Layer
+from ..slicing.printers import Printer
+from .jobs import SliceRun
+from .layerformats import LayerFormat
+from .ranges import Encode
+from .resins import Resin
+from .resuming import Journal
 
 _AREA = struct.Struct("<d")
 """Area before the picture in a record, mm^2."""
@@ -58,8 +59,10 @@ class PrintData:
     picture: Callable[[], NDArray[np.uint8]] | None = None
 
     def __iter__(self) -> Iterator[bytes]:
-        """Iterate over the encoded pictures."""
-        return (record[_AREA.size :] for record in self.journal)
+        """Iterate over the encoded pictures; some are read by another thread while those before are used."""
+        groups = self.journal.groups()
+        records = chain.from_iterable(ahead(groups) if self.run.work.threads > 1 else groups)
+        return (record[_AREA.size :] for record in records)
 
     @cached_property
     def _read(self) -> tuple[NDArray[np.float64], list[int]]:

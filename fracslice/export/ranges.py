@@ -7,17 +7,18 @@ import threading
 from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, Self
 
-from fracslice.cluster import Shard
-from fracslice.errors import ClusterError, ExportError, SharedError
-from fracslice.export.resuming import Journal
-from fracslice.slicing import Layer
-from fracslice.slicing.layers import SLAB
-from fracslice.work import Work
+from ..common.digits import counted
+from ..errors import ClusterError, ExportError, SharedError
+from ..slicing import Layer
+from ..slicing.layers import SLAB
+from ..work import Work
+from .resuming import Journal
 
 if TYPE_CHECKING:
-    from fracslice.export.jobs import SliceRun
+    from ..cluster import Contents
+    from .jobs import SliceRun
 
 Encode = Callable[[Layer], bytes]
 """Encodes a layer."""
@@ -81,16 +82,65 @@ class RangeTask:
     first: int
     end: int
 
+    @classmethod
+    def all(cls, run: SliceRun, job: str, start: int = 0) -> list[Self]:
+        """Tasks of all layers.
+
+        Parameters
+        ----------
+        run : SliceRun
+            The run.
+        job : str
+            Its key.
+        start : int
+            A layer; the tasks before it are left out.
+
+        Returns
+        -------
+        list of tasks
+
+        Raises
+        ------
+        ExportError
+            If the layers were planned by hand.
+        """
+        if run.recipe is None:
+            raise ExportError("a cluster needs the scene of the layers; these are planned by hand")
+        size = range_size(run)
+        begins = range(start // size * size, run.layers, size)
+        return [cls(run.recipe, job, first, min(first + size, run.layers)) for first in begins]
+
     @property
     def name(self) -> str:
         """Name of the range."""
         return f"layers-{self.first:06}-{self.end:06}"
 
-    def make(self, work: Work) -> bytes:
-        """Records of the encoded layers; see `Task.make`."""
-        run, encode, job = _planned(self.recipe)
-        if job != self.job:
+    def planned(self, form: str) -> SliceRun:
+        """The run, planned once in a process.
+
+        Parameters
+        ----------
+        form : str
+            Format of the layers.
+
+        Returns
+        -------
+        SliceRun
+
+        Raises
+        ------
+        ClusterError
+            If it is another one than that of the job.
+        """
+        run = _planned(self.recipe)
+        if run.key(form) != self.job:
             raise ClusterError("the layers planned here are others than those of the job")
+        return run
+
+    def make(self, work: Work) -> Contents:
+        """Records of the encoded layers; see `Task.make`."""
+        run = self.planned(self.recipe.form)
+        encode = self.recipe.encoder(run)
         file = io.BytesIO()
         journal = Journal(file)
         for data in run.slicer_with(work).map(encode, range(self.first, self.end)):
@@ -114,9 +164,13 @@ def begin(run: SliceRun, form: str) -> None:
         For a shard that does not write the output, when its ranges are made.
     """
     pool = run.work.cluster
+    if pool is None:
+        return
+    from ..cluster import Shard
+
     if isinstance(pool, Shard) and not pool.first:
-        count = pool.share(_tasks(run, form, 0), run.work)
-        raise SharedError(f"{count} ranges of layers are made; shard 1 writes the file")
+        count = pool.share(RangeTask.all(run, run.key(form)), run.work)
+        raise SharedError(f"this shard made {counted(count, 'range')} of layers; shard 1 writes the file")
 
 
 def encoded_layers(run: SliceRun, form: str, encode: Encode, start: int) -> Iterator[bytes]:
@@ -142,12 +196,13 @@ def encoded_layers(run: SliceRun, form: str, encode: Encode, start: int) -> Iter
     if pool is None:
         yield from run.slicer.map(encode, range(start, run.layers))
         return
-    tasks = _tasks(run, form, start)
+    job = run.key(form)
+    tasks = RangeTask.all(run, job, start)
     for task, data in zip(tasks, pool.results(tasks, run.work, "slicing"), strict=True):
         for index, layer in enumerate(Journal(io.BytesIO(data), task.end - task.first), task.first):
             if index >= start:
                 yield layer
-    pool.finished(run.key(form))
+    pool.finished(job)
 
 
 def range_size(run: SliceRun) -> int:
@@ -166,27 +221,15 @@ def range_size(run: SliceRun) -> int:
     return max(SLAB, min(PIXELS // max(run.stack.shape), run.layers // MOST) // SLAB * SLAB)
 
 
-def _tasks(run: SliceRun, form: str, start: int) -> list[RangeTask]:
-    """Ranges of layers from the one of `start` on, the same for any number of workers."""
-    if run.recipe is None:
-        raise ExportError("a cluster needs the scene of the layers; these are planned by hand")
-    size, job = range_size(run), run.key(form)
-    return [
-        RangeTask(run.recipe, job, first, min(first + size, run.layers))
-        for first in range(start // size * size, run.layers, size)
-    ]
-
-
 _PLANNING = threading.Lock()
 
 
-def _planned(recipe: Recipe) -> tuple[SliceRun, Encode, str]:
-    """The run of a recipe, how its layers are encoded, and their key, planned once in a process."""
+def _planned(recipe: Recipe) -> SliceRun:
+    """The run of a recipe, planned once in a process."""
     with _PLANNING:
         return _kept(recipe)
 
 
 @lru_cache(maxsize=2)
-def _kept(recipe: Recipe) -> tuple[SliceRun, Encode, str]:
-    run = recipe.run(Work(threads=1))
-    return run, recipe.encoder(run), run.key(recipe.form)
+def _kept(recipe: Recipe) -> SliceRun:
+    return recipe.run(Work(threads=1))

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import csv
-import difflib
 import re
-import tomllib
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -15,10 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fracslice.common.files import reported
-from fracslice.errors import ExportError
-from fracslice.formulas.parameters import REQUIRED, Count, Number, validate
-from fracslice.slicing.printers import Printer
+from ..common.tables import read_table, read_text
+from ..errors import ExportError
+from ..formulas.parameters import REQUIRED, Count, Number
+from ..formulas.records import attribute, from_table, validate
+from ..slicing.printers import Printer
 
 
 @dataclass(frozen=True)
@@ -52,20 +51,20 @@ class Resin:
         For an invalid value.
     """
 
-    exposure: float
-    bottom_exposure: float
+    exposure: float = attribute(Number, REQUIRED, "seconds of each layer", above=0, most=1000)
+    bottom_exposure: float = attribute(Number, REQUIRED, "seconds of each bottom layer", above=0, most=1000)
     name: str = "unknown"
-    bottom_layers: int = 5
-    transition_layers: int = 5
-    lift: float = 5.0
-    lift_speed: float = 65.0
-    retract_speed: float = 150.0
-    wait: float = 0.5
-    density: float = 1.1
-    price: float = 0.0
+    bottom_layers: int = attribute(Count, 5, "bottom layers", most=200)
+    transition_layers: int = attribute(Count, 5, "transition layers", most=200)
+    lift: float = attribute(Number, 5.0, "mm after each layer", above=0, most=100)
+    lift_speed: float = attribute(Number, 65.0, "mm/min", above=0, most=10_000)
+    retract_speed: float = attribute(Number, 150.0, "mm/min", above=0, most=10_000)
+    wait: float = attribute(Number, 0.5, "seconds before each layer", least=0, most=1000)
+    density: float = attribute(Number, 1.1, "g/ml", above=0, most=100)
+    price: float = attribute(Number, 0.0, "of a litre", least=0)
 
     def __post_init__(self) -> None:
-        validate(self, KINDS, ExportError)
+        validate(self, ExportError)
 
     def exposures(self, layers: int) -> NDArray[np.float64]:
         """Exposure of each layer.
@@ -124,10 +123,14 @@ def resin(name: str, printer: Printer | None, layer: float) -> Resin:
         For an unknown resin, or a file that cannot be read or has an invalid value.
     """
     ending = Path(name).suffix.lower()
-    if ending in (".ini", ".toml"):
-        return _of_ini(Path(name)) if ending == ".ini" else of_table(name, _toml(Path(name)))
+    if ending == ".ini":
+        return _of_ini(Path(name))
+    if ending == ".toml":
+        return of_table(name, read_table(Path(name), ExportError))
     known = _table().get(printer.name if printer else "", {})
     if name not in known:
+        import difflib
+
         near = difflib.get_close_matches(name, known, 1, 0.3)
         hint = f"did you mean {near[0]!r}?" if near else "expected a .toml or .ini file, or --exposure"
         title = printer.title if printer else "no printer"
@@ -200,29 +203,12 @@ def of_table(where: str, values: Mapping[str, Any]) -> Resin:
     ExportError
         For an unknown or missing key, or an invalid value.
     """
-    names = [f.name for f in fields(Resin)]
-    if unknown := sorted(set(values) - set(names)):
-        raise ExportError(f"{where}: {unknown[0]!r}: unknown; expected {', '.join(names)}")
-    if missing := [name for name in names[:2] if name not in values]:
-        raise ExportError(f"{where}: {missing[0]} is missing")
-    try:
-        return Resin(**{"name": Path(where).stem, **values})
-    except ExportError as error:
-        raise ExportError(f"{where}: {error}") from None
-
-
-def _toml(path: Path) -> dict[str, Any]:
-    with reported(path):
-        try:
-            return tomllib.loads(path.read_text(encoding="utf-8"))
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise ExportError(f"{path}: {error}") from None
+    return from_table(Resin, where, {"name": Path(where).stem, **values}, ExportError)
 
 
 def _of_ini(path: Path) -> Resin:
     """Read a resin profile of PrusaSlicer: its keys, and those in its notes."""
-    with reported(path):
-        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    lines = read_text(path, ExportError, "replace").splitlines()
     pairs = (line.partition("=") for line in lines if "=" in line and not line.startswith("#"))
     values = {key.strip(): value.strip() for key, _, value in pairs}
     notes = values.get("material_notes", "").replace("\\n", "\n").replace("\\r", "\n")
@@ -268,16 +254,3 @@ INI = {
     "DELAY_BEFORE_EXPOSURE": ("wait", 1.0),
 }
 """Keys of PrusaSlicer's profiles, and of the notes that its .pwmx writer reads (mm/s), and their units."""
-
-KINDS = {
-    "exposure": Number(REQUIRED, "seconds of each layer", above=0, most=1000),
-    "bottom_exposure": Number(REQUIRED, "seconds of each bottom layer", above=0, most=1000),
-    "bottom_layers": Count(5, "bottom layers", most=200),
-    "transition_layers": Count(5, "transition layers", most=200),
-    "lift": Number(5.0, "mm after each layer", above=0, most=100),
-    "lift_speed": Number(65.0, "mm/min", above=0, most=10_000),
-    "retract_speed": Number(150.0, "mm/min", above=0, most=10_000),
-    "wait": Number(0.5, "seconds before each layer", least=0, most=1000),
-    "density": Number(1.1, "g/ml", above=0, most=100),
-    "price": Number(0.0, "of a litre", least=0),
-}

@@ -6,17 +6,19 @@ import os
 import re
 import struct
 import warnings
-import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import BinaryIO
 
-from fracslice.common.files import check_target, replacing, reported
-from fracslice.common.private import OWNER_ONLY, opened
-from fracslice.common.seals import seal
-from fracslice.errors import ExportError, FracsliceWarning
+from isal.isal_zlib import crc32
+
+from ..common.files import check_target, replacing, reported
+from ..common.private import OWNER_ONLY, opened
+from ..common.seals import seal
+from ..errors import ExportError, FracsliceWarning
 
 JOB = "job.json"
 """Name of the file that identifies the job of an unfinished folder."""
@@ -27,6 +29,9 @@ LAYER = re.compile(r"\d{5,}\.(png|svg)")
 """Names of layer files in a folder."""
 
 UNREADABLE = "the finished layers cannot be read back"
+
+GROUP = 1 << 22
+"""Bytes that are read while those before are written."""
 
 _HEAD = struct.Struct("<II")
 """Header of a record: length and CRC-32 of the data."""
@@ -55,17 +60,39 @@ class Journal:
         layer : bytes
             The encoded layer.
         """
-        self.file.write(_HEAD.pack(len(layer), zlib.crc32(layer)) + layer)
+        self.file.write(_HEAD.pack(len(layer), crc32(layer)) + layer)
         self.count += 1
 
     def __iter__(self) -> Iterator[bytes]:
         """Iterate over all layers in order. Raises `ExportError` if a record cannot be read back."""
+        return chain.from_iterable(self.groups())
+
+    def groups(self) -> Iterator[list[bytes]]:
+        """Iterate over all layers in groups, each of which is read in one go.
+
+        Yields
+        ------
+        list of bytes
+            Consecutive layers, at least `GROUP` bytes of them, or the last ones.
+
+        Raises
+        ------
+        ExportError
+            If a record cannot be read back.
+        """
         self.file.seek(0)
+        group, size = list[bytes](), 0
         for _ in range(self.count):
             layer = self.next()
             if layer is None:
                 raise ExportError(UNREADABLE)
-            yield layer
+            group.append(layer)
+            size += len(layer)
+            if size >= GROUP:
+                yield group
+                group, size = [], 0
+        if group:
+            yield group
 
     def heads(self, size: int) -> Iterator[tuple[bytes, int]]:
         """Iterate over the begins of all layers, without reading the rest.
@@ -108,7 +135,7 @@ class Journal:
             return None
         size, crc = _HEAD.unpack(head)
         data = self.file.read(size)
-        return data if len(data) == size and zlib.crc32(data) == crc else None
+        return data if len(data) == size and crc32(data) == crc else None
 
 
 @contextmanager

@@ -11,8 +11,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from fracslice.work import chunks
-
+from ..work import chunks
 from .colour_png import STRIP
 
 

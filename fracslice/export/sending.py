@@ -18,9 +18,10 @@ from io import BufferedReader
 from pathlib import Path
 from urllib.parse import quote, urlsplit
 
-from fracslice.common.files import reported
-from fracslice.errors import ExportError
-from fracslice.work import Work
+from ..common.files import reported
+from ..common.tables import read_text
+from ..errors import ExportError
+from ..work import Work
 
 PACKET = 1 << 20
 """Bytes of a packet of SDCP."""
@@ -114,8 +115,7 @@ def _key() -> str:
         raise ExportError(
             f"PrusaLink needs a key: expected it in {KEY}, or the name of a file with it in {KEY_FILE}"
         )
-    with reported(Path(name)):
-        return Path(name).read_text(encoding="utf-8").strip()
+    return read_text(Path(name), ExportError).strip()
 
 
 def _packets(file: BufferedReader, size: int, work: Work) -> Iterator[bytes]:
@@ -179,7 +179,7 @@ def _answered(response: HTTPResponse) -> HTTPResponse:
 
 
 def _reason(answer: object) -> str:
-    """What an answer of SDCP says."""
+    """Message of an answer of SDCP."""
     messages = answer.get("messages") if isinstance(answer, dict) else None
     first = messages[0] if isinstance(messages, list) and messages else {}
     return f"{first.get('message', 'no reason')}" if isinstance(first, dict) else "no reason"

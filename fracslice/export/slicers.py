@@ -17,9 +17,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fracslice.common.files import check_target
-from fracslice.errors import ExportError
-from fracslice.work import Work
+from ..common.files import check_target
+from ..errors import ExportError
+from ..work import Work
 
 Command = Callable[[str, Sequence[str], Path, Path], list[str]]
 """Command line from the program, the profiles, the model and the file to write."""
@@ -147,7 +147,7 @@ def _run(command: Sequence[str], work: Work, title: str) -> list[str]:
 
 
 def _last(lines: Sequence[str]) -> str:
-    """Last line that says something."""
+    """Last line that is not empty."""
     return next((line.strip() for line in reversed(lines) if line.strip()), "it says nothing")
 
 

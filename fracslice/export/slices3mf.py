@@ -8,13 +8,14 @@ from typing import BinaryIO
 
 import numpy as np
 
-from fracslice.errors import ExportError
-from fracslice.export.jobs import SliceRun
-from fracslice.export.layerformats import FileFormat
-from fracslice.export.ranges import Encode
-from fracslice.export.text import rows
-from fracslice.export.threemf import mesh_element, package
-from fracslice.slicing import Layer
+from ..errors import ExportError
+from ..slicing import Layer
+from .jobs import SliceRun
+from .layerformats import FileFormat
+from .packages import package
+from .ranges import Encode
+from .text import rows
+from .threemf import mesh_element
 
 LEVEL = 1
 HEAD = (

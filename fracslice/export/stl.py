@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from functools import partial
+from collections.abc import Iterable, Iterator, Mapping
 from typing import BinaryIO
 
-import numpy as np
+from ..background import ahead
+from ..errors import ExportError
+from ..mesh.model import Mesh
 
-from fracslice.errors import ExportError
-from fracslice.mesh.model import Mesh
+HEADER, TRIANGLE = 84, 50
+"""Bytes before the first triangle, and of a triangle."""
 
-BLOCK, TRIANGLE = 1 << 18, 50
-"""Triangles of a block, and bytes of a triangle."""
+BLOCK = 1 << 18
+"""Triangles that are encoded together."""
 
 
 def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
@@ -53,68 +54,61 @@ def write_pieces(meshes: Iterable[Mesh], file: BinaryIO, metadata: Mapping[str, 
     ExportError
         For more than 4294967295 triangles.
     """
-    write_blocks((block for mesh in meshes for block in _blocks(mesh)), file, metadata)
-
-
-def write_blocks(blocks: Iterable[bytes | memoryview], file: BinaryIO, metadata: Mapping[str, str]) -> None:
-    """Write a mesh from blocks of encoded triangles.
-
-    Parameters
-    ----------
-    blocks : iterable of bytes-like
-        Triangles of 50 bytes.
-    file : file
-        Binary file, open for writing and able to seek.
-    metadata : mapping of str to str
-        Names and values; the header holds Application.
-
-    Raises
-    ------
-    ExportError
-        For more than 4294967295 triangles.
-    """
-
-    def written(block: bytes | memoryview, file: BinaryIO) -> int:
-        file.write(block)
-        return memoryview(block).nbytes
-
-    concatenate((partial(written, block) for block in blocks), file, metadata)
-
-
-def concatenate(
-    blocks: Iterable[Callable[[BinaryIO], int]], file: BinaryIO, metadata: Mapping[str, str]
-) -> None:
-    """Write a mesh from functions that append encoded triangles.
-
-    Parameters
-    ----------
-    blocks : iterable of callable
-        Appends triangles of 50 bytes to the file; returns the number of bytes.
-    file : file
-        Binary file, open for writing and able to seek.
-    metadata : mapping of str to str
-        Names and values; the header holds Application.
-
-    Raises
-    ------
-    ExportError
-        For more than 4294967295 triangles.
-    """
     start, count = file.tell(), 0
-    header = f"binary STL, units: mm, {metadata['Application']}".encode("ascii", "replace")
-    file.write(header[:80].ljust(80) + bytes(4))
-    for block in blocks:
-        count += block(file) // TRIANGLE
-        if count >= 2**32:
-            raise ExportError("STL cannot hold more than 4294967295 triangles")
-    file.seek(start + 80)
-    file.write(np.uint32(count).astype("<u4").tobytes())
+    head = header(0, metadata)
+    file.write(head)
+    for mesh in meshes:
+        count += len(mesh.triangles)
+        head = header(count, metadata)
+        for block in ahead(blocks(mesh)):
+            file.write(block)
+    file.seek(start)
+    file.write(head)
     file.seek(0, os.SEEK_END)
 
 
-def _blocks(mesh: Mesh) -> Iterator[memoryview]:
-    """Encoded triangles of a mesh."""
-    from fracslice._native import stl
+def header(count: int, metadata: Mapping[str, str]) -> bytes:
+    """Begin of a file.
+
+    Parameters
+    ----------
+    count : int
+        Number of triangles.
+    metadata : mapping of str to str
+        Names and values; the header holds Application.
+
+    Returns
+    -------
+    bytes
+        `HEADER` bytes.
+
+    Raises
+    ------
+    ExportError
+        For more than 4294967295 triangles.
+    """
+    if count >= 2**32:
+        raise ExportError("STL cannot hold more than 4294967295 triangles")
+    about = f"binary STL, units: mm, {metadata['Application']}".encode("ascii", "replace")
+    return about[:80].ljust(80) + count.to_bytes(4, "little")
+
+
+def blocks(mesh: Mesh, threads: int = 0) -> Iterator[memoryview]:
+    """Encode the triangles of a mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh, mm.
+    threads : int, optional
+        Threads; 0 for all cores.
+
+    Yields
+    ------
+    memoryview
+        Triangles of 50 bytes.
+    """
+    from .._native import stl
 
     for begin in range(0, len(mesh.triangles), BLOCK):
-        yield stl(mesh.vertices, mesh.triangles[begin : begin + BLOCK]).data
+        yield stl(mesh.vertices, mesh.triangles[begin : begin + BLOCK], threads).data

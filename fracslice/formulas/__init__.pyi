@@ -249,7 +249,7 @@ def cells(keep: float | Sequence[int] = (1, 2, 3), level: int = 3) -> Node:
 
     Parameters
     ----------
-    keep : 1 or 2 or 3 whole numbers >= 0 and <= 3, default (1, 2, 3)
+    keep : 1, 2 or 3 whole numbers >= 0 and <= 3, default (1, 2, 3)
         cells kept: 0 at a corner, 1 at an edge, 2 at a face, 3 at the centre
     level : a whole number from 0 to 20, default 3
         how often every cell is cut into 27
@@ -712,10 +712,7 @@ def mandelbulb(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'au
     """The Mandelbulb: whole powers by complex multiplication, others in polar coordinates.
 
     White and Nylander 2009; distance: Quilez 2009, "Mandelbulb", after Hart, Sandin and Kauffman 1989. With
-    w = (rho e^(i phi), z), w^n = (Im (z + i rho)^n e^(i n phi), Re (z + i rho)^n). Both powers are products;
-    Im (z + i rho)^n is carried divided by rho, so the poles are no special case. The real part of a square is
-    2 re^2 minus the squared norm, which is known. The azimuth enters as u + iv = e^(2 i phi), which needs no
-    root, to the power n/2; the remaining factor of rho e^(i n phi) is x + iy for odd n, else rho.
+    w = (rho e^(i phi), z), w^n = (Im (z + i rho)^n e^(i n phi), Re (z + i rho)^n).
 
     The map stretches by n r^(n-1) along meridians and by n |sin n theta / sin theta| r^(n-1) along circles of
     latitude. The usual dr ignores the second stretch, and overestimates distances up to 13 times near the
@@ -749,8 +746,9 @@ def mandelbulb(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'au
 def material(*elements: Node, colour: Sequence[float] = (0.8, 0.8, 0.8), palette: Literal['colours', 'viridis', 'plasma', 'inferno', 'magma', 'cividis', 'twilight'] = 'colours', trap: Literal['point', 'axes', 'planes', 'sphere', 'steps', 'direction'] = 'point', texture: float | None = None, tile: float = 1.0, repeats: float = 1.0, shift: float = 0.0, specular: float = 0.2, shininess: float = 32.0, glow: float = 0.0, reflect: float = 0.0, roughness: float = 0.0, vary: float = 0.0, coat: float = 0.0, metallic: float = 0.0, clear: float = 0.0, index: float = 1.5, absorb: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
     """The appearance of the element in pictures. A material nested deeper takes precedence.
 
-    A palette shows the smallest distance of the orbit to the origin (point), to the axes, to the coordinate
-    planes or to the unit sphere, its number of steps, or its last angle about the z axis (direction).
+    A palette shows the smallest distance of the orbit to the origin (point), to the axes or to the coordinate
+    planes, the smallest | |w|^2 - 1 | (sphere), its number of steps, or its last angle about the z axis
+    (direction). It is run through once from 0 to 1, and again beyond; shapes without an orbit have 1.
 
     The field is that of the element: L = the element's.
 
@@ -758,7 +756,7 @@ def material(*elements: Node, colour: Sequence[float] = (0.8, 0.8, 0.8), palette
     ----------
     *elements : Node
         What it is applied to; several are a union.
-    colour : 3 or 6 or 9 or 12 or 15 or 18 or 21 or 24 numbers >= 0 and <= 1, default (0.8, 0.8, 0.8)
+    colour : 3, 6, 9, 12, 15, 18, 21 or 24 numbers >= 0 and <= 1, default (0.8, 0.8, 0.8)
         red, green and blue; several colours, three numbers each, are a palette for the orbit
     palette : colours, viridis, plasma, inferno, magma, cividis or twilight, default 'colours'
         a palette by name in place of the colours

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from . import power_maps
 from .orbits import orbit
 from .parameters import Count, Number
+from .powers import calm_power, power_length, square, square_length
+from .powers import power as raised
 from .registry import Node
-from .verbs import positive, turn
-from .verbs import power as raised
+from .verbs import LENGTHS, positive, turn
 from .vocabulary import absolute, atan2, cos, exp, floor, log, maximum, rsqrt, sin, sqrt, where
 
 POWER = Number(8.0, "the exponent", least=2, most=16)
@@ -21,8 +23,7 @@ def quaternion_mandelbrot(w, c):  # type: ignore[no-untyped-def]
 
     It is the complex Mandelbrot set turned about the real axis. L = 2 is measured.
     """
-    x, y, z = w
-    return (x * x - y * y - z * z, 2.0 * x * y, 2.0 * x * z) + c, 2.0 * sqrt(x * x + y * y + z * z)
+    return square(w) + c
 
 
 @orbit()
@@ -33,12 +34,21 @@ def bristorbrot(w, c):  # type: ignore[no-untyped-def]
 
 
 @orbit(power=POWER)
-def burning_ship(w, c, power):  # type: ignore[no-untyped-def]
+def burning_ship(w, c, power, calm):  # type: ignore[no-untyped-def]
     """The Mandelbulb of absolute coordinates, after Michelitsch and Roessler 1992, "The burning ship".
 
     L = 2 is measured.
     """
-    return raised(positive(w), power) + c
+    return calm_power(positive(w), power, calm) + c
+
+
+burning_ship.hooks.update(power_maps.HOOKS)
+
+
+@burning_ship.growth  # type: ignore[untyped-decorator]
+def burning_ship_growth(node: Node) -> dict[str, object]:
+    """Of positive coordinates, no azimuth is at the tear."""
+    return {**power_maps.power_growth(node), "torn": False}
 
 
 @orbit(power=Count(3, "the exponent", least=2, most=9))
@@ -66,6 +76,11 @@ def cosine_bulb(w, c, power):  # type: ignore[no-untyped-def]
     Lengths along meridians grow by n r^(n-1), along circles of latitude by r^(n-1) |cos n theta / cos theta|,
     without limit near the poles if n is not odd: space tears there. L = 2 is measured.
     """
+    return equatorial_power(w, power) + c
+
+
+def equatorial_power(w, power):  # type: ignore[no-untyped-def]
+    """Power in polar coordinates whose angle is that to the equator."""
     x, y, z = w
     rho2 = maximum(x * x + y * y, 1e-30)
     r2 = maximum(rho2 + z * z, 1e-30)
@@ -80,7 +95,10 @@ def cosine_bulb(w, c, power):  # type: ignore[no-untyped-def]
     p, q = sin(theta), cos(theta)
     across, along = rn * (cosine * q + sine * p), rn * (sine * q - cosine * p)
     stretch = power * maximum(rn * rsqrt(r2), absolute(across) / rho)
-    return (across * cos(phi), across * sin(phi), where(z < 0.0, -along, along)) + c, stretch
+    return (across * cos(phi), across * sin(phi), where(z < 0.0, -along, along)), stretch
+
+
+LENGTHS[equatorial_power] = power_length
 
 
 @orbit(
@@ -94,6 +112,9 @@ def lambda_bulb(w, c, power, factor, angle):  # type: ignore[no-untyped-def]
     beyond.
     """
     return factor * turn(w - raised(w, power), (0.0, 0.0, 1.0), angle)
+
+
+lambda_bulb.hooks["step"] = power_maps.products_step
 
 
 @lambda_bulb.slope  # type: ignore[untyped-decorator]
@@ -123,3 +144,6 @@ def pine(w):  # type: ignore[no-untyped-def]
     k = 2.0 * x / rho
     image = (x * x - y * y - z * z, k * (y * y - z * z), k * 2.0 * y * z)
     return image, maximum(2.0 * sqrt(x * x + y * y + z * z), 4.0 * absolute(x))
+
+
+LENGTHS[pine] = square_length

@@ -78,9 +78,7 @@ def sure_distance(margin, slope, bend):  # type: ignore[no-untyped-def]
     return margin / minimum(slope + bend * margin, 1e30)
 
 
-def levels(
-    power: float, iterations: int, bailout: float, escaped: float
-) -> tuple[float, float, float, float]:
+def levels(power: float, iterations: int, bailout: float) -> tuple[float, float, float]:
     """Level parameters of an escape-time formula, as `potential_distance` takes them.
 
     Parameters
@@ -91,18 +89,60 @@ def levels(
         Steps of the orbit, N.
     bailout : float
         Bailout radius, R.
-    escaped : float
-        |w| one step past the escape circle: E^power.
 
     Returns
     -------
-    (float, float, float, float)
-        first_level, last_level, E^2 and the lower limit of r2.
+    (float, float, float)
+        first_level, last_level and the lower limit of r2.
     """
     steps = min(iterations, int(30 / math.log10(power)))
     last = 2 * math.log(bailout)
-    escape = max(bailout, escaped ** (1 / power))
-    return last / power**steps, last, escape**2, bailout**2 * math.exp(-max(0.2 / bailout, 1e-4))
+    return last / power**steps, last, bailout**2 * math.exp(-max(0.2 / bailout, 1e-4))
+
+
+def stop(power: float, bailout: float, escaped: float) -> float:
+    """Radius where an orbit stops.
+
+    Parameters
+    ----------
+    power : float
+        Exponent of the formula.
+    bailout : float
+        Bailout radius, R.
+    escaped : float
+        |w| one step past the radius: E^power.
+
+    Returns
+    -------
+    float
+        E, at least R.
+    """
+    return float(max(bailout, escaped ** (1 / power)))
+
+
+def enclosing_radius(power: float, bailout: float, steps: int, constant: float) -> float:
+    """Bound of the radius of the solid of some steps: |w_n+1| >= |w_n|^power - |c| bounds |w_n| backwards.
+
+    Parameters
+    ----------
+    power : float
+        Exponent of the formula.
+    bailout : float
+        Bailout radius.
+    steps : int
+        Number of steps.
+    constant : float
+        Norm of the constant added in each step.
+
+    Returns
+    -------
+    float
+        Largest distance from the origin.
+    """
+    radius = bailout
+    for _ in range(steps):
+        radius = (radius + constant) ** (1 / power)
+    return float(radius)
 
 
 def farthest(power: float, bailout: float, constant: float) -> float:

@@ -37,6 +37,8 @@ class Bounds:
         (`docs/how/accuracy.md`).
     boxless : tuple of str
         Names of the formulas in the field that state no box.
+    measured : tuple of str
+        Names of the formulas in the field whose L is measured, not proved.
     """
 
     box: Box
@@ -44,6 +46,7 @@ class Bounds:
     exterior_only: bool
     steepening: float = 0.0
     boxless: tuple[str, ...] = ()
+    measured: tuple[str, ...] = ()
 
 
 class Kernel(Protocol):
@@ -147,11 +150,14 @@ class Loops:
         Points that make a call worthwhile.
     runs : mapping of str to CompiledLoop
         The loops by name.
+    on_gpu : bool
+        Whether they can be launched on arrays in GPU memory.
     """
 
     width: int
     batch: int
     runs: Mapping[str, FieldLoop]
+    on_gpu: bool = False
 
 
 class Cells(Protocol):

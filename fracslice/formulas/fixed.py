@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
+
+EVALUATED: set[Callable[..., Any]] = set()
+"""Functions of numbers that are evaluated where a step is read: their values are constants of the code."""
 
 
 @dataclass(frozen=True)
@@ -18,3 +22,20 @@ class Fixed:
     """
 
     value: Any
+
+
+def evaluated(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorate a function that is evaluated where a step is read.
+
+    Parameters
+    ----------
+    function : callable
+        Function of numbers; NaN stands for one that is no constant of the code.
+
+    Returns
+    -------
+    callable
+        The function.
+    """
+    EVALUATED.add(function)
+    return function

@@ -32,6 +32,10 @@ class Hooks:
         """Set the hook that returns the Lipschitz bound, where it depends on parameters or children."""
         return self._hook("slope", hook)
 
+    def proves_slope(self, hook: Callable[[Node], bool]) -> Callable[[Node], bool]:
+        """Set the hook that returns True if the Lipschitz bound of an escape-time fractal is a theorem."""
+        return self._hook("proves_slope", hook)
+
     def steepening(self, hook: Callable[[Node], float]) -> Callable[[Node], float]:
         """Set the hook that returns `Bounds.steepening`, where it is not the maximum of the children's."""
         return self._hook("steepening", hook)
@@ -80,6 +84,14 @@ class Hooks:
     def step(self, hook: Callable[[Node], tuple[Any, ...]]) -> Callable[[Node], tuple[Any, ...]]:
         """Set the hook that returns the step of an escape-time fractal, see `orbits.Stepped`."""
         return self._hook("step", hook)
+
+    def alone(self, hook: Callable[[Node], dict[str, Any]]) -> Callable[[Node], dict[str, Any]]:
+        """Set the hook that returns the values of a step's parameters that differ outside of hybrids."""
+        return self._hook("alone", hook)
+
+    def growth(self, hook: Callable[[Node], dict[str, Any]]) -> Callable[[Node], dict[str, Any]]:
+        """Set the hook that returns the attributes of `kernel.growth.Growth`, where they are known."""
+        return self._hook("growth", hook)
 
     def visible(self, hook: Callable[[Node, float], Node]) -> Callable[[Node, float], Node]:
         """Set the hook that returns the node without detail finer than a voxel size in its own units."""

@@ -7,12 +7,13 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from .box import Box
-from .escape import CORE, levels, potential_distance
-from .orbits import escape_sign, single
-from .parameters import AUTO, Number, Vector
+from .escape import CORE, enclosing_radius, levels, potential_distance, stop
+from .orbits import escape_sign, rounds, single
+from .parameters import Number, Vector
+from .powers import square
 from .registry import Fixed, Node, shape
 from .rounds import ITERATIONS, REPEAT, Stepped
-from .vocabulary import any_of, maximum, orbit, sqrt, where
+from .vocabulary import any_of, maximum, orbit, where
 
 ESCAPED = 256.0
 """|w| one step past the escape circle."""
@@ -71,7 +72,8 @@ def julia(x, y, z, c, iterations, first_level, last_level, escape2, least, flat,
 
 @julia.arguments
 def julia_arguments(node: Node) -> dict[str, object]:
-    first, last, escape2, least = levels(2, node["iterations"], node["bailout"], ESCAPED)
+    first, last, least = levels(2, node["iterations"], node["bailout"])
+    escape2 = stop(2, node["bailout"], ESCAPED) ** 2
     flat = Fixed(node["c"][3] == 0)
     return {
         "c": node["c"],
@@ -105,17 +107,11 @@ def julia_steepening(node: Node) -> float:
 @julia.bounds
 def julia_bounds(node: Node) -> Box:
     single(node)
-    # |w_n+1| >= |w_n|^2 - |c|, so |w_N| <= R bounds every |w_n| backwards, down to the start point.
-    radius, steps = node["bailout"], 1 if node["iterations"] == AUTO else min(node["iterations"], 60)
-    for _ in range(steps):
-        radius = math.sqrt(radius + math.hypot(*node["c"]))
-    return Box.centred(radius)
+    return Box.centred(enclosing_radius(2, node["bailout"], rounds(node), math.hypot(*node["c"])))
 
 
 def step(w, c):  # type: ignore[no-untyped-def]
-    """Step of the quaternions without k."""
-    x, y, z = w
-    return (x * x - y * y - z * z, 2.0 * x * y, 2.0 * x * z) + c, 2.0 * sqrt(x * x + y * y + z * z)
+    return square(w) + c
 
 
 @julia.step
@@ -127,5 +123,5 @@ def julia_step(node: Node) -> Stepped:
 
 @julia.sign
 def julia_sign(node: Node) -> tuple[Callable[..., Any], dict[str, object]] | None:
-    _, _, escape2, _ = levels(2, node["iterations"], node["bailout"], ESCAPED)
-    return escape_sign(node, node["bailout"], escape2) if not node["c"][3] else None
+    escape = stop(2, node["bailout"], ESCAPED)
+    return escape_sign(node, node["bailout"], escape**2) if not node["c"][3] else None

@@ -50,8 +50,9 @@ TRAPS = ("point", "axes", "planes", "sphere", "steps", "direction")
 def material(child, x, y, z):  # type: ignore[no-untyped-def]
     """The appearance of the element in pictures. A material nested deeper takes precedence.
 
-    A palette shows the smallest distance of the orbit to the origin (point), to the axes, to the coordinate
-    planes or to the unit sphere, its number of steps, or its last angle about the z axis (direction).
+    A palette shows the smallest distance of the orbit to the origin (point), to the axes or to the coordinate
+    planes, the smallest | |w|^2 - 1 | (sphere), its number of steps, or its last angle about the z axis
+    (direction). It is run through once from 0 to 1, and again beyond; shapes without an orbit have 1.
 
     The field is that of the element: L = the element's.
     """

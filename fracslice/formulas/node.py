@@ -120,7 +120,8 @@ class Node(Operators, Field):
     def conservative(self) -> Node:
         """Conservative tree, for skipping empty space where the node's own field exceeds its bound.
 
-        The two differ beside the tears of fractional powers and at seams with an escape-time fractal.
+        The two differ beside the tears of fractional powers, at seams with an escape-time fractal, and for
+        hybrids.
 
         Returns
         -------
@@ -138,7 +139,7 @@ class Node(Operators, Field):
         Parameters
         ----------
         message : str
-            What is wrong and what was expected.
+            The fault, and the expected value.
 
         Returns
         -------
@@ -156,7 +157,10 @@ class Node(Operators, Field):
         own = [] if "bounds" in self.formula.hooks else [self.formula.name]
         boxless = dict.fromkeys([*(name for b in below for name in b.boxless), *own])
         exterior_only = self.formula.exterior_only or any(b.exterior_only for b in below)
-        return Bounds(box, slope, exterior_only, steepening, tuple(boxless))
+        is_measured = self.formula.exterior_only and not self._hooked("proves_slope", False)
+        names = (name for b in below for name in b.measured)
+        measured = dict.fromkeys([*names, *([self.formula.name] if is_measured else [])])
+        return Bounds(box, slope, exterior_only, steepening, tuple(boxless), tuple(measured))
 
     def _hooked(self, name: str, default: Any, *arguments: Any) -> Any:
         """Value of a hook of the formula, or the default of a formula without it."""

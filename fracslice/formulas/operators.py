@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from ..providers import provider
 from .axes import Axis, direction, three
+from .catalogue import FORMULAS
 
 if TYPE_CHECKING:
     import numpy as np
@@ -278,9 +279,7 @@ class Operators:
 
 def _made(name: str, *elements: Operators, **values: Any) -> Node:
     """Node of the formula with this name."""
-    from .registry import get
-
-    node: Node = get(name)(*cast("tuple[Node, ...]", elements), **values)
+    node: Node = FORMULAS[name](*cast("tuple[Node, ...]", elements), **values)
     return node
 
 

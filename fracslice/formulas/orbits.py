@@ -57,7 +57,7 @@ class _Orbit(Formula):
 
 def _registered(parameters: dict[str, Any]) -> Callable[[Callable[..., Any]], Formula]:
     def decorate(step: Callable[..., Any]) -> Formula:
-        formula = shape(lipschitz=LIPSCHITZ, exterior_only=True, **parameters, **OWN)(step)
+        formula = shape(lipschitz=LIPSCHITZ, exterior_only=True, **{**parameters, **OWN, **parameters})(step)
         formula.hooks.update(HOOKS, step=orbit_step)
         return formula
 
@@ -81,14 +81,30 @@ def grown(node: Node) -> Growth:
     SceneError
         If they do not escape, or grow too fast to compute.
     """
-    made, values = steps(node)
-    rounds = 1 if node["iterations"] == AUTO else node["iterations"]
-    bound = provider("growth").growth(made, tuple(values.items()), rounds)
+    if known := node.formula.hooks.get("growth"):
+        return provider("growth").Growth(**known(node))
+    made, values = steps(node, alone=False)
+    bound = provider("growth").growth(made, tuple(values.items()), rounds(node))
     if bound is None:
         raise node.fail("has orbits that do not escape: expected parameters that enlarge more")
     if not bound.fits:
         raise node.fail("has orbits that grow too fast to compute: expected smaller powers")
     return bound
+
+
+def rounds(node: Node) -> int:
+    """Return the number of rounds, 1 where it is automatic.
+
+    Parameters
+    ----------
+    node : Node
+        Orbit.
+
+    Returns
+    -------
+    int
+    """
+    return 1 if node["iterations"] == AUTO else int(node["iterations"])
 
 
 def single(node: Node) -> None:
@@ -116,21 +132,23 @@ def orbit_bounds(node: Node) -> Box:
 
 def orbit_arguments(node: Node) -> dict[str, object]:
     made, values = steps(node)
-    own: dict[str, object] = provider("growth").arguments(made, grown(node), node["iterations"])
-    return {**own, **values}
+    own = {**provider("growth").arguments(made, grown(node), node["iterations"]), **values}
+    code = orbit_select(node).__code__
+    return {name: own[name] for name in code.co_varnames[3 : code.co_argcount]}
 
 
 def orbit_sign(node: Node) -> tuple[Callable[..., Any], dict[str, object]] | None:
     code, values = steps(node)
     grown_by = grown(node)
     own = provider("orbit_signs").sign_arguments(code, grown_by, node["iterations"])
-    return (provider("orbits").sign(code, grown_by.scaled), {**own, **values}) if own else None
+    return (provider("orbit_signs").sign(code, grown_by.scaled), {**own, **values}) if own else None
 
 
 def orbit_proved_bounds(node: Node) -> Box:
+    if "growth" in node.formula.hooks:
+        return orbit_bounds(node)
     code, values = steps(node)
-    rounds = 1 if node["iterations"] == AUTO else node["iterations"]
-    box: Box = provider("orbit_signs").proved_box(code, tuple(values.items()), rounds)
+    box: Box = provider("orbit_signs").proved_box(code, tuple(values.items()), grown(node), rounds(node))
     return box
 
 
@@ -152,18 +170,29 @@ def escape_sign(node: Node, radius: float, escape2: float) -> tuple[Callable[...
     """
     code, values = steps(node)
     own = {"iterations": node["iterations"], "radius2": radius**2, "stop0": escape2}
-    return provider("orbits").sign(code, False), {**own, **values}
+    return provider("orbit_signs").sign(code, False), {**own, **values}
 
 
 def orbit_select(node: Node) -> Callable[..., Any]:
-    bound = grown(node)
-    function: Callable[..., Any] = provider("orbits").field(steps(node)[0], bound.by_power, bound.scaled)
+    code = steps(node)[0]
+    function: Callable[..., Any] = provider("orbits").field(
+        code, grown(node).form(code, node.is_conservative)
+    )
     return function
 
 
 def orbit_slope(node: Node) -> float:
-    """Lipschitz bound: that of a constant stretch if it is proved, else a measured one."""
-    return float(grown(node).lipschitz or node.formula.lipschitz)
+    """Lipschitz bound: that of a constant stretch if it is proved, else a measured one.
+
+    Of a field that stays below twice the sure distance, that is 2.
+    """
+    bound = grown(node)
+    sure = bound.form(steps(node)[0], True).sure
+    return float(bound.lipschitz or (LIPSCHITZ if sure else node.formula.lipschitz))
+
+
+def orbit_proves_slope(node: Node) -> bool:
+    return grown(node).lipschitz is not None
 
 
 def orbit_steepening(node: Node) -> float:
@@ -199,6 +228,7 @@ HOOKS: dict[str, Callable[..., Any]] = {
     "sign": orbit_sign,
     "proved_bounds": orbit_proved_bounds,
     "slope": orbit_slope,
+    "proves_slope": orbit_proves_slope,
     "steepening": orbit_steepening,
     "potential": orbit_potential,
     "check": orbit_check,
@@ -210,7 +240,7 @@ def _hybrid(w, c):  # type: ignore[no-untyped-def]
 
     A round takes the step of every element, `repeat` times each. A `transform` around an element is that of
     its step's coordinates; `julia` of an element is the constant of its step, in these coordinates. With one
-    element it is that fractal, transformed. L = 3 is measured.
+    element it is that fractal, transformed. L = 2 or 3 is measured.
     """
     return w
 
@@ -224,7 +254,7 @@ orbit = register(
             AUTO,
             'rounds of the orbit; "auto": until one more moves most by less than 1/512 of the size',
             least=1,
-            auto=True,
+            words=(AUTO,),
         ),
         "julia": JULIA,
     },

@@ -2,19 +2,18 @@
 
 Each kind parses text from a scene file (`read`), validates a value (`check`, which raises a `ValueError` that
 says what is expected) and writes it back (`text`). The schema and the documentation are made from the same
-objects; `validate` applies them to the fields of a record.
+objects; `records.validate` applies them to the fields of a record.
 """
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from numbers import Integral
 from typing import Any
 
-from .conversion import finite, items, plain, shortest, shown
+from .conversion import finite, items, plain, shortest
 
 REQUIRED: Any = ...
 AUTO = "auto"
@@ -139,27 +138,29 @@ class Count(Parameter):
     ----------
     least, most : int
         Inclusive limits.
-    auto : bool
-        True if the word "auto" is allowed, too.
+    words : tuple of str
+        Words that are allowed, too.
     """
 
     least: int = 0
     most: int = 10_000
-    auto: bool = False
+    words: tuple[str, ...] = ()
 
     @property
     def expects(self) -> str:
-        return f"a whole number from {self.least} to {self.most}" + (' or "auto"' if self.auto else "")
+        whole = f"a whole number from {self.least} to {self.most}"
+        *others, last = whole, *(f'"{word}"' for word in self.words)
+        return f"{', '.join(others)} or {last}" if others else last
 
     def read(self, text: str) -> Any:
         try:
-            return self.check(text.strip() if self.auto and text.strip() == AUTO else int(plain(text)))
+            return self.check(text.strip() if text.strip() in self.words else int(plain(text)))
         except ValueError:
             raise ValueError(self.expects) from None
 
     def check(self, value: Any) -> Any:
-        if self.auto and isinstance(value, str) and value == AUTO:
-            return AUTO
+        if isinstance(value, str) and value in self.words:
+            return value
         whole = isinstance(value, Integral) and not isinstance(value, bool)
         if not whole or not self.least <= value <= self.most:
             raise ValueError(self.expects)
@@ -188,7 +189,9 @@ class Vector(Bounded):
     def expects(self) -> str:
         kind = "whole numbers" if self.whole else "numbers"
         nonzero = ", not all zero" if self.nonzero else ""
-        return f"{' or '.join(map(str, self.sizes))} {kind}{self.range}{nonzero}"
+        *others, last = map(str, self.sizes)
+        count = f"{', '.join(others)} or {last}" if others else last
+        return f"{count} {kind}{self.range}{nonzero}"
 
     def read(self, text: str) -> Any:
         return self.check(tuple(map(self.parsed, text.split())))
@@ -249,46 +252,3 @@ class File(Parameter):
         if not isinstance(value, str) or not value.isprintable():
             raise ValueError(self.expects)
         return value.strip()
-
-
-def validate(record: Any, kinds: Mapping[str, Any], fail: Callable[[str], Exception]) -> None:
-    """Validate and convert fields of a frozen record in place. None is kept where it is the default.
-
-    Parameters
-    ----------
-    record : dataclass
-        The record.
-    kinds : mapping of str to Parameter
-        Kind of each field.
-    fail : callable
-        Makes the exception to raise from the message "name=value: expected ...".
-    """
-    for name, kind in kinds.items():
-        value = getattr(record, name)
-        if value is not None or kind.default is not None:
-            object.__setattr__(record, name, validated(name, value, kind, fail))
-
-
-def validated(name: str, value: Any, kind: Any, fail: Callable[[str], Exception]) -> Any:
-    """Validate and convert one value.
-
-    Parameters
-    ----------
-    name : str
-        Name in the message.
-    value : object
-        The value.
-    kind : Parameter
-        Its kind.
-    fail : callable
-        Makes the exception to raise from the message "name=value: expected ...".
-
-    Returns
-    -------
-    object
-        The value in the kind's type.
-    """
-    try:
-        return kind.check(value)
-    except ValueError as error:
-        raise fail(f"{name}={shown(value)}: expected {error}") from None

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import sys
 import traceback
+import warnings
 from functools import cache
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
-from ..errors import FracsliceError, SceneError
+from ..errors import FracsliceError, FracsliceWarning, SceneError
 from .registry import Formula, get, names
 
 GROUP = "fracslice.formulas"
@@ -56,11 +57,15 @@ def run_file(path: str) -> list[Formula]:
 
 @cache
 def load_installed() -> None:
-    """Load the formulas of installed packages."""
+    """Load the formulas of installed packages; warn of a module that cannot be loaded."""
     from importlib.metadata import entry_points  # imports an e-mail parser
 
     for entry in entry_points(group=GROUP):
-        entry.load()
+        try:
+            entry.load()
+        except Exception as error:
+            message = f"formulas of {entry.value} are left out: {type(error).__name__}: {error}"
+            warnings.warn(message, FracsliceWarning, stacklevel=2)
 
 
 def origin(formula: Formula) -> str:

@@ -18,10 +18,12 @@ from typing import Any, Literal, TypeVar
 
 from ..errors import SceneError
 from . import signatures
+from .catalogue import FORMULAS
 from .fixed import Fixed as Fixed
 from .hooks import Hook, Hooks
 from .node import Node as Node
-from .parameters import REQUIRED, Parameter, validated
+from .parameters import REQUIRED, Parameter
+from .records import validated
 
 Kind = Literal["shape", "csg", "domain"]
 
@@ -74,7 +76,7 @@ class Formula(Hooks):
             object.__setattr__(self, name, value)
 
     def __repr__(self) -> str:
-        return f"<{self.kind} {self.name}{signatures.signature(self)}>"
+        return f"<{self.kind} {self.name}{signatures.signature(self, Node)}>"
 
     def __reduce__(self) -> tuple[Any, ...]:
         return get, (self.name,)
@@ -87,7 +89,7 @@ class Formula(Hooks):
     @property
     def __signature__(self) -> Signature:
         """Signature of the formula as a Python function."""
-        return signatures.signature(self)
+        return signatures.signature(self, Node)
 
     def __call__(self, *arguments: Any, place: str | None = None, **keywords: Any) -> Node:
         """Make a scene node.
@@ -144,9 +146,6 @@ class Formula(Hooks):
     def doc(self) -> str:
         """Docstring of the function."""
         return (self.function.__doc__ or "").strip()
-
-
-_REGISTRY: dict[str, Formula] = {}
 
 
 def shape(
@@ -258,13 +257,13 @@ def register(
     def decorate(function: Callable[..., Any]) -> Made:
         name = function.__name__.rstrip("_")
         formula = made(name, kind, function, MappingProxyType(parameters), children, **known)
-        if name in _REGISTRY and not _is_run_again(_REGISTRY[name].function, function):
+        if name in FORMULAS and not _is_run_again(FORMULAS[name].function, function):
             code = function.__code__
             raise SceneError(
                 f"{code.co_filename}:{code.co_firstlineno}: formula {name!r}: expected another name, "
                 f"there is one of this name already"
             )
-        _REGISTRY[name] = formula
+        FORMULAS[name] = formula
         return formula
 
     return decorate
@@ -292,9 +291,9 @@ def get(name: str) -> Formula:
     KeyError
         If there is no formula of this name.
     """
-    return _REGISTRY[name]
+    return FORMULAS[name]
 
 
 def names() -> list[str]:
     """Names of all formulas, sorted; see `get`."""
-    return sorted(_REGISTRY)
+    return sorted(FORMULAS)

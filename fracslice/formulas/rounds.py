@@ -23,7 +23,7 @@ ITERATIONS = Count(
     AUTO,
     'steps of the orbit; "auto": until one more moves most by less than 1/512 of the size',
     least=1,
-    auto=True,
+    words=(AUTO,),
 )
 JULIA = Vector(
     None, "adds this point in each step instead of the start point: a Julia set", least=-100, most=100
@@ -53,18 +53,21 @@ def taken(node: Node) -> Iterator[tuple[Node, Affine | None]]:
             yield inner, (linear, offset) if moved else None
 
 
-def _step(node: Node) -> Stepped:
-    step: Stepped = node.formula.hooks["step"](node)
-    return step
+def _step(node: Node, alone: bool) -> Stepped:
+    function, values, constant = node.formula.hooks["step"](node)
+    only = node.formula.hooks.get("alone") if alone else None
+    return function, {**values, **(only(node) if only else {})}, constant
 
 
-def steps(node: Node) -> tuple[tuple[Any, ...], dict[str, Any]]:
+def steps(node: Node, alone: bool = True) -> tuple[tuple[Any, ...], dict[str, Any]]:
     """Return the steps of a round as code, and the values of their arguments.
 
     Parameters
     ----------
     node : Node
         Orbit.
+    alone : bool
+        False for the step of a formula as in a hybrid.
 
     Returns
     -------
@@ -73,7 +76,7 @@ def steps(node: Node) -> tuple[tuple[Any, ...], dict[str, Any]]:
     """
     code, codes, values = provider("orbits").Code, [], dict[str, Any]()
     for place, (step, moved) in enumerate(taken(node)):
-        function, own, constant = _step(step)
+        function, own, constant = _step(step, alone and step is node)
         fixed = tuple((name, v.value) for name, v in own.items() if isinstance(v, Fixed))
         passed = {name: v for name, v in own.items() if not isinstance(v, Fixed)}
         sizes = tuple((name, len(v) if isinstance(v, tuple) else 1) for name, v in passed.items())
@@ -83,7 +86,7 @@ def steps(node: Node) -> tuple[tuple[Any, ...], dict[str, Any]]:
             undone, spread = inverse(linear), stretches(linear)
             values[f"back{place}"] = (*undone.ravel().tolist(), *(-product(undone, offset)).tolist())
             values[f"forth{place}"] = (*linear.ravel().tolist(), *offset.tolist())
-            values[f"spread{place}"] = float(spread[0] / spread[-1])
+            values |= {f"spread{place}": float(spread[0] / spread[-1]), f"shrink{place}": float(spread[-1])}
         if constant is None and node["julia"] is not None:
             point = np.array(node["julia"])
             constant = tuple((product(undone, point - offset) if moved else point).tolist())

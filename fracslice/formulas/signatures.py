@@ -1,19 +1,15 @@
-"""Python signatures, docstrings and stubs of formulas, from the registry."""
+"""Python signatures and docstrings of formulas."""
 
 from __future__ import annotations
 
-import ast
 import inspect
-import re
 from collections.abc import Mapping, Sequence
 from inspect import Parameter, Signature
 from keyword import iskeyword
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from ..common.suggestions import hint
 from ..errors import SceneError
-from . import vocabulary
 from .parameters import REQUIRED, Choice, Count, Vector
 
 if TYPE_CHECKING:
@@ -71,13 +67,11 @@ def bound(
     return (), first | given
 
 
-def signature(formula: Formula) -> Signature:
-    """Signature of a formula as a Python function."""
-    from .registry import Node
-
+def signature(formula: Formula, node: type) -> Signature:
+    """Signature of a formula as a Python function that makes a `node`."""
     alone = formula.children[1] == 0
     kind = Parameter.POSITIONAL_OR_KEYWORD if alone else Parameter.KEYWORD_ONLY
-    elements = [] if alone else [Parameter("elements", Parameter.VAR_POSITIONAL, annotation=Node)]
+    elements = [] if alone else [Parameter("elements", Parameter.VAR_POSITIONAL, annotation=node)]
     values = [
         Parameter(
             python_name(name),
@@ -87,14 +81,14 @@ def signature(formula: Formula) -> Signature:
         )
         for name, parameter in ordered(formula).items()
     ]
-    return Signature([*elements, *values], return_annotation=Node)
+    return Signature([*elements, *values], return_annotation=node)
 
 
 def annotation(parameter: Any) -> Any:
     """Type annotation of a parameter's values."""
     match parameter:
-        case Count(auto=auto):
-            type_: Any = int | Literal["auto"] if auto else int
+        case Count(words=words):
+            type_: Any = int | Literal[*words] if words else int
         case Vector(sizes=sizes, whole=whole):
             several = Sequence[int] if whole else Sequence[float]
             type_ = float | several if 1 in sizes else several
@@ -136,59 +130,3 @@ def parameter_lines(parameters: Mapping[str, Any]) -> list[str]:
 
 
 _ELEMENTS = {True: "What it is applied to; several are a union.", False: "What it is made of."}
-
-
-def stub() -> str:
-    """Text of the stub file of `fracslice.formulas`: formulas as functions, all other names re-exported."""
-    from .registry import get
-
-    package = Path(__file__).with_name("__init__.py")
-    imports = [
-        n for n in ast.parse(package.read_text(encoding="utf-8")).body if isinstance(n, ast.ImportFrom)
-    ]
-    lines = [_HEAD]
-    for node in imports:
-        exported = sorted(vocabulary.NAMES) if node.module == "vocabulary" else [a.name for a in node.names]
-        lines += [f"from .{node.module} import {name} as {name}" for name in exported if node.level]
-    imported = {alias.name for node in imports for alias in node.names}
-    made = [name for name in _shipped() if name not in imported]
-    return "\n".join([*lines, *(f"\n{_function(get(name))}" for name in made)]) + "\n"
-
-
-def _shipped() -> list[str]:
-    """Names of the formulas of this package."""
-    from .registry import get, names
-
-    return [name for name in names() if get(name).function.__module__.startswith(__package__)]
-
-
-def package_stub(modules: Mapping[str, str]) -> str:
-    """Text of the stub file of `fracslice`: its public names, and every formula.
-
-    Parameters
-    ----------
-    modules : mapping of str to str
-        Module of each public name, relative to the package.
-
-    Returns
-    -------
-    str
-    """
-    exported = {**modules, **dict.fromkeys(_shipped(), "formulas")}
-    lines = sorted(f"from .{module} import {name} as {name}" for name, module in exported.items())
-    return "\n".join([_MADE, *lines, ""])
-
-
-_MADE = "# Made from the registry of formulas by `python docs/generate.py`; do not edit."
-_HEAD = f"""\
-{_MADE}
-from collections.abc import Sequence
-from typing import Literal, Union
-"""
-
-
-def _function(formula: Formula) -> str:
-    """Function of a formula in the stub file."""
-    text = re.sub(r"\b(?:fracslice\.formulas\.\w+|collections\.abc)\.", "", str(signature(formula)))
-    body = docstring(formula).replace("\n", "\n    ").replace("\n    \n", "\n\n")
-    return f'def {formula.name}{text}:\n    """{body}\n    """'

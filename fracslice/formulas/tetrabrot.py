@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .box import Box
-from .escape import levels, potential_distance
+from .escape import levels, potential_distance, stop
 from .julia import ESCAPED
 from .registry import Node, shape
 from .rounds import ITERATIONS
@@ -53,12 +53,12 @@ def plane_distance(a, b, iterations, first_level, last_level, escape2, least):  
 
 @tetrabrot.arguments
 def tetrabrot_arguments(node: Node) -> dict[str, object]:
-    first, last, escape2, least = levels(2, node["iterations"], BAILOUT, ESCAPED)
+    first, last, least = levels(2, node["iterations"], BAILOUT)
     return {
         "iterations": node["iterations"],
         "first_level": first,
         "last_level": last,
-        "escape2": escape2,
+        "escape2": stop(2, BAILOUT, ESCAPED) ** 2,
         "least": least,
     }
 

@@ -83,7 +83,9 @@ def transform_check(node: Node) -> None:
         raise node.fail("matrix: expected the last row 0 0 0 1")
     stretch = stretches(affine(node)[0])
     if not stretch[-1] > max(1e-9 * stretch[0], SMALLEST / 2):
-        raise node.fail("scale or matrix: expected a map that does not flatten space")
+        name = "matrix" if node["matrix"] else "scale"
+        value = " ".join(f"{number:g}" for number in node[name])
+        raise node.fail(f'{name}="{value}": expected a map that does not flatten space')
 
 
 @transform.identity

@@ -10,30 +10,45 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from .registry import Fixed
-from .vocabulary import (
-    absolute,
-    atan2,
-    cos,
-    exp,
-    floor,
-    log,
-    maximum,
-    minimum,
-    ratio,
-    rsqrt,
-    sin,
-    sqrt,
-    where,
+from .powers import (
+    calm_length,
+    calm_majorant,
+    calm_power,
+    power,
+    power_length,
+    power_majorant,
+    power_over,
+    square,
+    square_length,
+    square_majorant,
 )
+from .vocabulary import absolute, cos, floor, maximum, minimum, ratio, sin, sqrt
 
-OVER: dict[Callable[..., Any], Callable[..., Any]] = {}
+OVER: dict[Callable[..., Any], Callable[..., Any]] = {power: power_over}
 """Stretch of each verb over the ball of radius e around a point: a function of the point, e and the verb's
 other arguments.
 """
 
 NAMES = ("ball", "fold", "fold_to", "inversion", "mirror", "modulo", "positive", "power", "turn")
 """Verbs whose arguments are points and numbers."""
+
+MAJORANTS: dict[Callable[..., Any], Callable[..., Any]] = {
+    power: power_majorant,
+    calm_power: calm_majorant,
+    square: square_majorant,
+}
+"""Bend (`escape.sure_distance`) and distance to the tear of each verb that has a majorant: a function of the
+verb's arguments.
+"""
+
+LENGTHS: dict[Callable[..., Any], Callable[..., Any]] = {
+    power: power_length,
+    calm_power: calm_length,
+    square: square_length,
+}
+"""Length of the image, for verbs where it depends on that of the point alone: a function of the length and of
+the verb's other arguments.
+"""
 
 Verb = Callable[..., Any]
 
@@ -96,6 +111,19 @@ def ball_over(w, e, inner):  # type: ignore[no-untyped-def]
     return maximum(ratio(1.0, near * near), 1.0)
 
 
+def ball_majorant(w, inner):  # type: ignore[no-untyped-def]
+    """Inwards from r <= 1, the stretch 1 / s^2 adds up to (1 / r^2) e / (1 - e / r)."""
+    x, y, z = w
+    return ratio(1.0, maximum(minimum(sqrt(x * x + y * y + z * z), 1.0), inner)), 1e30
+
+
+def ball_length(r, inner):  # type: ignore[no-untyped-def]
+    return maximum(ratio(r, maximum(r * r, inner * inner)), r)
+
+
+MAJORANTS[ball], LENGTHS[ball] = ball_majorant, ball_length
+
+
 def inversion(w, radius):  # type: ignore[no-untyped-def]
     """Invert in the sphere of this radius around the origin."""
     x, y, z = w
@@ -152,102 +180,8 @@ def modulo(w, period):  # type: ignore[no-untyped-def]
     return image, 1.0
 
 
-def power(w, n):  # type: ignore[no-untyped-def]
-    """Raise to a power in the triplex numbers of White and Nylander (2009).
+CENTRAL = frozenset({mirror, positive, turn})
+"""Verbs that keep the length."""
 
-    Lengths along meridians grow by n r^(n-1), along circles of latitude by r^(n-1) |sin n theta / sin theta|.
-    """
-    x, y, z = w
-    rho2 = maximum(x * x + y * y, 1e-30)
-    r2 = maximum(rho2 + z * z, 1e-30)
-    rho = sqrt(rho2)
-    rn = exp(0.5 * n * log(r2))
-    theta, phi = n * atan2(rho, absolute(z)), n * atan2(y, x)
-    # Angles are counted from the nearer pole: rounding of those near pi is not small against rho.
-    half_turns = floor(n + 0.5)
-    sign = 1.0 - 2.0 * (half_turns - 2.0 * floor(0.5 * half_turns))
-    rest = 3.141592653589793 * (n - half_turns)
-    sine, cosine = sign * sin(rest), sign * cos(rest)
-    s, c = sin(theta), cos(theta)
-    s, c = where(z < 0.0, sine * c - cosine * s, s), where(z < 0.0, cosine * c + sine * s, c)
-    stretch = n * maximum(rn * rsqrt(r2), rn * absolute(s) / rho)
-    return (rn * s * cos(phi), rn * s * sin(phi), rn * c), stretch
-
-
-@over(power)
-def power_over(w, e, n):  # type: ignore[no-untyped-def]
-    x, y, z = w
-    far = sqrt(x * x + y * y + z * z) + e
-    return n * n * exp((n - 1.0) * log(maximum(far, 1e-30)))
-
-
-def raise_whole(w, digits, turns, half_digits, even, linear, n):  # type: ignore[no-untyped-def]
-    """Raise to a whole power in the triplex numbers by products, see `mandelbulb`.
-
-    Compiled into the code are the binary digits of n, n // 2 and (n - 1) // 2 after the first, and whether n
-    is even or 2.
-    """
-    x, y, z = w
-    rho2 = maximum(x * x + y * y, 1e-30)
-    r2 = rho2 + z * z
-    re, im, norm2 = z, 1.0, r2
-    for odd in digits:
-        twice = re + re
-        re, im = twice * re - norm2, twice * im
-        norm2 = norm2 * norm2
-        if odd:
-            re, im = re * z - im * rho2, re + im * z
-            norm2 = norm2 * r2
-    over = ratio(y, rho2)
-    u, v = 1.0 - (y + y) * over, (x + x) * over
-    cu, cv = u, v
-    for odd in turns:
-        twice = cv + cv
-        cu, cv = 1.0 - twice * cv, twice * cu
-        if odd:
-            cu, cv = cu * u - cv * v, cu * v + cv * u
-    meridian = r2
-    for odd in half_digits:
-        meridian = meridian * meridian
-        if odd:
-            meridian = meridian * r2
-    if even:
-        meridian = meridian * sqrt(r2)
-    if linear:
-        meridian = sqrt(r2)
-    stretch = n * maximum(meridian, absolute(im))
-    if even:
-        s = im * sqrt(rho2)
-        image = (s * cu, s * cv, re)
-    else:
-        image = (im * (cu * x - cv * y), im * (cu * y + cv * x), re)
-    return image, stretch
-
-
-def products(power: float) -> dict[str, Fixed]:
-    """Arguments of `raise_whole` for a power; those of a fractional one make no products.
-
-    Parameters
-    ----------
-    power : float
-        The power.
-
-    Returns
-    -------
-    dict
-        Fixed arguments by name.
-    """
-    whole = power == int(power)
-    n = int(power) if whole else 2
-    return {
-        "digits": Fixed(_digits(n) if whole else ()),
-        "turns": Fixed(_digits(n // 2)),
-        "half_digits": Fixed(_digits((n - 1) // 2)),
-        "even": Fixed(n % 2 == 0),
-        "linear": Fixed(n == 2),
-    }
-
-
-def _digits(n: int) -> tuple[int, ...]:
-    """Binary digits of n after the first. Exponentiation squares for each and multiplies where it is 1."""
-    return tuple(int(d) for d in bin(n)[3:])
+RIGID = frozenset({fold, fold_to, mirror, positive, turn})
+"""Verbs that neither stretch, bend nor tear."""

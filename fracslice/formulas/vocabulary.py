@@ -90,6 +90,40 @@ def orbit(r2: np.ndarray, alive: np.ndarray, x: np.ndarray, y: np.ndarray, z: np
     """
 
 
+def cell_middle(a: np.ndarray) -> np.ndarray:
+    """Number near the middle of the values of a cell; of a point its own. For code of the kernel alone.
+
+    Parameters
+    ----------
+    a
+        Numbers, or intervals.
+
+    Returns
+    -------
+    ndarray
+        Numbers, or intervals of one number.
+    """
+    return a
+
+
+def cell_extent(a: np.ndarray) -> np.ndarray:
+    """Largest distance of the values of a cell from `cell_middle`.
+
+    Parameters
+    ----------
+    a
+        Numbers, or intervals.
+
+    Returns
+    -------
+    ndarray
+        Numbers, or intervals of one number.
+    """
+    return 0.0 * a
+
+
 _FUNCTIONS = ("where", "sqrt", "rsqrt", "ratio", "log", "exp", "sin", "cos", "atan2", "floor")
 NAMES = frozenset((*_FUNCTIONS, "minimum", "maximum", "absolute", "any_of"))
+OF_CELLS = frozenset(("cell_middle", "cell_extent"))
+"""Functions that only code of the kernel calls."""
 __all__ = sorted(NAMES)

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..background import in_background
 from ..work import Work
 from .finishing import Finish
 from .placement import Placement
 
 if TYPE_CHECKING:
     from ..mesh import Mesh
-    from ..mesh.check import MeshReport
     from ..mesh.halo import Finished
+    from ..mesh.mesh_report import MeshReport
     from ..volume import Plan
 
 MOST_ERRORS = 1 << 20
@@ -63,7 +65,7 @@ def off_surface(
     """
     from ..volume.accuracy import surface_error
 
-    return surface_error(planned.root, place.units(vertices), planned.voxel, work)
+    return surface_error(planned.root, vertices, planned.voxel, work, place.scale, place.offset)
 
 
 class Check:
@@ -102,11 +104,14 @@ class Check:
         for piece in pieces:
             yield piece.passed  # the consumer may write it meanwhile
             with self._finish.clock("checking"):
-                self._tally.add(piece)
-                self.contact += on_the_plate(piece.passed, self._finish.clock.work.threads)
-                finish = self._finish
-                vertices = piece.points[:: self._stride]
-                self._errors.append(off_surface(finish.planned, finish.place, vertices, finish.clock.work))
+                finish, work = self._finish, self._finish.clock.work
+                with in_background(
+                    partial(on_the_plate, piece.passed, work.threads), work.threads
+                ) as contact:
+                    self._tally.add(piece)
+                    vertices = piece.points[:: self._stride]
+                    self._errors.append(off_surface(finish.planned, finish.place, vertices, work))
+                    self.contact += contact()
 
     @property
     def mesh(self) -> MeshReport:

@@ -10,14 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..mesh.gathering import gathered
+from ..meshjob import PIECES
 from ..scene import Print
 from .clock import Clock
 from .placement import Placement
 
 if TYPE_CHECKING:
-    from ..mesh.check import MeshReport
     from ..mesh.components import Removed
     from ..mesh.halo import Finished, SelectedPiece
+    from ..mesh.mesh_report import MeshReport
     from ..mesh.quantisation import Frame
     from ..mesh.tally import Tally
     from ..volume import Plan, SignBricks
@@ -28,6 +29,9 @@ FLAT = 0.1
 """Fraction of the minimum distance between vertices. Vertices within this height of the bed are moved to the
 bed, which keeps a flat base flat; a larger one would fold the small triangles around a lowest vertex.
 """
+
+CRUMB = 0.5
+"""Volume of a body around a single sample, at most, voxels."""
 
 
 def placing(planned: Plan, signs: SignBricks, place: Placement) -> tuple[NDArray[np.float64], Frame]:
@@ -56,6 +60,25 @@ def placing(planned: Plan, signs: SignBricks, place: Placement) -> tuple[NDArray
     return place.mm(grid_planes(signs)), (place.scale, place.offset, bed)
 
 
+def largest_crumb(volumes: NDArray[np.float64], voxel: float) -> float:
+    """Return the volume below which bodies are tips that the samples separate from the body beside them.
+
+    Parameters
+    ----------
+    volumes : ndarray of float64, shape (s,)
+        Volumes of the shells, negative for cavities.
+    voxel : float
+        Volume of a voxel.
+
+    Returns
+    -------
+    float
+        Half a voxel; 0 if bodies as small as this hold much of the material.
+    """
+    crumbs = volumes[(volumes > 0) & (volumes < CRUMB * voxel)]
+    return CRUMB * voxel if crumbs.sum() < PIECES * volumes.sum() else 0.0
+
+
 class Finish:
     """Selection of bodies and placement of a surface, decided once for all pieces.
 
@@ -66,7 +89,7 @@ class Finish:
     how : Print
         Choice of bodies and cavities.
     dust : callable
-        Maps the volume of the object to the volume below which a body is removed, mm3.
+        Maps the volume of the object and that of crumbs to the volume below which a body is removed, mm3.
     size : Sizing
         Size of the remaining bodies.
     scale : float or None
@@ -84,7 +107,7 @@ class Finish:
         self,
         surface: Surface,
         how: Print,
-        dust: Callable[[float], float],
+        dust: Callable[[float, float], float],
         size: Sizing,
         scale: float | None,
         clock: Clock,
@@ -98,8 +121,8 @@ class Finish:
         unit = (scale or size.scale(planned.box)) ** 3
         nested, self.misplaced = surface.nested(how.cavities == "fill", clock.work.threads)
         sized = replace(nested, volumes=nested.volumes * unit)
-        limit = dust(float(sized.volumes.sum()))
-        self.stays, removed = choose(sized, keep=how.keep, dust_mm3=limit, cavities=how.cavities)
+        limit = dust(float(sized.volumes.sum()), largest_crumb(sized.volumes, planned.voxel**3 * unit))
+        self.stays, removed = choose(sized, keep=how.bodies, dust_mm3=limit, cavities=how.cavities)
         rest = shells.bounds(self.stays)
         tips = shells.tips(self.stays)
         box = box_of_the_rest(planned, shells.bounds(), rest, tips, clock.work)
@@ -133,11 +156,6 @@ class Finish:
         hollow = self.shells.volumes < 0
         bodies, cavities = int((self.stays & ~hollow).sum()), int((self.stays & hollow).sum())
         return tally.report(bodies, cavities, self.misplaced)
-
-    def count_near(self) -> None:
-        """Count the bodies that nearly touch, of pieces that another process finishes."""
-        for number, mesh in enumerate(self.pieces.meshes()):
-            self.near.add(mesh.vertices, self.pieces.labels(number), self.pieces.ends[number])
 
     def finished(self) -> Iterator[Finished]:
         """Place and clean the pieces, mm. Pieces held in memory are released.

@@ -71,7 +71,7 @@ def make_implicit(
     SceneError, KernelError, VolumeError, ExportError, Cancelled
         For a scene that is no formula or too large a one, or a file that cannot be written.
     """
-    from ..export import application, check_target
+    from ..export import check_target
     from ..export.implicit import write_implicit
     from ..kernel.graph import graph
     from ..volume.sizing import sizing
@@ -89,7 +89,7 @@ def make_implicit(
     place = Placement(scale, (-scale * x, -scale * y, -scale * plan.box.lo[2]))
     box, outer = (Box.around(map(tuple, place.mm(np.array([b.lo, b.hi])))) for b in (plan.box, plan.outer))
     operations = graph(plan.root.tree, place.scale, place.offset)
-    about = {"Application": application()} | metadata(scene)
+    about = metadata(scene)
     file = write_implicit(operations, outer, plan.voxel * scale, path, about)
     return Implicit(file, len(operations), plan.root.tree, place, box, plan.notes)
 

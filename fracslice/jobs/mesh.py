@@ -11,12 +11,13 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..background import in_background
 from ..common.memory import peak_rss_mb
 from ..errors import SceneError, SharedError, TooLargeError
 from ..meshjob import MeshJob
 from ..scene import Scene
 from ..version import __version__
-from ..work import Work, in_background
+from ..work import Work
 from . import surfaces
 from .clock import Clock
 from .finishing import Finish
@@ -187,6 +188,7 @@ class _Job:
 
     def result(self, sized: Sized, surface: Surface) -> MeshResult:
         """Finished mesh and report."""
+        from ..kernel.depth import shallower
         from ..mesh.touching import touching_note
         from .completeness import mesh_amount
 
@@ -205,6 +207,8 @@ class _Job:
             with clock("checking"):
                 amount, off = measured()
         fell = f"{thin}; expected a smaller voxel, or a thickness of {2 * scale * planned.voxel:.2g} mm"
+        near = finish.near.count
+        settings = shallower(planned.root.tree, planned.voxel) if near and planned.root.tree else ()
         report = Report(
             scene=self.scene.name,
             scene_hash=self.scene.hash,
@@ -217,6 +221,7 @@ class _Job:
             surface_to_mesh_mm=SurfaceToMesh.of(scale * made.back),
             evaluations=signs.evaluations,
             proved=signs.proved,
+            measured=() if what.proved else planned.root.bounds.measured,
             bricks=len(signs),
             seconds=clock.seconds,
             peak_rss_mb=peak_rss_mb(),
@@ -225,10 +230,9 @@ class _Job:
             simplified=made.simplified,
             notes=(
                 *planned.notes,
-                *([fell] if thin else ()),
+                *([fell] if thin and not near else ()),
                 *(refined.notes if refined else ()),
-                *touching_note(finish.near.count, planned.voxel * scale),
-                *off,
+                *touching_note(near, planned.voxel * scale, settings, off),
             ),
             depths=planned.depths,
             contact_mm2=float(f"{made.contact:.9g}"),  # sums over pieces differ in the last digit

@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cluster import Files, ResultFolder, packed, unpacked
+from ..cluster import ResultFolder, packed, unpacked
 from ..mesh.contouring import Piece
 from ..mesh.halo import Strip, strip
 from ..mesh.model import Mesh
 from ..mesh.pieces import Pieces as MeshPieces
-from ..mesh.survey import PieceComponents
+from ..mesh.whole_shells import WholeShells
 from ..store import Arrays
 from .placement import Placement
 
 SIDES = "head", "tail"
 """Names of the strips at the begin and at the end of a piece."""
 
-CHOICE = "choice"
-"""File of a job with what stays of its surface."""
+CHOICE, SHELLS = "choice", "shells"
+"""Files of a job with what stays of its surface, and with the shells of its surface."""
 
 
 class StoredPieces(MeshPieces):
@@ -166,8 +167,9 @@ class Selection:
         return Placement(scale, (x, y, z))
 
 
+@lru_cache(maxsize=1)
 def read_choice(pieces: ResultFolder, job: str) -> Selection:
-    """Selection of the bodies of a job from its file.
+    """Selection of the bodies of a job from its file, read once in a process.
 
     Parameters
     ----------
@@ -185,35 +187,42 @@ def read_choice(pieces: ResultFolder, job: str) -> Selection:
     return Selection(prefix=prefix, stride=stride, **files)
 
 
-def read_components(files: Files) -> PieceComponents:
-    """Components of a piece from the result of its `ContourTask`.
+class StoredShells(NamedTuple):
+    """Shells of a job.
+
+    Attributes
+    ----------
+    shells : WholeShells
+        The shells.
+    searched : ndarray of bool, shape (s,)
+        Shells whose surroundings are searched.
+    prefix : str
+        Begin of the names of the pieces.
+    first_labels : ndarray of int32, shape (p,)
+        First label of each piece.
+    """
+
+    shells: WholeShells
+    searched: NDArray[np.bool_]
+    prefix: str
+    first_labels: NDArray[np.int32]
+
+
+@lru_cache(maxsize=1)
+def read_shells(pieces: ResultFolder, job: str) -> StoredShells:
+    """Shells of a job from its file, read once in a process.
 
     Parameters
     ----------
-    files : dict
-        Arrays by name.
+    pieces : ResultFolder
+        Folder with the files of the job.
+    job : str
+        Key of the job.
 
     Returns
     -------
-    PieceComponents
-        The components.
+    StoredShells
     """
-    return PieceComponents(**{name: files[name] for name in PieceComponents.__dataclass_fields__})
-
-
-def read_seam(files: Files, name: str) -> Mesh:
-    """Triangles at a seam from the result of a `ContourTask`.
-
-    Parameters
-    ----------
-    files : dict
-        Arrays by name.
-    name : {"head", "tail"}
-        The begin or the end of the piece.
-
-    Returns
-    -------
-    Mesh
-        The triangles.
-    """
-    return Mesh(files[f"{name}_vertices"], files[f"{name}_triangles"])
+    files = unpacked(pieces.read(job, SHELLS))
+    searched, prefix, labels = files.pop("searched"), str(files.pop("prefix")), files.pop("labels")
+    return StoredShells(WholeShells(**files), searched, prefix, labels)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -41,7 +41,11 @@ class MeshResult:
     place: Placement
     planned: Plan
     whole: Mesh | None
-    work: Work
+    work: Work = field(default_factory=Work)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle and copy all but the threads and callbacks of the job."""
+        return MeshResult, (self.report, self.place, self.planned, self.whole)
 
     @property
     def mesh(self) -> Mesh:

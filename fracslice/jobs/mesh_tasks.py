@@ -13,27 +13,27 @@ from ..cluster import Contents, ResultFolder, packed, unpacked
 from ..mesh.contouring import layers
 from ..mesh.halo import WAITS, SelectedPiece, finished_piece
 from ..mesh.missed import NEARBY, nearest
+from ..mesh.model import Mesh
 from ..mesh.pointed_vertices import pointed_in
 from ..mesh.survey import components
 from ..mesh.tally import Tally
 from ..mesh.tip_triangles import at_tips
-from ..mesh.whole_shells import WholeShells
+from ..mesh.touching import NearBodies
 from ..volume import SignBricks
 from ..volume.lattice import BRICK
 from ..work import Work
 from .checking import off_surface, on_the_plate
+from .finished_pieces import finished_mesh
 from .finishing import placing
-from .mesh_files import Selection, StoredPieces, read_choice
-from .mesh_recipe import MeshRecipe, sampled
+from .mesh_files import Selection, StoredPieces, read_choice, read_shells
+from .mesh_recipe import MeshRecipe, plan_of, sampled
+from .mesh_summary import Summary, joined_summary
 
-MOST, LEAST, COUNT = 1 << 15, 1 << 12, 256
-"""Bricks of a task: of a gigabyte at most, of 0.7 seconds at least; about `COUNT` tasks between."""
+MOST, LEAST, COUNT = 1 << 15, 1 << 14, 256
+"""Bricks of a task: of a gigabyte at most, of 1.5 to 2 seconds at least; about `COUNT` tasks between."""
 
 HALO = WAITS + 0.5
 """Width of the strips at the seams, voxels: wider than the halo that a neighbour takes of them."""
-
-SHELLS = "shells"
-"""File of a job with the shells of its surface."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class MeshTask(ABC):
 
 @dataclass(frozen=True)
 class ContourTask(MeshTask):
-    """Contours a piece of the surface; its result is what the pieces are joined by.
+    """Contours a piece of the surface; its result is the summary by which the pieces are joined.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class ContourTask(MeshTask):
         return f"surface-{self.number:05}"
 
     def make(self, work: Work) -> Contents:
-        """Components and pointed vertices of the piece; see `Task.make`."""
+        """Summary of the piece; see `Task.make`."""
         of = sampled(self.recipe, self.pieces, self.job)
         piece = of.contours.piece(self.first, self.last, of.contours.refiner(work), work)
         start = of.signs.origin[0] + of.signs.voxel * BRICK * self.first if self.number else -np.inf
@@ -96,13 +96,34 @@ class ContourTask(MeshTask):
         stored = StoredPieces(self.pieces, self.job, HALO * voxel)
         stored.put(self.number, piece.mesh, start, piece.end)
         stored.label(self.number, labels)
-        ends = {
-            f"{name}_{part}": getattr(mesh, part)
-            for name, mesh in (("head", sharp.head), ("tail", sharp.tail))
-            for part in ("vertices", "triangles")
-        }
-        counts = np.array([piece.end, len(piece.mesh.triangles)])
-        return packed(counts=counts, pointed=sharp.points, **ends, **vars(sums))
+        counted = np.array([len(piece.mesh.triangles)])
+        return Summary(np.array([piece.end]), counted, sums, sharp).packed()
+
+
+@dataclass(frozen=True)
+class JoinTask(MeshTask):
+    """Joins consecutive ranges of pieces.
+
+    Attributes
+    ----------
+    children : tuple of str
+        Files with their summaries, in order.
+    level : int
+        Level in the tree, from 1.
+    """
+
+    children: tuple[str, ...]
+    level: int
+
+    @property
+    def name(self) -> str:
+        """Name of the task."""
+        return f"joined-{self.level}-{self.number:05}"
+
+    def make(self, work: Work) -> Contents:
+        """Summary of all pieces below; see `Task.make`."""
+        ranges = [Summary.read(unpacked(self.pieces.read(self.job, name))) for name in self.children]
+        return joined_summary(ranges, plan_of(self.recipe).voxel, work.threads).packed()
 
 
 class NestTask(MeshTask):
@@ -115,17 +136,14 @@ class NestTask(MeshTask):
 
     def make(self, work: Work) -> Contents:
         """Winding numbers and parents; see `Task.make`."""
-        files = unpacked(self.pieces.read(self.job, SHELLS))
-        searched, prefix = files.pop("searched"), str(files.pop("prefix"))
-        first_label = int(files.pop("labels")[self.number])
-        stored = StoredPieces(self.pieces, self.job, prefix=prefix)
-        shells = WholeShells(**files)
-        mesh, labels = stored.mesh(self.number), stored.labels(self.number) + np.int32(first_label)
-        return packed(**shells.rays(self.number, mesh, labels, searched, work.threads)._asdict())
+        of = read_shells(self.pieces, self.job)
+        stored = StoredPieces(self.pieces, self.job, prefix=of.prefix)
+        mesh, labels = stored.mesh(self.number), stored.labels(self.number) + of.first_labels[self.number]
+        return packed(**of.shells.rays(self.number, mesh, labels, of.searched, work.threads)._asdict())
 
 
 class FinishTask(MeshTask):
-    """Cleans, checks and encodes a piece."""
+    """Cleans and checks a piece."""
 
     @property
     def name(self) -> str:
@@ -133,9 +151,7 @@ class FinishTask(MeshTask):
         return f"finished-{self.number:05}"
 
     def make(self, work: Work) -> Contents:
-        """Measures; the triangles are a file of their own, as an STL file holds them. See `Task.make`."""
-        from .._native import stl
-
+        """Measures; the triangles are a file of their own, see `finished_mesh`. See `Task.make`."""
         of = sampled(self.recipe, self.pieces, self.job)
         choice = read_choice(self.pieces, self.job)
         number, voxel, threads = self.number, of.planned.voxel, work.threads
@@ -148,16 +164,30 @@ class FinishTask(MeshTask):
         tally.add(made)
         passed, late = made.passed, at_tips(made.passed, choice.tips)
         at = np.flatnonzero(late >= 0)
-        plain = passed.selected(late < 0) if len(at) else passed
-        self.pieces.write(self.job, triangles_file(number), [stl(plain.vertices, plain.triangles).data])
+        plain = passed.selected(late < 0, threads)
+        self.pieces.write(self.job, finished_file(number), finished_mesh(plain))
         return packed(
+            rows=np.array(len(plain.triangles)),
             late=late[at],
+            near=self.near(choice, own.mesh, voxel, threads),
             corners=passed.vertices[passed.triangles[at]],
             contact=np.array(on_the_plate(passed, threads)),
             tally=np.array(json.dumps(asdict(tally))),
             errors=off_surface(of.planned, choice.place, made.points[:: choice.stride], work),
             distances=nearest([own.mesh], choice.points, NEARBY * voxel, work),
         )
+
+    def near(self, choice: Selection, mesh: Mesh, voxel: float, threads: int) -> NDArray[np.int64]:
+        """Shells of the bodies that nearly touch others, in the piece and at its seam with the next one."""
+        shells, number = read_shells(self.pieces, self.job).shells, self.number
+        stays, stored = np.zeros(len(shells.volumes), bool), choice.stored(self.pieces, self.job)
+        stays[shells.of_label] = choice.stays
+        bodies = NearBodies(shells, stays, voxel, threads)
+        bodies.add(mesh.vertices, self.labels(choice, number), choice.ends[number])
+        if number + 1 < len(choice.ends):
+            part, _ = stored.beside(number + 1, "head", 0)
+            bodies.add(part.mesh.vertices, self.labels(choice, number + 1)[part.numbers], np.inf)
+        return bodies.bodies
 
     def kept(self, choice: Selection) -> SelectedPiece:
         """The piece with the choice of its bodies."""
@@ -175,9 +205,14 @@ class FinishTask(MeshTask):
 
     def stays(self, choice: Selection, number: int) -> NDArray[np.bool_]:
         """True for each vertex of a piece whose body stays."""
-        labels = choice.stored(self.pieces, self.job).labels(number)
-        stays: NDArray[np.bool_] = choice.stays[labels + choice.first_labels[number]]
+        stays: NDArray[np.bool_] = choice.stays[self.labels(choice, number)]
         return stays
+
+    def labels(self, choice: Selection, number: int) -> NDArray[np.int32]:
+        """Labels of the vertices of a piece, counted from the first piece on."""
+        own = choice.stored(self.pieces, self.job).labels(number)
+        labels: NDArray[np.int32] = own + choice.first_labels[number]
+        return labels
 
 
 @dataclass(frozen=True)
@@ -204,19 +239,19 @@ class MissedTask(MeshTask):
         return packed(distances=nearest([mesh], far["points"], float(far["reach"]), work))
 
 
-def triangles_file(number: int) -> str:
+def finished_file(number: int) -> str:
     """Name of the file with the finished triangles of a piece.
 
     Parameters
     ----------
     number : int
-        Index of the piece.
+        Index of the piece; that of the triangles at tips follows the last one.
 
     Returns
     -------
     str
     """
-    return f"triangles{number}"
+    return f"finished{number}"
 
 
 def far_file(turn: int) -> str:

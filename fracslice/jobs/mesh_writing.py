@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..background import ahead
 from ..meshjob import MeshJob
 from ..scene import Scene
-from ..work import ahead
 from .checking import Check
 from .clock import Clock
 from .finishing import Finish
 
 if TYPE_CHECKING:
     from ..mesh import Mesh
-    from ..mesh.check import MeshReport
+    from ..mesh.mesh_report import MeshReport
     from ..mesh.simplify import Simplified
     from .surfaces import Surface
 
@@ -97,35 +96,16 @@ class Writing:
         """Write the file from the pieces of a pool; None for a surface that was made here."""
         if self.clock.work.cluster is None:
             return None
-        from ..export import FORMATS
-        from ..export.stl import concatenate
-        from .shared_mesh import SharedSurface, finished, whole
+        from .shared_mesh import SharedSurface
+        from .shared_writing import write_shared
 
         if not isinstance(surface, SharedSurface):
             return None
-        check, blocks = finished(surface, finish)
-        ending = STL if self.path is None else self.path.suffix.lower()
-        mesh = None
-        if not self.path or ending != STL:
-            mesh = whole(blocks)
-            finish.count_near()
-        if self.path:
-            with self._file(self.path) as (file, about):
-                if mesh is None:
-                    concatenate(blocks, file, about)
-                else:
-                    FORMATS[ending](mesh, file, about)
-        check.end()
+        check, mesh = write_shared(surface, finish, self.path, metadata(self.scene))
+        for near in check.near:
+            finish.near.include(near)
         errors = np.concatenate(check.off)
         return Made(mesh, None, finish.report(check.tally), errors, check.back, check.contact)
-
-    @contextmanager
-    def _file(self, path: Path) -> Iterator[tuple[BinaryIO, dict[str, str]]]:
-        """Open the file, and return what it says about itself."""
-        from ..export import application, flushing, replacing
-
-        with replacing(path) as file, flushing(file):
-            yield file, {"Application": application()} | metadata(self.scene)
 
     def _written(
         self, finish: Finish, check: Check, tips: np.ndarray
@@ -133,7 +113,7 @@ class Writing:
         """Write the file while it is checked. Returns the mesh, if in one piece, and the result of its
         simplification, if any.
         """
-        from ..export import FORMATS
+        from ..export import FORMATS, flushing, replacing
         from ..export.stl import write_pieces
         from ..mesh.halo import Finished
         from ..mesh.tip_triangles import tips_last
@@ -161,7 +141,8 @@ class Writing:
                 with self.clock("writing"):  # the consumer writes during the yield
                     yield mesh
 
-        with self._file(self.path) as (file, about):
+        about = metadata(self.scene)
+        with replacing(self.path) as file, flushing(file):
             if self.path.suffix.lower() == STL:
                 write_pieces(timed(), file, about)
             else:
@@ -195,6 +176,8 @@ def metadata(scene: Scene) -> dict[str, str]:
     Returns
     -------
     dict
-        Title and hash.
+        Application, title and hash.
     """
-    return {"Title": scene.name, "scene_hash": scene.hash}
+    from ..export import application
+
+    return {"Application": application(), "Title": scene.name, "scene_hash": scene.hash}

@@ -64,6 +64,10 @@ def planned(scene: Scene, what: MeshJob, size: Sizing, clock: Clock) -> Sized:
     with clock("planning"):
         root = oriented(scene.root, what.up, size.stretch, clock.work)
         made = plan(root, what.voxels(size.longest), clock.work)
+        if how.bodies is not None:
+            from ..printing.framing import framed
+
+            made = framed(made, size, how.bodies, clock.work)
     if not how.whole:
         return edited(made, scene, what, size, clock)
     return Sized(made.strict if what.proved else made, None, how)

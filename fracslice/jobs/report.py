@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from ..common.quantiles import quantile
 
 if TYPE_CHECKING:
-    from ..mesh.check import MeshReport
     from ..mesh.components import Removed
+    from ..mesh.mesh_report import MeshReport
     from ..mesh.refine import Refined
     from ..mesh.simplify import Simplified
 
@@ -85,9 +85,18 @@ class SurfaceToMesh:
 
 @dataclass(frozen=True)
 class Amount:
-    """Volumes of the object and of its mesh or layers.
+    """Volumes of the object and of its mesh or layers, mm3.
 
-    The volume of the object is estimated from its field at random points.
+    Attributes
+    ----------
+    object
+        Volume of the object, estimated from its field at random points.
+    error
+        Standard error of that estimate.
+    made
+        Volume of the mesh or the layers.
+    off
+        Relative difference if it is significant, else 0.
     """
 
     object: float
@@ -140,6 +149,8 @@ class Report:
         Volume of sealed cavities, mm3.
     proved : float, optional
         Share of the space without samples whose sign is proved; the rest relies on a measured bound.
+    measured : tuple of str
+        Formulas by whose measured bound space was skipped.
     """
 
     scene: str
@@ -163,9 +174,19 @@ class Report:
     contact_mm2: float = 0.0
     cavities_mm3: float = 0.0
     proved: float | None = None
+    measured: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "seconds", MappingProxyType(dict(self.seconds)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle and copy the fields, as mapping proxies are not."""
+        values = (getattr(self, field.name) for field in fields(self))
+        return Report, tuple(dict(value) if isinstance(value, Mapping) else value for value in values)
+
+    def __repr__(self) -> str:
+        verdict = f"would not print: {', '.join(self.problems)}" if self.problems else "watertight, manifold"
+        return f"<Report of {self.scene}: {self.size_mm:g} mm, voxel {self.voxel_mm:.3g} mm, {verdict}>"
 
     @property
     def problems(self) -> tuple[str, ...]:

@@ -1,48 +1,27 @@
-"""Mesh made by several processes: from the pieces that they make to one file."""
+"""Surface made by several processes."""
 
 from __future__ import annotations
 
-import io
-import json
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
-from functools import partial
-from itertools import count
-from typing import BinaryIO
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..cluster import Files, Pool, Shard, packed, unpacked
+from ..common.digits import counted
 from ..common.keys import key
 from ..errors import SharedError
 from ..mesh.components import Shells
-from ..mesh.missed import distances, surface_samples
-from ..mesh.model import Mesh
 from ..mesh.nesting import Nesting
-from ..mesh.pointed_vertices import Pointed, PointedPiece
-from ..mesh.survey import Survey, survey
-from ..mesh.tally import Tally
-from ..mesh.tip_triangles import by_tip
+from ..mesh.pointed_vertices import Pointed
+from ..mesh.survey import groups, levels, survey
 from ..mesh.tips import with_tips
 from ..volume import Plan, SignBricks
-from .checking import stride
 from .clock import Clock
-from .finishing import Finish
-from .mesh_files import CHOICE, StoredPieces, read_components, read_seam
+from .mesh_files import SHELLS, StoredPieces
 from .mesh_recipe import SAMPLES, MeshRecipe, samples_key
-from .mesh_tasks import (
-    HALO,
-    SHELLS,
-    ContourTask,
-    FinishTask,
-    MeshTask,
-    MissedTask,
-    NestTask,
-    cuts,
-    far_file,
-    triangles_file,
-)
+from .mesh_summary import Summary, joined_summary
+from .mesh_tasks import HALO, ContourTask, JoinTask, MeshTask, NestTask, cuts
 from .surfaces import Surface
 
 
@@ -114,6 +93,27 @@ def results(
     yield from map(unpacked, pool.results(tasks, clock.work, stage))
 
 
+def leave_to_the_first(surface: SharedSurface, tasks: Sequence[MeshTask]) -> None:
+    """Make the own tasks of a shard that does not write the output, and end its job.
+
+    Parameters
+    ----------
+    surface : SharedSurface
+        The surface.
+    tasks : sequence of MeshTask
+        Last tasks of the job.
+
+    Raises
+    ------
+    SharedError
+        For a shard that is not the first one.
+    """
+    pool = surface.pool
+    if isinstance(pool, Shard) and not pool.first:
+        count = pool.share(tasks, surface.clock.work)
+        raise SharedError(f"this shard made {counted(count, 'piece')}; shard 1 writes the file")
+
+
 def shared_surface(
     recipe: MeshRecipe, planned: Plan, signs: SignBricks, pool: Pool, clock: Clock
 ) -> SharedSurface:
@@ -143,160 +143,37 @@ def shared_surface(
     arrays = packed(ijk=signs.ijk, signs=signs.signs, index=signs.index, key=np.array(own))
     pool.pieces.write(job, SAMPLES, arrays)
     stored = StoredPieces(pool.pieces, job, HALO * planned.voxel)
-    joined, pointed = Survey(), Pointed(planned.voxel, work.threads)
-    abouts = ((number, *layers) for number, layers in enumerate(pieces))
     with clock("meshing"):
-        for files in results(ContourTask, (recipe, pool, job), abouts, "meshing", clock):
-            end, triangles = files["counts"].tolist()
-            stored.count(end, int(triangles))
-            stored.first_labels.append(joined.add(read_components(files)))
-            sharp = PointedPiece(files["pointed"], read_seam(files, "head"), read_seam(files, "tail"))
-            pointed.join(sharp, end)
-        tipped, tips = with_tips(planned, stored, pointed.points, work)
-        shells = joined.shells() if tipped is stored else survey(tipped, planned.voxel, work.threads)
+        summary = _summary((recipe, pool, job), pieces, planned.voxel, clock)
+        first = np.cumsum([0, *summary.components.counts[:-1]])
+        stored = StoredPieces(pool.pieces, job, HALO * planned.voxel)
+        stored.first_labels = first.tolist()
+        for end, triangles in zip(summary.ends.tolist(), summary.triangles.tolist(), strict=True):
+            stored.count(end, triangles)
+        sharp = Pointed(planned.voxel, work.threads)
+        sharp.join(summary.pointed, np.inf)
+        tipped, tips = with_tips(planned, stored, sharp.points, work)
+        shells = (
+            summary.components.shells() if tipped is stored else survey(tipped, planned.voxel, work.threads)
+        )
     return SharedSurface(planned, signs, tipped, shells, tips, recipe, pool, job, clock)
 
 
-@dataclass
-class SharedCheck:
-    """Sums over finished pieces.
+def _summary(
+    of: tuple[MeshRecipe, Pool, str], pieces: Sequence[tuple[int, int]], voxel: float, clock: Clock
+) -> Summary:
+    """Summary of all pieces. Tasks contour them, and join them up to the children of the tree's root."""
+    (recipe, pool, job), work = of, clock.work
 
-    Attributes
-    ----------
-    surface : SharedSurface
-        The surface.
-    points : ndarray of float64, shape (n, 3)
-        Points of the field's surface.
-    tally : Tally
-        Sums.
-    contact : float
-        Area on the plate, mm2.
-    off : list of ndarray
-        Distances of vertices from the surface, scene units.
-    back : ndarray of float64, shape (n,)
-        Distances of the points from the mesh, scene units.
-    """
+    def make(tasks: Sequence[MeshTask], stage: str = "") -> list[str]:
+        for _ in pool.make(tasks, work, stage):
+            pass
+        return [task.name for task in tasks]
 
-    surface: SharedSurface
-    points: NDArray[np.float64]
-    tally: Tally = field(default_factory=Tally)
-    contact: float = 0.0
-    off: list[NDArray[np.float64]] = field(default_factory=list)
-    back: NDArray[np.float64] = field(default_factory=lambda: np.array(np.inf))
-
-    def add(self, files: Files) -> None:
-        """Add the result of a `FinishTask`."""
-        self.tally.include(Tally(**json.loads(str(files["tally"]))))
-        self.contact += float(files["contact"])
-        self.off.append(np.asarray(files["errors"]))
-        self.back = np.minimum(self.back, files["distances"])
-
-    def end(self) -> None:
-        """Measure the distances of points without triangles nearby; remove the files of the job."""
-        surface, turns = self.surface, count()
-        ends, margin = np.array(surface.pieces.ends), surface.planned.voxel
-
-        def search(points: NDArray[np.float64], reach: float) -> NDArray[np.float64]:
-            turn, x = next(turns), points[:, :1]
-            surface.pool.pieces.write(
-                surface.job, far_file(turn), packed(points=points, reach=np.array(reach))
-            )
-            begins = np.concatenate([[-np.inf], ends[:-1]])
-            near = (x > begins - reach - margin) & (x < ends + reach + margin)
-            abouts = [(int(number), turn) for number in np.flatnonzero(near.any(axis=0))]
-            of = surface.recipe, surface.pool, surface.job
-            made = results(MissedTask, of, abouts, "checking", surface.clock)
-            result = np.full(len(points), np.inf)
-            for files in made:
-                np.minimum(result, files["distances"], out=result)
-            return result
-
-        self.back = distances(search, self.points, margin, self.back)
-        surface.pool.finished(surface.job)
-
-
-Append = Callable[[BinaryIO], int]
-"""Appends encoded triangles to a file; returns the number of bytes."""
-
-
-def finished(surface: SharedSurface, finish: Finish) -> tuple[SharedCheck, Iterator[Append]]:
-    """Finish the pieces.
-
-    Parameters
-    ----------
-    surface : SharedSurface
-        The surface.
-    finish : Finish
-        Selection and placement.
-
-    Returns
-    -------
-    SharedCheck
-        Checks and measures, complete after the last block.
-    iterator of callable
-        Append blocks of triangles, in order, as an STL file holds them.
-
-    Raises
-    ------
-    SharedError
-        For a shard that does not write the output, when its pieces are made.
-    """
-    stored, pool, place = surface.pieces, surface.pool, finish.place
-    assert isinstance(stored, StoredPieces)
-    points = surface_samples(surface.planned, surface.clock.work)
-    first = stored.first_labels or [0] * len(stored)
-    choice = packed(
-        prefix=np.array(stored.prefix),
-        ends=np.array(stored.ends),
-        fresh=np.array(stored.fresh, np.int64),
-        first_labels=np.array(first, np.int32),
-        stays=finish.stays[surface.shells.of_label],
-        placed=np.array([place.scale, *place.offset]),
-        points=points,
-        tips=place.mm(surface.tips),
-        stride=np.array(stride(len(surface.signs))),
-    )
-    pool.pieces.write(surface.job, CHOICE, choice)
-    if isinstance(pool, Shard) and not pool.first:
-        tasks = [FinishTask(surface.recipe, pool.pieces, surface.job, n) for n in range(len(stored))]
-        raise SharedError(f"{pool.share(tasks, surface.clock.work)} pieces are made; shard 1 writes the file")
-    check = SharedCheck(surface, points)
-    return check, _blocks(surface, check)
-
-
-def _blocks(surface: SharedSurface, check: SharedCheck) -> Iterator[Append]:
-    from .._native import stl
-
-    late: list[tuple[int, NDArray[np.float64]]] = []
-    for number, files in enumerate(surface.results(FinishTask, range(len(surface.pieces)), "finishing")):
-        check.add(files)
-        late += zip(files["late"].tolist(), np.asarray(files["corners"]), strict=True)
-        yield partial(surface.pool.pieces.append, surface.job, triangles_file(number))
-    if late:
-        last = by_tip(late)
-        surface.pool.pieces.write(surface.job, "tips", [stl(last.vertices, last.triangles).data])
-        yield partial(surface.pool.pieces.append, surface.job, "tips")
-
-
-def whole(blocks: Iterable[Append]) -> Mesh:
-    """Mesh of the triangles of an STL file; its vertices are in the order of their first use.
-
-    Parameters
-    ----------
-    blocks : iterable of callable
-        Append blocks of triangles.
-
-    Returns
-    -------
-    Mesh
-        The mesh, mm.
-    """
-    from .._native import weld
-
-    kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
-    file = io.BytesIO()
-    for block in blocks:
-        block(file)
-    corners = np.frombuffer(file.getbuffer(), kind)["corners"].reshape(-1, 3)
-    first, labels = weld(np.ascontiguousarray(corners))
-    return Mesh(corners[first].astype(np.float64), labels.reshape(-1, 3)).in_order()
+    contours = [ContourTask(recipe, pool.pieces, job, number, *cut) for number, cut in enumerate(pieces)]
+    names = make(contours, "meshing")
+    for level, _ in enumerate([*levels(len(names))][:-1], 1):
+        children = enumerate(groups(names))
+        names = make([JoinTask(recipe, pool.pieces, job, n, tuple(of), level) for n, of in children])
+    ranges = [Summary.read(unpacked(pool.pieces.read(job, name))) for name in names]
+    return joined_summary(ranges, voxel, work.threads)

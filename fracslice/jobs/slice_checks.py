@@ -2,50 +2,26 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from ..cluster import (
-    Contents,
-    Files,
-    Pool,
-    Shard,
-    packed,
-    unpacked,
-)
-from ..errors import ClusterError, SharedError
+from ..cluster import Contents, Files, Pool, Shard, packed, unpacked
+from ..errors import SharedError
 from ..export.jobs import SliceRun
-from ..export.ranges import range_size
+from ..export.ranges import RangeTask
 from ..printing.limits import Limits
-from ..slicing.checks import LayerFindings, PrintReport, check_layers, findings_of
+from ..slicing.layer_checks import LayerFindings, PrintReport, check_layers, findings_of
 from ..slicing.runs import LayerComponents, Nodes, Runs
 from ..work import Work
-from .slice_recipe import SliceRecipe
+
+FORM = "checks"
+"""Stands for the format in the key of checked layers."""
 
 
-@dataclass(frozen=True)
-class CheckTask:
-    """Layers `first` to `end` - 1 of a run, each examined by itself.
-
-    Attributes
-    ----------
-    recipe : SliceRecipe
-        The run.
-    job : str
-        Key of the run.
-    first, end : int
-        Range.
-    """
-
-    recipe: SliceRecipe
-    job: str
-    first: int
-    end: int
+class CheckTask(RangeTask):
+    """Layers `first` to `end` - 1 of a run, each examined by itself."""
 
     @property
     def name(self) -> str:
@@ -54,9 +30,7 @@ class CheckTask:
 
     def make(self, work: Work) -> Contents:
         """Components and widths of the layers; see `Task.make`."""
-        run = _planned(self.recipe)
-        if _key(run) != self.job:
-            raise ClusterError("the layers planned here are others than those of the job")
+        run = self.planned(FORM)
         arrays: Files = {}
         for index, of in enumerate(findings_of(run.slicer_with(work), range(self.first, self.end))):
             arrays |= {f"{index}-{name}": array for name, array in _arrays(of)}
@@ -86,11 +60,8 @@ def check_run(run: SliceRun, limits: Limits | None = None) -> PrintReport:
     pool, printer = run.work.cluster, run.screen.printer
     if pool is None:
         return check_layers(run.stack, limits, printer, run.work)
-    recipe, job, size = run.recipe, _key(run), range_size(run)
-    assert isinstance(recipe, SliceRecipe)
-    tasks = [
-        CheckTask(recipe, job, first, min(first + size, run.layers)) for first in range(0, run.layers, size)
-    ]
+    job = run.key(FORM)
+    tasks = CheckTask.all(run, job)
     if isinstance(pool, Shard) and not pool.first:
         raise SharedError(f"{pool.share(tasks, run.work)} ranges are checked; shard 1 writes the report")
     report = check_layers(run.stack, limits, printer, run.work, _findings(pool, tasks, run))
@@ -130,22 +101,3 @@ def _read(files: Files, layer: str, width: int) -> LayerFindings:
 
     widths: list[Any] = [files.get(f"{layer}{name}") for name in ("walls", "gaps")]
     return LayerFindings(components("solid"), components("empty"), float(files[f"{layer}area"]), *widths)
-
-
-def _key(run: SliceRun) -> str:
-    """Key of the checks of a run."""
-    return run.key("checks")
-
-
-_PLANNING = threading.Lock()
-
-
-def _planned(recipe: SliceRecipe) -> SliceRun:
-    """The run of a recipe, planned once in a process."""
-    with _PLANNING:
-        return _kept(recipe)
-
-
-@lru_cache(maxsize=2)
-def _kept(recipe: SliceRecipe) -> SliceRun:
-    return recipe.run(Work(threads=1))

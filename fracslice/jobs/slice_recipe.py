@@ -7,9 +7,9 @@ from datetime import datetime
 
 from .. import slicing
 from ..export.jobs import EPOCH, SliceRun
+from ..export.layer_files import FORMATS
 from ..export.ranges import Encode
 from ..export.resins import Resin
-from ..export.slices import FORMATS
 from ..scene.reader import reads
 from ..slicing.printers import Printer
 from ..slicing.raster import Screen

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..background import ahead
 from ..common.memory import available_bytes
 from ..errors import TooLargeError
 from ..volume.lattice import BRICK
 from ..volume.states import distinct
-from ..work import ahead
 from .clock import Clock
 
 if TYPE_CHECKING:
@@ -120,8 +120,8 @@ def has_thin_walls(signs: SignBricks) -> bool:
     bool
         True from the share on that `WholeShells.thin_walls` notes.
     """
-    from ..mesh.components import PIECES
-    from ..printing.components import thin_share
+    from ..meshjob import PIECES
+    from ..printing.solid_components import thin_share
 
     return thin_share(signs) >= PIECES
 

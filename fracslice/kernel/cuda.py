@@ -1,46 +1,25 @@
 """CUDA back end: a scene's field on an NVIDIA GPU, by numba-cuda.
 
 Importing this module is cheap and always possible. Functions that need a GPU raise `KernelError` with a line
-that names what is missing. Machine code is cached in the cache folder, next to its
-source text.
+that names what is missing.
 """
 
 from __future__ import annotations
 
 import math
-import sys
-import threading
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import lru_cache, partial
-from types import ModuleType
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from ..common.keys import key
-from ..formulas.field import Kernel, Loops, Precision
+from ..formulas.field import Kernel, Precision
 from ..formulas.registry import Node
-from . import cuda_source
 from .cuda_driver import available as available
 from .cuda_driver import missing as missing
 from .cuda_driver import require as require
-from .cuda_driver import toolchain
+from .cuda_launching import launched, load_loops, parameters
 from .cuda_loops import bricks, points
 from .linker import Linked, link
-from .loops import Loop
-from .modules import imported
-
-BLOCK = 128
-"""Threads per block."""
-
-_LAUNCH = threading.Lock()
-"""Lock around kernel launches: Numba's first launch of a kernel must happen only once, and launching holds
-the GIL anyway.
-"""
-
-LANES = 1 << 18
-"""Lanes of a call of a loop: few enough that one call is copied while native code prepares others."""
 
 LOOPS = points, bricks
 """Loops of every CUDA kernel."""
@@ -131,88 +110,6 @@ class CudaKernel(Kernel):
         launched(self._loops.bricks, math.prod(out.shape), self._parameters, *frame, corners, out)
 
 
-@dataclass(frozen=True, eq=False)
-class CudaLoop:
-    """`formulas.field.CompiledLoop` on the GPU, with a thread per lane. Rows are copied there and back.
-
-    Attributes
-    ----------
-    loop
-        Kernel.
-    parameters
-        Parameters of the scene, on the GPU.
-    """
-
-    loop: Any
-    parameters: Any
-
-    def __call__(self, frame: np.ndarray, rows: np.ndarray, out: np.ndarray, *numbers: int) -> None:
-        cuda, count = require(), rows.shape[1]
-        given, result = cuda.to_device(rows), cuda.to_device(out)
-        arrays = [self.parameters, cuda.to_device(frame), *map(given.__getitem__, range(len(rows)))]
-        arrays += map(result.__getitem__, range(len(out)))
-        launched(self.loop, count, *arrays, *numbers, count)
-        result.copy_to_host(out)
-
-    def native(self, frame: np.ndarray) -> Callable[..., None]:
-        """Return a function for native code.
-
-        Parameters
-        ----------
-        frame
-            Frame of the loop.
-
-        Returns
-        -------
-        Callable
-            Function of the loop's other arguments.
-        """
-        return partial(self, frame)
-
-
-@lru_cache(maxsize=32)
-def compile_loops(linked: Linked, loops: tuple[Loop, ...], precision: Precision) -> Loops:
-    """Compile loops over lanes for the GPU.
-
-    Parameters
-    ----------
-    linked
-        Linked scene.
-    loops
-        Loops to compile.
-    precision
-        "float32" or "float64".
-
-    Returns
-    -------
-    Loops
-        Loops by name, with one lane.
-
-    Raises
-    ------
-    KernelError
-        If a loop cannot be compiled, or no GPU can be used.
-    """
-    module, placed = load_loops(linked, precision, loops), parameters(linked, precision)
-    return Loops(1, LANES, {loop.name: CudaLoop(getattr(module, loop.name), placed) for loop in loops})
-
-
-def launched(loop: Any, threads: int, *arguments: Any) -> None:
-    """Launch a loop without waiting for it.
-
-    Parameters
-    ----------
-    loop
-        Compiled loop.
-    threads
-        Least number of threads, > 0.
-    *arguments
-        Arguments of the loop.
-    """
-    with _LAUNCH:
-        loop[-(-threads // BLOCK), BLOCK](*arguments)
-
-
 _kernel = lru_cache(maxsize=32)(CudaKernel)
 
 
@@ -237,56 +134,3 @@ def compile_scene(root: Node, precision: Precision = "float32") -> CudaKernel:
         If the scene cannot be linked or compiled, or no GPU can be used.
     """
     return _kernel(link(root), precision)
-
-
-def parameters(linked: Linked, precision: Precision) -> Any:
-    """Copy the parameters P of a linked scene to the GPU.
-
-    Passing them as launch constants is no faster, and makes launching slower.
-
-    Parameters
-    ----------
-    linked
-        Linked scene.
-    precision
-        "float32" or "float64".
-
-    Returns
-    -------
-    DeviceNDArray
-        Parameters on the GPU.
-
-    Raises
-    ------
-    KernelError
-        If no GPU can be used.
-    """
-    return require().to_device(linked.parameters.astype(precision))
-
-
-def load_loops(linked: Linked, precision: Precision, loops: Sequence[Loop]) -> ModuleType:
-    """Load loops over a linked scene. Each is compiled at its first call, for the types of its arguments.
-
-    Parameters
-    ----------
-    linked
-        Linked scene.
-    precision
-        "float32" or "float64".
-    loops
-        Loops to load.
-
-    Returns
-    -------
-    module
-        Module with the loops as attributes.
-
-    Raises
-    ------
-    KernelError
-        If no GPU can be used.
-    """
-    require()
-    text = cuda_source.module(linked, 32 if precision == "float32" else 64, loops)
-    name = f"cuda_{key(text, toolchain())}"
-    return sys.modules.get(name) or imported(name, text)

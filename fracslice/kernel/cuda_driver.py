@@ -72,7 +72,7 @@ def require() -> Any:
 
 
 @lru_cache(maxsize=1)
-def toolchain() -> str:
+def cuda_toolchain() -> str:
     """Return the key of everything besides a module's own text that its machine code depends on."""
     from importlib.metadata import version  # imports an e-mail parser
 

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
 from ..common.quantiles import quantile
+from ..errors import EmptyError
 from ..formulas.algebra import stretches
-from ..formulas.parameters import AUTO
+from ..formulas.parameters import AUTO, Count
 from ..formulas.registry import Node
 from ..formulas.transforms import affine
 from .cells import possible_cells
@@ -30,6 +34,9 @@ CELLS = 1 << 13
 
 STEPS = "steps"
 """Kind of text in the cache."""
+
+WIDE = 8
+"""Voxels below which tips of the smallest parts may come off, half their width."""
 
 BISECTIONS = 24
 """Bisection steps per surface point."""
@@ -79,9 +86,9 @@ def resolve_depths(root: Node, detail: float) -> Node:
     """
     detail = _within(root, detail)
     children = tuple(resolve_depths(child, detail) for child in root.fields)
-    if AUTO in (v for v in root.values.values() if isinstance(v, str)):
-        return root.changed(iterations=_depth(root, detail))
-    return root if children == root.fields else root.changed(children)
+    root = root if children == root.fields else root.changed(children)
+    automatic = tuple(name for name, value in root.values.items() if value == AUTO)
+    return _at(root, automatic, _depth(root, automatic, detail)) if automatic else root
 
 
 def depth_notes(root: Node, known: Node) -> tuple[str, ...]:
@@ -100,7 +107,7 @@ def depth_notes(root: Node, known: Node) -> tuple[str, ...]:
         One note per automatic depth.
     """
     pairs = zip(root.walk(), known.walk(), strict=True)
-    return tuple(f"{a.formula.name} {b['iterations']}" for a, b in pairs if a.values != b.values)
+    return tuple(f"{a.formula.name} {b[n]}" for a, b in pairs for n in a.values if a[n] != b[n])
 
 
 def visible(root: Node, voxel: float) -> tuple[Node, tuple[str, ...]]:
@@ -134,6 +141,58 @@ def visible(root: Node, voxel: float) -> tuple[Node, tuple[str, ...]]:
     return whole, tuple(dict.fromkeys([*changed, *(note for _, notes in shown for note in notes)]))
 
 
+def shallower(root: Node, voxel: float) -> tuple[str, ...]:
+    """Find the depths at which the smallest parts of a scene are many voxels wide.
+
+    Parameters
+    ----------
+    root
+        Scene.
+    voxel
+        Voxel size, scene units.
+
+    Returns
+    -------
+    tuple of str
+        Changed depths, such as "flake.level=3"; those that may be automatic move most of the surface by less
+        than half that many voxels with one more iteration.
+    """
+    coarse = resolve_depths(_automatic(visible(root, WIDE * voxel)[0]), WIDE * voxel)
+    pairs = zip(root.walk(), coarse.walk(), strict=True)
+    changed = [f"{a.formula.name}.{n}={b[n]}" for a, b in pairs for n in a.values if a[n] != b[n] < a[n]]
+    return tuple(dict.fromkeys(changed))
+
+
+@contextmanager
+def advised(root: Node | None, voxel: float) -> Iterator[None]:
+    """Add the depths that voxels show to the error of an empty scene.
+
+    Parameters
+    ----------
+    root
+        Scene, or None.
+    voxel
+        Voxel size, scene units.
+
+    Raises
+    ------
+    EmptyError
+        If the managed block does.
+    """
+    try:
+        yield
+    except EmptyError as error:
+        settings = shallower(root, voxel) if root else ()
+        raise EmptyError(" or ".join([str(error), *settings])) from None
+
+
+def _automatic(root: Node) -> Node:
+    """Scene with all depths automatic that may be."""
+    kinds = root.formula.parameters.items()
+    depths = {name: AUTO for name, kind in kinds if isinstance(kind, Count) and AUTO in kind.words}
+    return root.changed(tuple(map(_automatic, root.fields)) or root.children, **depths)
+
+
 def _within(node: Node, voxel: float) -> float:
     """Voxel size in the units of a node's children; the largest one if a transform stretches."""
     if node.formula.name != "transform":
@@ -141,16 +200,21 @@ def _within(node: Node, voxel: float) -> float:
     return voxel / float(stretches(affine(node)[0])[-1])
 
 
-def _depth(node: Node, detail: float) -> int:
+def _at(node: Node, names: tuple[str, ...], depth: int) -> Node:
+    values: dict[str, Any] = dict.fromkeys(names, depth)
+    return node.changed(**values)
+
+
+def _depth(node: Node, names: tuple[str, ...], detail: float) -> int:
     """Smallest sufficient depth; the deepest non-empty one if none is sufficient.
 
     Solids of successive depths need not be nested: steps of a Mandelbox add and take away in turns, and every
     other step is small. So two successive steps have to be.
     """
-    steps = _steps(*(Known(node.changed(iterations=d)) for d in (1, DEEPEST)))
+    steps = _steps(*(Known(_at(node, names, d)) for d in (1, DEEPEST)))
     for depth in range(1, DEEPEST):
         for k in range(len(steps) + 1, depth + 2):
-            steps.append(_step(*(Known(node.changed(iterations=d)) for d in (k, k + 1))))
+            steps.append(_step(*(Known(_at(node, names, d)) for d in (k, k + 1))))
             keep_text(STEPS, steps.made_of, " ".join(map(repr, steps)))
         step, following = steps[depth - 1 : depth + 1]
         if step is None:

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from ..errors import DeviceError
 from ..formulas.field import Device
-from ..formulas.parameters import Choice, validated
+from ..formulas.parameters import Choice
+from ..formulas.records import validated
 
 DEVICES = Choice("auto", "what computes", ("cpu", "cuda", "auto"))
 """Parameter of the device to compute on."""
+FEWEST = 1 << 22
+"""Samples of a picture below which "auto" selects the CPU: one core renders them while CUDA starts."""
 
 
 def chosen(device: str) -> Device:
@@ -37,3 +40,23 @@ def chosen(device: str) -> Device:
     if reason and device == "cuda":
         raise DeviceError(f"device cuda: {reason}")
     return "cpu" if reason else "cuda"
+
+
+def for_picture(device: str, size: tuple[int, int], samples: int) -> str:
+    """Select the CPU for a small picture, unless a device was named.
+
+    Parameters
+    ----------
+    device
+        "cpu", "cuda" or "auto".
+    size
+        Width and height, pixels.
+    samples
+        Samples per pixel.
+
+    Returns
+    -------
+    str
+        "cpu" in place of "auto" for less than `FEWEST` samples, else the device.
+    """
+    return "cpu" if device == "auto" and size[0] * size[1] * samples < FEWEST else device

@@ -59,7 +59,7 @@ def undecided(
 
 
 def proved_half(field: Callable[..., Any], radius: float, half: Triple) -> Triple:
-    """Enlarge a box around the origin until what is outside of it is proved to be empty.
+    """Enlarge a box around the origin until everything outside is proved to be empty.
 
     Cells that reach out of the box are split until intervals prove them to be empty, or until they are many
     or small: then the box takes them in.

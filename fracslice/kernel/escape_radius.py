@@ -17,7 +17,7 @@ from .enclosing_box import Corners, undecided
 from .interval_arrays import on_intervals
 from .interval_numbers import ARRAYS
 from .intervals import Interval
-from .orbits import Round, written
+from .orbits import R2, Round, written
 
 MOST, LEVELS, MARGIN = 1 << 15, 12, 1e-9
 """Cells of a level, beyond which the radius is enlarged; levels of cells; least relative growth, more than
@@ -28,6 +28,13 @@ BESIDE = 4e-290
 """End of an interval in place of 0. The steps of a cell that ends at a plane are those of its side of the
 plane; on the plane itself they are limits of these.
 """
+
+ADDED = [
+    "reach = reach + size",
+    "r = maximum(absolute(sqrt(r2) - size), minimum(sqrt(r2) + size, sqrt(x * x + y * y + z * z)))",
+    "r2 = r * r",
+]
+"""Lines that add constants to the ball and to the squared distance from the origin."""
 
 BOX, BALL = ("x", "y", "z"), ("mx", "my", "mz", "reach")
 UNIT = Interval(np.full(1, -1.0), np.full(1, 1.0), ARRAYS)
@@ -152,29 +159,28 @@ def _last_size(steps: Round, first: int) -> Callable[..., Any]:
     The box x, y, z is the image by intervals. The ball around mx, my, mz grows by the stretch over the box;
     if a step may tear space, the box takes its place. Constants that are added move w by their size.
     """
-    given, body, added = [], ["alive = x == x"], False
+    given, body, added = [], ["alive = x == x", R2], False
     for place, code in list(enumerate(steps))[first:]:
         if place > first:
             given.append(f"stop{place - 1}")
             body += [f"{v} = {v} + size * unit" for v in "xyz" if added]
-            body += ["reach = reach + size"] if added else []
-            body += ["r2 = x * x + y * y + z * z", f"alive = alive & (r2 < stop{place - 1})"]
+            body += [*ADDED] if added else []
+            body += [f"alive = alive & (r2 < stop{place - 1})"]
         step = code.traced(place)
         added = step.is_added and not code.julia
         given += code.arguments(place)
         start = ("0.0" if added else "size * unit",) * 3
-        lines, assigned = code.around(place, step.lines)
         spread = f"spread{place} * " if code.moved else ""
         body += code.before(place, start)
         if step.is_torn:
-            body += [*code.image(place), "mx, my, mz, reach = x, y, z, 0.0 * reach"]
+            body += [*code.boxed(place), "mx, my, mz, reach = x, y, z, 0.0 * reach"]
         else:
             body += ["bx, by, bz = x, y, z", "x, y, z = mx, my, mz", *code.image(place)]
             body += ["mx, my, mz = x, y, z", "x, y, z = bx, by, bz"]
-            body += [*lines, f"reach = {spread}{step.stretch[0]} * reach", *assigned]
-    box, ball = (f"sqrt({p}x * {p}x + {p}y * {p}y + {p}z * {p}z)" for p in ("", "m"))
-    reach = " - size" if added else ""
-    body.append(f"return where(alive, maximum({box}, {ball} - reach){reach}, 1e200)")
+            body += code.boxed(place, [f"reach = {spread}{step.stretch[0]} * reach"])
+        body += [R2] if step.length is None else []
+    ball, reach = "sqrt(mx * mx + my * my + mz * mz) - reach", " - size" if added else ""
+    body.append(f"return where(alive, maximum(sqrt(r2), {ball}){reach}, 1e200)")
     return written(steps, [*BOX, *BALL, "size", "unit", *given], body)
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from llvmlite import ir
 
+from ..formulas.vocabulary import OF_CELLS
 from . import lanes_math
 from .intervals import Interval, Possible
 from .kinds import Kind, as_kind, joined, kind_of, made_of, parts_of, types_of
@@ -31,7 +32,7 @@ _ON_LANES: dict[type, Callable[[Vec, Vec], Vec]] = {
 _INTRINSICS = {
     name: (getattr(lanes_math, name), count)
     for count, names in (
-        (1, ("sqrt", "rsqrt", "log", "exp", "sin", "cos", "floor", "absolute")),
+        (1, ("sqrt", "rsqrt", "log", "exp", "sin", "cos", "floor", "absolute", *sorted(OF_CELLS))),
         (2, ("ratio", "atan2", "minimum", "maximum")),
     )
     for name in names

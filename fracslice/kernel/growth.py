@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from ..formulas.box import Box
-from ..formulas.escape import CORE
-from . import functions
+from ..formulas.escape import CORE, levels
+from . import functions, majorants
 from .cells import possible_cells
 from .escape_radius import constant_stretch, escape_radius, least_size
 from .orbit_samples import (
@@ -26,8 +26,9 @@ from .orbit_samples import (
     sampled_escape,
     sampled_radius,
     step_power,
+    widened_escapes,
 )
-from .orbits import Round, field
+from .orbits import Form, Round, field
 
 LIPSCHITZ, CELLS = 3.0, 1 << 15
 """Lipschitz bound of the fields of hybrids, and the most cells of the search for the box."""
@@ -35,24 +36,19 @@ LIPSCHITZ, CELLS = 3.0, 1 << 15
 ROUNDS = 60
 """Rounds after which an orbit counts as bounded."""
 
-LEAST = 1.1
-"""Least scaled radius of escape of an orbit that grows by a power."""
+FEW, THICK = 8, 3
+"""Rounds of a solid that has no thin tips, and of one that is no dust: it holds those of more rounds."""
 
-FEW = 8
-"""Rounds of a solid that has no thin tips."""
+STOP, STOPPED = 4.0, 300.0
+"""An orbit stops at this times R; if its next step grows by a power, where that step leads to a radius."""
 
-STOP = {False: 4.0, True: 300.0}
-"""An orbit stops at this times R, or at the root of this if its next step grows by a power: there the value
-depends little on the number of steps.
+LEAST, LARGEST = 1.1, 27.0
+"""Least scaled radius of escape of an orbit that grows by a power; largest log |w| one step past the radius
+where it stops.
 """
-
-LARGEST = 27.0
-"""Largest log |w| one step past the radius where an orbit stops."""
 
 TRIES, LARGER = 3, 1.65
-"""Radii that are tried to be proved, each where the search before left no doubt; most that the first is
-enlarged by.
-"""
+"""Radii that are tried to be proved, each that of the search before; most that the first is enlarged by."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +73,17 @@ class Growth:
         True if it is proved that no orbit comes back from beyond the radii (`escape_radius`).
     stretch
         Stretch of a round if it is the same at all points, else None.
+    least
+        Least scaled radius of the surface of an orbit that grows by a power.
+    stopped
+        |w| one step past the radius where an orbit that grows by a power stops: there the value depends
+        little on the number of steps.
+    connected
+        True if no critical point is outside, False if one is, None if that is not known.
+    reach
+        Radius of a ball around the solids of all numbers of rounds.
+    torn
+        False if no orbit comes to the tears of the steps.
     """
 
     powers: tuple[float, ...]
@@ -85,6 +92,11 @@ class Growth:
     half: tuple[float, float, float] = (math.inf,) * 3
     proved: bool = False
     stretch: float | None = None
+    least: float = LEAST
+    stopped: float = STOPPED
+    connected: bool | None = None
+    reach: float = math.inf
+    torn: bool = True
 
     @property
     def power(self) -> float:
@@ -105,7 +117,7 @@ class Growth:
     def surface(self) -> float:
         """The last |w| on the surface: the radius of escape, or more, for the potential of 1 is 0."""
         scale = self.scales[-1] if self.scaled else 1.0
-        return max(self.escape, LEAST / scale) if self.by_power else self.escape
+        return max(self.escape, self.least / scale) if self.by_power else self.escape
 
     @property
     def lipschitz(self) -> float | None:
@@ -117,8 +129,8 @@ class Growth:
         """
         if not self.proved or self.stretch is None or self.by_power:
             return None
-        largest = STOP[False] * max(self.escapes) / self.escape
-        return (largest - 1) / (largest * (1 - 1 / STOP[False]))
+        largest = STOP * max(self.escapes) / self.escape
+        return (largest - 1) / (largest * (1 - 1 / STOP))
 
     @property
     def following(self) -> tuple[float, ...]:
@@ -142,6 +154,20 @@ class Growth:
     def scaled(self) -> bool:
         """True if factors are not 1."""
         return self.by_power and any(self.factors)
+
+    def form(self, steps: Round, conservative: bool) -> Form:
+        """Form of the field; a conservative one stays below twice the distance to tears.
+
+        That of a hybrid stays below twice the sure distance, too, for critical points may be outside. Without
+        majorants, neither is known: outside of a hybrid with tears it is then 0.
+        """
+        made = [code.traced(place) for place, code in enumerate(steps)]
+        bent = majorants.known(made)
+        torn = self.torn and conservative and bent and majorants.torn(made)
+        hybrid = len(steps) > 1 or steps[0].moved
+        blind = conservative and hybrid and not bent and any(step.is_torn for step in made)
+        sure = self.by_power and (self.connected is False or (hybrid and bent and conservative))
+        return Form(self.by_power, self.scaled, not self.connected, sure, torn, blind)
 
     @property
     def fits(self) -> bool:
@@ -168,7 +194,7 @@ def growth(steps: Round, values: tuple[tuple[str, Any], ...], iterations: int) -
     Returns
     -------
     Growth or None
-        Powers, radii of escape and box of the solid; None if orbits do not escape.
+        None if orbits do not escape.
     """
     known = dict(values)
     images = [image(steps, place, known) for place in range(len(steps))]
@@ -189,16 +215,22 @@ def growth(steps: Round, values: tuple[tuple[str, Any], ...], iterations: int) -
     ]
     powers, factors = zip(*rates, strict=True)
     bound = Growth(powers, factors, (*escapes, radius), stretch=constant_stretch(steps, 0, known))
-    bound = _proved(steps, bound, known, size) if bound.fits else bound
-    sampled = 1.5 * sampled_radius(whole, points, iterations, bound.escape)
-    bound = replace(bound, half=(sampled, sampled, sampled))
+    bound = _proved(steps, bound, known, size)
+    if not bound.proved:
+        bound = replace(bound, escapes=widened_escapes(images, bound.escapes, size))
+        bound = _proved(steps, bound, known, size)
+    reach, thick = (
+        sampled_radius(whole, points, n, bound.escape) for n in (iterations, min(iterations, THICK))
+    )
+    reach = max(1.5 * reach, thick, 1.02 * bound.surface if bound.by_power else 0.0)
+    bound = replace(bound, half=(reach, reach, reach))
     return replace(bound, half=_half(steps, bound, known, iterations)) if bound.fits else bound
 
 
 def _proved(steps: Round, bound: Growth, values: Mapping[str, Any], size: float) -> Growth:
     """Growth with radii of escape that are proved; the same if they cannot be."""
     tried, constants = bound, None if size and bound.by_power else size
-    for _ in range(TRIES):
+    for _ in range(TRIES if bound.fits else 0):
         own = {**values, **arguments(steps, tried, 1)}
         radii = [
             escape_radius(
@@ -223,7 +255,7 @@ def _half(
     """Half sizes of a box around the cells that the field does not prove to be empty; the search begins with
     one half more than the samples reach.
     """
-    function = field(steps, bound.by_power, bound.scaled)
+    function = field(steps, Form(bound.by_power, bound.scaled))
     own = {**arguments(steps, bound, iterations), **values}
     given = [own[name] for name in functions.parameters(function)[3:]]
 
@@ -255,20 +287,19 @@ def arguments(steps: Round, bound: Growth, iterations: int) -> dict[str, object]
     """
     own: dict[str, object] = {"iterations": iterations}
     if not bound.by_power:
-        stops = {f"stop{k}": (STOP[False] * max(e, bound.escape)) ** 2 for k, e in enumerate(bound.escapes)}
+        stops = {f"stop{k}": (STOP * max(e, bound.escape)) ** 2 for k, e in enumerate(bound.escapes)}
         return {**own, **stops, "bailout": bound.escape}
-    counted = min(iterations, int(30 / math.log10(bound.power)))
     scales = bound.scales if bound.scaled else (1.0,) * len(steps)
     radius = bound.surface * scales[-1]
-    last = 2 * math.log(radius)
-    least = radius**2 * math.exp(-max(0.2 / radius, 1e-4))
-    own["levels"] = (last / bound.power**counted, last, least)
+    own["levels"] = levels(bound.power, iterations, radius)
+    own["reach"] = min(bound.reach, bound.surface)
     escapes = (*bound.escapes[:-1], bound.surface)
     for k, (escape, following, scale) in enumerate(zip(escapes, bound.following, scales, strict=True)):
-        own[f"stop{k}"] = max(escape, STOP[True] ** (1 / following) / scale) ** 2
+        own[f"stop{k}"] = max(escape, bound.stopped ** (1 / following) / scale) ** 2
+        own[f"surface{k}"] = escape
         own[f"rate{k}"] = power = bound.powers[k]
         if bound.scaled:
             own[f"scale{k}"] = scale
-        if steps[k].is_fixed(k):
+        if not bound.connected and steps[k].is_fixed(k):
             own[f"least{k}"] = power * CORE ** ((power - 1) / 2) if power > POWER else 0.0
     return own

@@ -1,4 +1,4 @@
-"""Descriptions of functions that are the same in every process: keys of what is made from them."""
+"""Descriptions of functions that are the same in every process: keys of the code made from them."""
 
 from __future__ import annotations
 

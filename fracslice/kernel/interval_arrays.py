@@ -61,4 +61,5 @@ def on_intervals(function: Callable[..., Any]) -> Callable[..., Any]:
         The same code with functions of intervals.
     """
     assert isinstance(function, FunctionType)
-    return FunctionType(function.__code__, {name: on_cells(name) for name in vocabulary.NAMES})
+    names = vocabulary.NAMES | vocabulary.OF_CELLS
+    return FunctionType(function.__code__, {name: on_cells(name) for name in names})

@@ -105,6 +105,17 @@ class Interval:
         absolute, by = self.of.functions.absolute, units * self.of.unit
         return Interval(self.lo - absolute(self.lo) * by, self.hi + absolute(self.hi) * by, self.of)
 
+    def cell_middle(self) -> Interval:
+        """See `vocabulary.cell_middle`."""
+        centre = self.lo * self._like(0.5) + self.hi * self._like(0.5)
+        return Interval(centre, centre, self.of)
+
+    def cell_extent(self) -> Interval:
+        """See `vocabulary.cell_extent`."""
+        centre = self.cell_middle().lo
+        reach = self.of.functions.maximum(centre - self.lo, self.hi - centre)
+        return Interval(reach, reach, self.of).outward()
+
     def _limited(self) -> Interval:
         """Interval with finite bounds."""
         lesser, greater, huge = self.of.functions.minimum, self.of.functions.maximum, self._like(self.of.huge)

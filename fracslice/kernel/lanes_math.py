@@ -47,6 +47,16 @@ def absolute(a: Vec) -> Vec:
     return a.call("fabs")
 
 
+def cell_middle(a: Vec) -> Vec:
+    """Return the number: a point is its own middle."""
+    return a
+
+
+def cell_extent(a: Vec) -> Vec:
+    """Return 0."""
+    return a * 0.0
+
+
 def where(mask: Vec, yes: Vec, no: Vec) -> Vec:
     """Return `yes` where the mask is set, else `no`."""
     return mask.choose(yes, no)

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from .elf import Image, UnsupportedError
 from .loops import Loop
 
 
@@ -75,13 +76,24 @@ def loaded(code: bytes, loops: Sequence[Loop], dtype: np.dtype) -> dict[str, Fun
     dict
         Functions by name.
     """
+    try:
+        engine: Any = Image(code)
+    except UnsupportedError:
+        engine = _by_llvm(code)
+    return {loop.name: Function(engine, loop, dtype) for loop in loops}
+
+
+def _by_llvm(code: bytes) -> Any:
+    """Execution engine of an object file."""
     import llvmlite.binding as llvm
 
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
     machine = llvm.Target.from_triple(llvm.get_process_triple()).create_target_machine(jit=True)
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
-    return {loop.name: Function(engine, loop, dtype) for loop in loops}
+    return engine
 
 
 def constant(values: np.ndarray, dtype: np.dtype | str) -> np.ndarray:

@@ -15,6 +15,9 @@ from .orbits import Round, written
 DIRECTIONS, RADII, FARTHEST = 64, np.geomspace(1e-2, 1e4, 56).round(4), 1e6
 """Samples of the search for the radius of escape."""
 
+SAMPLES, OCTAVES = 1 << 13, (12.0, 1.0, 0.5, 0.5)
+"""Samples of each search of `widened_escapes`, and the octaves beyond the radius that they lie in."""
+
 POWER, FLAT = 1.2, 0.2
 """Least growth that counts as a power; largest logarithm of a factor that counts as 1, for it changes the
 potential of an escaped orbit by a thirtieth.
@@ -40,10 +43,53 @@ def sampled_escape(whole: Image, points: np.ndarray, size: float) -> float:
     """
     grows, radii = np.ones(points.shape[1], bool), norm(points)
     for against in (whole(points, np.zeros(3)), points, -points) if size else (points,):
-        constant = against * (-size / np.maximum(norm(against), 1e-300))
-        grows &= norm(whole(points, constant)) > 1.02 * radii
+        grows &= norm(whole(points, _against(against, size))) > 1.02 * radii
     stays = np.flatnonzero(~grows.reshape(-1, len(RADII)).all(axis=0))
     return float(RADII[min(stays.max(initial=0) + 1, len(RADII) - 1)])
+
+
+def widened_escapes(images: Sequence[Image], escapes: Sequence[float], size: float) -> tuple[float, ...]:
+    """Return radii of escape, enlarged until no orbit of dense random samples comes back from beyond them.
+
+    Parameters
+    ----------
+    images
+        Steps of a round.
+    escapes
+        Radius of escape after each step.
+    size
+        Size of the constants.
+
+    Returns
+    -------
+    tuple of float
+        Radius after each step; the given one where no orbit comes back.
+    """
+    rng, radii, last = np.random.default_rng(0), list(escapes), len(images) - 1
+    for octaves in OCTAVES:
+        for place in range(len(images)):
+            rest = composed(images[place + 1 :] or images)
+            w = _random(rng, radii[place] * 2.0 ** rng.uniform(0, octaves, SAMPLES))
+            limit = norm(w) if place == last else radii[-1]
+            back = np.zeros(SAMPLES, bool)
+            for against in (0.0 * w, rest(w, np.zeros(3)), w, -w, _random(rng, norm(w))):
+                back |= norm(rest(w, _against(against, size))) <= limit
+            radii[place] = max(radii[place], 1.02 * float(norm(w[:, back]).max(initial=0.0)))
+    return tuple(radii)
+
+
+def _random(rng: np.random.Generator, radius: np.ndarray) -> np.ndarray:
+    """Return points of given radii in random directions."""
+    w = rng.normal(size=(3, SAMPLES))
+    w *= radius / norm(w)
+    return w
+
+
+def _against(vectors: np.ndarray, size: float) -> np.ndarray:
+    """Return constants against vectors: as long as they are, at most of a size."""
+    length = norm(vectors)
+    against: np.ndarray = vectors * (-np.minimum(size, length) / np.maximum(length, 1e-300))
+    return against
 
 
 def sampled_radius(whole: Image, points: np.ndarray, rounds: int, radius: float) -> float:
@@ -102,6 +148,35 @@ def image(steps: Round, place: int, values: Mapping[str, Any]) -> Image:
         return finite.clip(-1e170, 1e170)
 
     return taken
+
+
+def stays(steps: Round, values: Mapping[str, Any], rounds: int, radius: float, outer: float) -> bool:
+    """Return True if the orbit that starts at the origin is within a radius after some rounds.
+
+    Parameters
+    ----------
+    steps
+        Steps of a round.
+    values
+        Values of the arguments of the steps.
+    rounds
+        Number of rounds.
+    radius
+        Radius.
+    outer
+        Radius from which no orbit comes back.
+
+    Returns
+    -------
+    bool
+    """
+    step, start = composed([image(steps, k, values) for k in range(len(steps))]), np.zeros((3, 1))
+    w = start
+    for _ in range(rounds):
+        w = step(w, start)
+        if float(norm(w)[0]) >= outer:
+            return False
+    return float(norm(w)[0]) <= radius
 
 
 def composed(images: Sequence[Image]) -> Image:

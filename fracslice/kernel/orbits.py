@@ -8,15 +8,19 @@ bounded by the stretch of each step: ``dr -> s dr + t``, where t is the stretch 
 
 from __future__ import annotations
 
+import ast
 import linecache
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from functools import lru_cache
 from typing import Any
 
 from ..formulas import vocabulary
-from ..formulas.escape import potential_distance
-from . import functions
+from ..formulas.escape import potential_distance, sure_distance
+from ..formulas.verbs import MAJORANTS, RIGID
+from . import functions, majorants
+from .kept_texts import kept_text
+from .parsing import parse_expression
 from .steps import traced
 from .straight_line import Step
 
@@ -56,7 +60,7 @@ class Code:
     def arguments(self, place: int) -> list[str]:
         """Names of the values that the step needs at a place in the round."""
         names = [f"v{place}_{name}" for name, _ in self.sizes]
-        return [*names, *self._flagged(place, julia=["c"], moved=["back", "forth", "spread"])]
+        return [*names, *self._flagged(place, julia=["c"], moved=["back", "forth", "spread", "shrink"])]
 
     def before(self, place: int, start: Sequence[str]) -> list[str]:
         """Lines before the first round: those that take vectors apart, set the constant of the step, from the
@@ -69,7 +73,7 @@ class Code:
         ]
         matrices = self._flagged(place, moved=["back", "forth"])
         lines += [f"{', '.join(f'{name}_{k}' for k in range(12))} = {name}" for name in matrices]
-        given = ", ".join(_mapped(f"back{place}", start) if self.moved else start)
+        given = ", ".join(mapped(f"back{place}", start) if self.moved else start)
         constant = f"cx{place}, cy{place}, cz{place} = {f'c{place}' if self.julia else given}"
         return [*lines, constant, *self.traced(place).before]
 
@@ -83,18 +87,51 @@ class Code:
         xyz, assigned = ("x", "y", "z"), [f"x, y, z = {', '.join(self.traced(place).point)}"]
         if not self.moved:
             return [*lines], assigned
-        there, back = (f"x, y, z = {', '.join(_mapped(f'{name}{place}', xyz))}" for name in ("back", "forth"))
+        there, back = (f"x, y, z = {', '.join(mapped(f'{name}{place}', xyz))}" for name in ("back", "forth"))
         return [there, *lines], [*assigned, back]
+
+    def boxed(self, place: int, between: Sequence[str] = ()) -> list[str]:
+        """Lines that take a box around x, y, z to its image.
+
+        Where the length of the image follows from that of the point, sqrt(r2), the image lies in a shell, and
+        r2 is that of the image.
+        """
+        step = self.traced(place)
+        lines, (assigned, *back) = self.around(place, step.lines)
+        if step.length is None:
+            return [*lines, *between, assigned, *back]
+        return [
+            *[*lines, *between],
+            f"rw{place} = sqrt({'x * x + y * y + z * z' if self.moved else 'r2'})",
+            f"rc{place} = sqrt(cx{place} * cx{place} + cy{place} * cy{place} + cz{place} * cz{place})",
+            *[*step.measuring, f"shell = {step.length}", assigned],
+            *(f"{v} = maximum(minimum({v}, shell), -shell)" for v in "xyz"),
+            *([*back, *self._moved_shell(place)] if self.moved else []),
+            "r2 = shell * shell",
+        ]
+
+    def _moved_shell(self, place: int) -> list[str]:
+        """Lines that map the shell as the point: around the image of the origin, then around the origin."""
+        offset = [f"forth{place}_{9 + k}" for k in range(3)]
+        own = " + ".join(f"({v} - {o}) * ({v} - {o})" for v, o in zip("xyz", offset, strict=True))
+        return [
+            f"shell = shrink{place} * shell",
+            f"shell = maximum(shell, minimum(spread{place} * shell, sqrt({own})))",
+            f"away = sqrt({' + '.join(f'{o} * {o}' for o in offset)})",
+            "shell = maximum(absolute(shell - away), minimum(shell + away, sqrt(x * x + y * y + z * z)))",
+        ]
 
     def _flagged(self, place: int, **names: list[str]) -> list[str]:
         return [f"{name}{place}" for flag, own in names.items() if getattr(self, flag) for name in own]
 
 
+R2 = "r2 = x * x + y * y + z * z"
+
 Round = tuple[Code, ...]
 """Steps of a round, in order."""
 
 
-def _mapped(matrix: str, point: Sequence[str]) -> list[str]:
+def mapped(matrix: str, point: Sequence[str]) -> list[str]:
     """Image of a point under an affine map: nine entries row by row, then three of the translation."""
     rows = [[f"{matrix}_{3 * k + i} * {p}" for i, p in enumerate(point)] for k in range(3)]
     return [" + ".join([*row, f"{matrix}_{9 + k}"]) for k, row in enumerate(rows)]
@@ -102,20 +139,60 @@ def _mapped(matrix: str, point: Sequence[str]) -> list[str]:
 
 @lru_cache(maxsize=256)
 def _traced(code: Code, place: int, _: object) -> Step:
-    return traced(code.step, dict(code.sizes), dict(code.fixed), place)
+    """Straight-line code of a step, cached: following its text takes a twentieth of a small picture."""
+    from .identity import identity
+
+    rigid = sorted(RIGID, key=lambda verb: verb.__name__)
+    verbs = identity(code.step, *(value for _, value in code.fixed), *MAJORANTS, *MAJORANTS.values(), *rigid)
+
+    def text() -> str:
+        return repr(astuple(traced(code.step, dict(code.sizes), dict(code.fixed), place)))
+
+    made_of = verbs, code.sizes, code.fixed, place
+    return Step(*ast.literal_eval(parse_expression(kept_text("traced", made_of, text))))
 
 
-def field(steps: Round, by_power: bool, scaled: bool) -> Callable[..., Any]:
+@dataclass(frozen=True)
+class Form:
+    """What the code of a field depends on besides the steps.
+
+    Attributes
+    ----------
+    by_power
+        True if rounds grow by a power.
+    scaled
+        True if the potential is that of ``scale |w|`` after each step.
+    critical
+        True if critical points may be outside, for constants that are the same at all points.
+    sure
+        True if the field stays below twice the sure distance (`formulas.escape.sure_distance`).
+    torn
+        True if it stays below twice the sure distance to the tears of the steps.
+    blind
+        True if it is at most 0.
+    """
+
+    by_power: bool
+    scaled: bool = False
+    critical: bool = True
+    sure: bool = False
+    torn: bool = False
+    blind: bool = False
+
+    def least(self, code: Code) -> bool:
+        """True if the derivative of a step has a minimum: preimages of critical points, see `escape.CORE`."""
+        return self.by_power and self.critical and code.is_fixed(0)
+
+
+def field(steps: Round, form: Form) -> Callable[..., Any]:
     """Write the function of an orbit's field.
 
     Parameters
     ----------
     steps
         Steps of a round.
-    by_power
-        True if rounds grow by a power.
-    scaled
-        True if the potential is that of ``scale |w|`` after each step.
+    form
+        Form of the field.
 
     Returns
     -------
@@ -127,18 +204,20 @@ def field(steps: Round, by_power: bool, scaled: bool) -> Callable[..., Any]:
     KernelError
         If a step is not in the language.
     """
-    return _field(steps, by_power, scaled, tuple(functions.fingerprint(code.step) for code in steps))
+    return _field(steps, form, tuple(functions.fingerprint(code.step) for code in steps))
 
 
 @lru_cache(maxsize=256)
-def _field(steps: Round, by_power: bool, scaled: bool, _: object) -> Callable[..., Any]:
+def _field(steps: Round, form: Form, _: object) -> Callable[..., Any]:
     given, setup, loop = [], [], []
+    by_power, scaled = form.by_power, form.scaled
     for place, code in enumerate(steps):
         given += [*code.arguments(place), f"stop{place}", *([f"scale{place}"] if scaled else [])]
         given += [f"rate{place}"] if by_power else []
-        given += [f"least{place}"] if by_power and code.is_fixed(place) else []
+        given += [f"least{place}"] if form.least(code) else []
+        given += [f"surface{place}"] if form.sure else []
         setup += code.before(place, ("x", "y", "z"))
-        loop += _taken(code, place, by_power, f"scale{place}" if scaled else "")
+        loop += _taken(code, place, form)
     last = len(steps) - 1
     body = [
         *setup,
@@ -149,80 +228,48 @@ def _field(steps: Round, by_power: bool, scaled: bool, _: object) -> Callable[..
         *([f"end_r2 = scale{last} * scale{last} * r2", f"slope = scale{last} * dr"] if scaled else []),
         *([] if scaled else ["end_r2 = r2", "slope = dr"]),
         f"alive = r2 < stop{last}",
+        *majorants.before(form.sure, form.torn),
         "for _ in range(iterations):",
-        *_indented(["if not any_of(alive):", "    break", *loop]),
-        "return potential_distance(end_r2, slope * slope, level, first_level, last_level, least_r2)"
+        *indented(["if not any_of(alive):", "    break", *loop]),
+        "f = potential_distance(end_r2, slope * slope, level, first_level, last_level, least_r2)"
         if by_power
-        else "return (sqrt(minimum(end_r2, 1e30)) - bailout) / minimum(slope, 1e30)",
+        else "f = (sqrt(minimum(end_r2, 1e30)) - bailout) / minimum(slope, 1e30)",
+        *majorants.last(form.sure, form.torn),
+        *(["f = minimum(f, 0.0)"] if form.blind else []),
+        "return f",
     ]
-    own = "levels" if by_power else "bailout"
-    return written(steps, ["x", "y", "z", "iterations", own, *given], body)
-
-
-def sign(steps: Round, scaled: bool) -> Callable[..., Any]:
-    """Write the function of ``|w_N|^2 - R^2`` where an orbit does not stop before, else of 1.
-
-    Parameters
-    ----------
-    steps
-        Steps of a round.
-    scaled
-        True if R is that of ``scale |w|``.
-
-    Returns
-    -------
-    Callable
-        Function in the language of formulas.
-
-    Raises
-    ------
-    KernelError
-        If a step is not in the language.
-    """
-    return _sign(steps, scaled, tuple(functions.fingerprint(code.step) for code in steps))
-
-
-@lru_cache(maxsize=256)
-def _sign(steps: Round, scaled: bool, _: object) -> Callable[..., Any]:
-    given, setup, loop = [], [], []
-    for place, code in enumerate(steps):
-        given += [*code.arguments(place), f"stop{place}"]
-        setup += code.before(place, ("x", "y", "z"))
-        loop += [*code.image(place), "r2 = x * x + y * y + z * z"]
-        loop += [f"alive = alive & (r2 < stop{place})"]
-    body = [
-        *setup,
-        "r2 = x * x + y * y + z * z",
-        f"alive = r2 < stop{len(steps) - 1}",
-        "for _ in range(iterations):",
-        *_indented(["if not any_of(alive):", "    break", *loop]),
-        f"return where(alive, {'scale * scale * ' if scaled else ''}r2 - radius2, 1.0 + 0.0 * r2)",
-    ]
-    own = ["scale", "radius2"] if scaled else ["radius2"]
+    own = ["levels" if by_power else "bailout", *(["reach"] if form.sure else [])]
     return written(steps, ["x", "y", "z", "iterations", *own, *given], body)
 
 
-def _taken(code: Code, place: int, by_power: bool, scale: str) -> list[str]:
+def _taken(code: Code, place: int, form: Form) -> list[str]:
     """Lines of the loop that take a step."""
-    by_w, by_c = code.traced(place).stretch
-    if code.is_fixed(place) and by_power:  # preimages of critical points outside the set, see `escape.CORE`
+    scale, step = f"scale{place}" if form.scaled else "", code.traced(place)
+    by_w, by_c = step.stretch
+    if form.least(code):
         by_w = f"maximum({by_w}, least{place})"
     grown = f"{by_w} * dr" if code.julia or by_c == "0.0" else f"{by_w} * dr + {by_c}"
-    lines, assigned = code.around(place, code.traced(place).lines)
+    shrink = f"shrink{place}" if code.moved else None
+    bent = majorants.of_step(step, form.torn, shrink) if form.sure or form.torn else []
+    lines, assigned = code.around(place, step.lines)
+    reached = [f"reached = reached * rate{place}", "level = where(alive, reached, level)"]
     return [
         *lines,
+        *bent,
         f"dr = spread{place} * ({grown})" if code.moved else f"dr = {grown}",
         *assigned,
         "r2 = x * x + y * y + z * z",
         "orbit(r2, alive, x, y, z)",
         f"end_r2 = where(alive, {f'{scale} * {scale} * r2' if scale else 'r2'}, end_r2)",
         f"slope = where(alive, maximum({f'{scale} * dr' if scale else 'dr'}, slope), slope)",
-        *([f"reached = reached * rate{place}", "level = where(alive, reached, level)"] if by_power else []),
+        *(reached if form.by_power else []),
+        *majorants.after(form.sure, form.torn, f"surface{place}"),
         f"alive = alive & (r2 < stop{place})",
     ]
 
 
-def _indented(lines: Sequence[str]) -> list[str]:
+def indented(lines: Sequence[str]) -> list[str]:
+    """Return lines of a block."""
     return [f"    {line}" for line in lines]
 
 
@@ -246,8 +293,10 @@ def written(steps: Round, arguments: Sequence[str], body: Sequence[str]) -> Call
     name = "_".join(code.step.__name__.strip("_") for code in steps)[:60]
     text = "\n    ".join([f"def {name}({', '.join(arguments)}):", *body]) + "\n"
     file = f"<orbit {name} {abs(hash((steps, text))):x}>"
-    scope: dict[str, Any] = {n: getattr(vocabulary, n) for n in (*vocabulary.NAMES, "orbit")}
-    scope["potential_distance"] = potential_distance
+    scope: dict[str, Any] = {
+        n: getattr(vocabulary, n) for n in (*vocabulary.NAMES, *vocabulary.OF_CELLS, "orbit")
+    }
+    scope |= {"potential_distance": potential_distance, "sure_distance": sure_distance}
     exec(compile(text, file, "exec"), scope)
     linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
     function: Callable[..., Any] = scope[name]

@@ -13,6 +13,8 @@ from .interval_arrays import on_cells
 from .intervals import Interval
 from .linker import CALLED, FIELD, link
 
+_NAMES = vocabulary.NAMES | vocabulary.OF_CELLS
+
 
 def reference(root: Node) -> Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]:
     """Return the signed field of a scene tree.
@@ -32,7 +34,7 @@ def reference(root: Node) -> Callable[[np.ndarray, np.ndarray, np.ndarray], np.n
     KernelError
         If the scene cannot be linked.
     """
-    function = _field(root, {name: getattr(vocabulary, name) for name in vocabulary.NAMES})
+    function = _field(root, {name: getattr(vocabulary, name) for name in _NAMES})
 
     def evaluate(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
         return np.asarray(function(*(np.asarray(a, dtype=np.float64) for a in (x, y, z))))
@@ -58,7 +60,7 @@ def enclosure(root: Node) -> Callable[[Interval, Interval, Interval], Interval]:
     KernelError
         If the scene cannot be linked.
     """
-    return _field(root, {name: on_cells(name) for name in vocabulary.NAMES})
+    return _field(root, {name: on_cells(name) for name in _NAMES})
 
 
 def _field(root: Node, scope: dict[str, Any]) -> Callable[..., Any]:

@@ -10,15 +10,18 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import nan
 from types import FunctionType
-from typing import Any, NoReturn
+from typing import Any, NoReturn, cast
 
 from ..errors import KernelError
+from ..formulas.fixed import EVALUATED
+from ..formulas.verbs import CENTRAL, LENGTHS, MAJORANTS, RIGID
 from . import functions, language
 from .parsing import parse_expression
 from .source import specialised
 from .straight_line import Step, named
-from .tape import DERIVATIVES, Scalar, Stretch, Tape, Vector3, as_number
+from .tape import DERIVATIVES, Majorant, Scalar, Stretch, Tape, Vector3, as_number
 
 Value = Any
 """Scalar, Vector or tuple of these."""
@@ -51,8 +54,8 @@ def traced(
         If the function is not in the language of steps.
     """
     tape = Tape(f"s{place}_")
-    constant = tape.variable(f"cx{place} cy{place} cz{place}", 3)
-    env: dict[str, Value] = {"w": tape.variable("x y z", 0), "c": constant}
+    constant = tape.variable(f"cx{place} cy{place} cz{place}", 3, f"rc{place}")
+    env: dict[str, Value] = {"w": tape.variable("x y z", 0, f"rw{place}"), "c": constant}
     env |= {name: _argument(f"v{place}_{name}", size) for name, size in parameters.items()}
     names = functions.parameters(function)
     if names[:2] != ["w", "c"] or {*names[2:]} != {*parameters, *fixed}:
@@ -66,9 +69,17 @@ def traced(
     if declared is not None:
         stretch = declared.atom, stretch[1]
     point = tuple(part.atom for part in vector.parts)
-    made = Step([], tape.lines, point, (stretch[0] or "0.0", stretch[1] or "0.0"))  # type: ignore[arg-type]
-    before, lines = _divided(made.needed(*made.point, *made.stretch))
-    return replace(made, before=before, lines=lines)
+    majorant = vector.majorant and (vector.majorant[0] or "0.0", vector.majorant[1])
+    made = Step([], tape.lines, point, (stretch[0] or "0.0", stretch[1] or "0.0"), majorant)  # type: ignore[arg-type]
+    own = made.needed(*made.point, *made.stretch)
+    before, lines = _divided(own)
+    bending, measuring = (
+        tuple(line for line in made.needed(*filter(None, names)) if line not in own)
+        for names in (majorant or (), (vector.length,))
+    )
+    return replace(
+        made, before=before, lines=lines, bending=bending, length=vector.length, measuring=measuring
+    )
 
 
 def _argument(name: str, size: int) -> Value:
@@ -142,6 +153,8 @@ class _Reader:
     def known(self, test: ast.expr) -> bool:
         """Truth of a condition that is known here."""
         value = self.value(test)
+        if isinstance(value, tuple):
+            return bool(value)
         number = as_number(value.atom) if isinstance(value, Scalar) else None
         if number is None:
             self.fail(test, "expected a condition on constants")
@@ -221,6 +234,8 @@ class _Reader:
     # --- calls ---
     def call(self, name: str, given: list[Value], node: ast.AST) -> Value:
         function = self.scope.get(name)
+        if function in EVALUATED:
+            return _constants(function(*map(_number, given)))
         if name not in language.INTRINSICS and isinstance(function, FunctionType):
             names = functions.parameters(function)
             if len(names) != len(given):
@@ -231,7 +246,9 @@ class _Reader:
             if not isinstance(given[0], Vector3):
                 self.fail(node, "expected a point first")
             (image, factor), before = value, given[0].stretch
-            return Vector3(image.parts, before and tuple(self.tape.times(factor.atom, s) for s in before))  # type: ignore[arg-type]
+            stretch = before and tuple(self.tape.times(factor.atom, s) for s in before)
+            length = self.length(function, given)
+            return Vector3(image.parts, stretch, self.majorant(function, given), length)  # type: ignore[arg-type]
         if name not in DERIVATIVES and name != "where":
             self.fail(node, f"{name!r} is not in the language of steps")
         if name == "where" and isinstance(given[1], Vector3) and isinstance(given[2], Vector3):
@@ -240,6 +257,26 @@ class _Reader:
         if not all(isinstance(v, Scalar) for v in given):
             self.fail(node, "expected numbers, found a point")
         return self.tape.intrinsic(name, given)
+
+    def majorant(self, verb: Callable[..., Any], given: list[Value]) -> Majorant | None:
+        """Majorant of a verb's image."""
+        if verb in RIGID:
+            return self.tape.after(given[0], (None, None))
+        if verb not in MAJORANTS:
+            return None
+        own = dict(zip(functions.parameters(verb), given, strict=True))
+        bend, tear = _followed(MAJORANTS[verb], {}, own, self.tape)
+        return self.tape.after(given[0], (bend.atom, None if as_number(tear.atom) else tear.atom))
+
+    def length(self, verb: Callable[..., Any], given: list[Value]) -> str | None:
+        """Length of a verb's image, from that of its point."""
+        before = given[0].length
+        if before is None or verb in CENTRAL:
+            return cast("str | None", before)
+        if verb not in LENGTHS:
+            return None
+        own = dict(zip(functions.parameters(LENGTHS[verb]), [Scalar(before), *given[1:]], strict=True))
+        return cast("str", _followed(LENGTHS[verb], {}, own, self.tape).atom)
 
 
 def _n(value: Scalar) -> ast.expr:
@@ -262,6 +299,12 @@ def _is_triple(value: Value) -> bool:
 
 def _constant_stretch(parts: tuple[Scalar, ...]) -> Stretch | None:
     return (None, None) if all(part.constant for part in parts) else None
+
+
+def _number(value: Value) -> float:
+    """Number that a value is known to be; NaN if it is not known."""
+    number = as_number(value.atom) if isinstance(value, Scalar) else None
+    return nan if number is None else number
 
 
 def _constants(value: Any) -> Value:

@@ -28,12 +28,26 @@ class Step:
         Expressions of the next point.
     stretch
         Expressions of the stretch by w and by c.
+    majorant
+        Expressions of the bend and of the distance to the nearest tear, or None without one; None if they are
+        not known.
+    bending
+        Assignments after `lines` that the majorant depends on.
+    length
+        Expression of the length of the next point, from "rw" and "rc", those of the point and the constant;
+        None if it is not known.
+    measuring
+        Assignments after `lines` that the length depends on.
     """
 
     before: list[str]
     lines: list[str]
     point: tuple[str, str, str]
     stretch: tuple[str, str]
+    majorant: tuple[str, str | None] | None = None
+    bending: tuple[str, ...] = ()
+    length: str | None = None
+    measuring: tuple[str, ...] = ()
 
     @cached_property
     def image(self) -> list[str]:

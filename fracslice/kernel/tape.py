@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 
+from . import polynomials
 from .parsing import parse_expression
 
 Slopes = tuple[str | None, ...]
@@ -37,12 +38,23 @@ Stretch = tuple[str | None, str | None]
 """Stretch by w and by c; None is zero."""
 
 
+Majorant = tuple[str | None, str | None]
+"""Bend by w (`formulas.escape.sure_distance`), and distance to the nearest tear; None is none."""
+
+
 @dataclass(frozen=True)
 class Vector3:
-    """Three scalars, and the stretch if it is known."""
+    """Three scalars; the stretch, the majorant and an atom of the length if they are known."""
 
     parts: tuple[Scalar, Scalar, Scalar]
     stretch: Stretch | None = None
+    majorant: Majorant | None = None
+    length: str | None = None
+
+    @property
+    def known_majorant(self) -> Majorant | None:
+        """The majorant; that of a constant is none."""
+        return (None, None) if self.stretch == (None, None) else self.majorant
 
 
 @dataclass
@@ -57,19 +69,23 @@ class Tape:
         Assignments.
     names
         Names by expression.
+    expressions
+        Expressions by name.
     """
 
     prefix: str
     lines: list[str] = field(default_factory=list)
     names: dict[str, str] = field(default_factory=dict)
+    expressions: dict[str, str] = field(default_factory=dict)
 
-    def variable(self, names: str, first: int) -> Vector3:
+    def variable(self, names: str, first: int, length: str) -> Vector3:
         """Point of three names; its derivatives are those from the given index on."""
         parts = [
             Scalar(name, tuple("1.0" if i == first + k else None for i in range(6)))
             for k, name in enumerate(names.split())
         ]
-        return Vector3(tuple(parts), (None, "1.0") if first else ("1.0", None))  # type: ignore[arg-type]
+        stretch = (None, "1.0") if first else ("1.0", None)
+        return Vector3(tuple(parts), stretch, (None, None), length)  # type: ignore[arg-type]
 
     def name(self, code: str | None) -> str | None:
         """Name of an expression; equal expressions have one. That of a name with a minus is itself."""
@@ -77,6 +93,7 @@ class Tape:
             return code
         if code not in self.names:
             self.names[code] = f"{self.prefix}{len(self.names)}"
+            self.expressions[self.names[code]] = code
             self.lines.append(f"{self.names[code]} = {code}")
         return self.names[code]
 
@@ -127,7 +144,29 @@ class Tape:
         if a.stretch and b.stretch:
             stretch = self.plus(a.stretch[0], b.stretch[0]), self.plus(a.stretch[1], b.stretch[1])
         parts = tuple(self.sum(p, q, sign) for p, q in zip(a.parts, b.parts, strict=True))
-        return Vector3(parts, stretch)  # type: ignore[arg-type]
+        first, second = a.known_majorant, b.known_majorant
+        majorant = first and second and self.joined(first, second)
+        return Vector3(parts, stretch, majorant, self.length_of_sum(a, b, parts))  # type: ignore[arg-type]
+
+    def length_of_sum(self, a: Vector3, b: Vector3, parts: Sequence[Scalar]) -> str | None:
+        """Length of a sum or difference: of intervals, between the difference and the sum of the lengths."""
+        first, second = (self.norm_of(v.parts) if v.stretch == (None, None) else v.length for v in (a, b))
+        if first is None or second is None:
+            return None
+        least, most = self.size(self.plus(first, second, "-")), self.plus(first, second)
+        return self.name(f"maximum({least or '0.0'}, {self.name(f'minimum({most}, {self.norm_of(parts)})')})")
+
+    def norm_of(self, parts: Sequence[Scalar]) -> str:
+        """Length of a vector, from its coordinates."""
+        x, y, z = (self.times(part.atom, part.atom) for part in parts)
+        total = self.plus(self.plus(x, y), z)
+        return str(self.name(f"sqrt({total})")) if total else "0.0"
+
+    def joined(self, a: Majorant, b: Majorant) -> Majorant:
+        """Majorant of a sum: the larger bend, and the nearer tear."""
+        pairs = zip(("maximum", "minimum"), a, b, strict=True)
+        bend, tear = (self.name(f"{which}({p}, {q})") if p and q else p or q for which, p, q in pairs)
+        return bend, tear
 
     def product(self, a: Scalar, b: Scalar) -> Scalar:
         """Product of two scalars."""
@@ -139,7 +178,19 @@ class Tape:
         if a.constant and b.stretch:
             size = self.size(a.atom)
             stretch = self.times(size, b.stretch[0]), self.times(size, b.stretch[1])
-        return Vector3(tuple(self.product(a, part) for part in b.parts), stretch)  # type: ignore[arg-type]
+        majorant = b.known_majorant if a.constant else None
+        length = self.times(self.size(a.atom), b.length) if a.constant and b.length else None
+        return Vector3(tuple(self.product(a, part) for part in b.parts), stretch, majorant, length)  # type: ignore[arg-type]
+
+    def after(self, before: Vector3, own: Majorant) -> Majorant | None:
+        """Majorant of a map after others; None if it is not known."""
+        if before.stretch is None or before.known_majorant is None:
+            return None
+        (bend, tear), (size, _) = before.known_majorant, before.stretch
+        if own[1] is not None and bend is not None:
+            return None
+        over = own[1] if size in (None, "1.0") else own[1] and self.name(f"ratio({own[1]}, {size})")
+        return self.joined((None, tear), (self.plus(bend, self.times(size, own[0])), over))
 
     def inverse(self, b: Scalar) -> Scalar:
         """Reciprocal of a scalar."""
@@ -202,6 +253,11 @@ class Tape:
     def dot(self, a: Slopes, b: Slopes) -> str | None:
         """Dot product of two rows."""
         total: str | None = None
+        terms = polynomials.dot(a, b, self.expressions.get)
+        if terms is not None:
+            for names, value in terms.items():
+                total = self.plus(total, self.times(*names), "+" if value > 0 else "-")
+            return total and self.times(repr(abs(next(iter(terms.values())))), total)
         for x, y in zip(a, b, strict=True):
             total = self.plus(total, self.times(x, y))
         return total

@@ -70,9 +70,9 @@ def loops(root: Node, loops: Sequence[Loop], precision: Precision, device: Devic
     """
     if device == "cpu":
         return cpu.compile_loops(link(root), tuple(loops), precision)
-    from . import cuda
+    from . import cuda_launching
 
-    return cuda.compile_loops(link(root), tuple(loops), precision)
+    return cuda_launching.compile_loops(link(root), tuple(loops), precision)
 
 
 def cells(root: Node, precision: Precision) -> Cells:

@@ -80,19 +80,8 @@ def trial(formula: Formula) -> Trial:
         results.append(_derivative(root, points))
     if formula.hooks.get("select") is orbit_select:
         results.append((True, _proofs(root)))
-    field = compile_scene(root, "float64").points
-    values = field(*points)
-    step = rng.normal(size=points.shape)
-    step *= 0.999 * np.abs(values) / root.bounds.lipschitz / np.linalg.norm(step, axis=0)
-    outside = values > 0
-    broken = int((field(*(points + step))[outside] < -1e-9).sum())
-    results.append(
-        (not broken, f"bound L = {root.bounds.lipschitz:g}: broken at {broken} of {outside.sum()}")
-    )
-    beyond = ((lo > points.T) | (hi < points.T)).any(axis=1) & box.finite
-    lost = int((values[beyond] < 0).sum())
-    shown = " x ".join(f"{s:.4g}" for s in box.size)
-    results.append((not lost, f"box {shown}: {lost} of {beyond.sum()} points beyond it are inside"))
+    values = compile_scene(root, "float64").points(*points)
+    results += [_bound(root, points, values), _box(root, lo, hi, points, values)]
     inside = float((values < 0).mean())
     results.append((0 < inside < 1, f"inside: {inside:.1%} of the points in and around the box"))
     lines = [f"{'ok   ' if good else 'FAULT'} {line}" for good, line in results]
@@ -117,6 +106,33 @@ def _parity(root: Node, points: np.ndarray, expected: np.ndarray, precision: str
     typical = float(np.quantile(error, 0.99))
     good = bool(np.isfinite(values).all()) and typical < TOLERANCE[precision]
     return good, f"{precision}: 99% of the values within {typical:.1e} of the reference"
+
+
+def _bound(root: Node, points: np.ndarray, values: np.ndarray) -> tuple[bool, str]:
+    """Search for points inside the balls that the Lipschitz bound excludes."""
+    bound, outside = root.bounds.lipschitz, values > 0
+    step = np.random.default_rng(2).normal(size=points.shape)
+    step *= 0.999 * np.abs(values) / bound / np.linalg.norm(step, axis=0)
+    field = compile_scene(root, "float64").points
+    broken = int((field(*(points + step))[outside] < -1e-9).sum())
+    line = f"bound L = {bound:g}: broken at {broken} of {outside.sum()}"
+    if not broken or root.bounds.exterior_only:
+        return not broken, line
+    near = points + NEAR * step / np.linalg.norm(step, axis=0)
+    slope = np.abs(field(*near) - values).max() / NEAR
+    return False, f"{line}; slopes up to {slope:.3g}: expected a larger lipschitz"
+
+
+def _box(
+    root: Node, lo: np.ndarray, hi: np.ndarray, points: np.ndarray, values: np.ndarray
+) -> tuple[bool, str]:
+    """Search for points inside the solid and outside its bounding box."""
+    if not root.bounds.box.finite:
+        return True, "no bounding box: the solid is endless; @formula.bounds declares one"
+    beyond = ((lo > points.T) | (hi < points.T)).any(axis=1)
+    lost = int((values[beyond] < 0).sum())
+    shown = " x ".join(f"{s:.4g}" for s in root.bounds.box.size)
+    return not lost, f"box {shown}: {lost} of {beyond.sum()} points beyond it are inside"
 
 
 def _proofs(root: Node) -> str:

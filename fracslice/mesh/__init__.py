@@ -1,5 +1,5 @@
 """Mesh extraction, connected components, cleaning, checks and solids."""
 
-from fracslice.mesh.model import Mesh
+from .model import Mesh
 
 __all__ = ["Mesh"]

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .._native import corners_by_vertex
 from .fit import OFF, UPRIGHT, Fit
 from .model import Mesh
 from .pieces import rows
-from .topology import corners_by_vertex
 
 ANGLES = 0.6, 0.3, 0.1
 """Minimum sines of the elevation of a tip above the planes of the triangles it replaces."""

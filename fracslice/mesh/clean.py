@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fracslice._native import touching, turned
-from fracslice.formulas.algebra import dot, length
-from fracslice.mesh.model import Mesh
-from fracslice.mesh.quantisation import (
+from .._native import touching, turned
+from ..formulas.algebra import dot, length
+from .model import Mesh
+from .quantisation import (
     NO_EDITS,
     NO_PLANES,
     UNMOVED,

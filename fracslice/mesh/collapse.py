@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fracslice._native import Reduction
-from fracslice.mesh.model import Mesh
-from fracslice.work import Work, chunks
+from .._native import Reduction
+from ..work import Work, chunks
+from .model import Mesh
 
 STAGES = (1e-3, 0.25, 0.5, 0.75, 1.0)
 """Fractions of the tolerance, in the order in which they are spent: cheap collapses first."""

@@ -7,10 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fracslice.errors import MeshError
-
-PIECES = 0.05
-"""Minimum fraction of the material in bodies thinner than a voxel for a note on thin walls."""
+from ..errors import MeshError
 
 
 @dataclass(frozen=True)
@@ -20,7 +17,7 @@ class Removed:
     Attributes
     ----------
     bodies : int
-        Removed bodies.
+        Removed bodies. Those outside the part around the bodies that stay are never meshed, and not counted.
     bodies_mm3 : float
         Their volume, mm3.
     cavities : int
@@ -64,7 +61,7 @@ class Shells:
 
 
 def choose(
-    shells: Shells, *, keep: str = "all", dust_mm3: float = 0.0, cavities: str = "keep"
+    shells: Shells, *, keep: int | None = None, dust_mm3: float = 0.0, cavities: str = "keep"
 ) -> tuple[NDArray[np.bool_], Removed]:
     """Choose bodies and cavities.
 
@@ -74,8 +71,8 @@ def choose(
     ----------
     shells : Shells
         All shells; volumes in mm3.
-    keep : {"all", "largest"}, optional
-        Bodies to keep.
+    keep : int, optional
+        Number of the largest bodies that stay; all by default.
     dust_mm3 : float, optional
         Bodies of less volume are removed, mm3.
     cavities : {"keep", "fill"}, optional
@@ -86,7 +83,7 @@ def choose(
     ndarray of bool, shape (s,)
         True for each shell that stays.
     Removed
-        What is removed.
+        The components to remove.
 
     Raises
     ------
@@ -95,8 +92,8 @@ def choose(
     ValueError
         For an unknown choice.
     """
-    if keep not in ("all", "largest") or cavities not in ("keep", "fill"):
-        raise ValueError(f"no such choice: keep={keep!r}, cavities={cavities!r}")
+    if cavities not in ("keep", "fill"):
+        raise ValueError(f"no such choice: cavities={cavities!r}")
     hollow = shells.volumes < 0
     material = shells.volumes if cavities == "fill" else shells.solid_volumes
     stays = ~hollow & (material >= dust_mm3)
@@ -104,8 +101,9 @@ def choose(
         stays &= shells.parent < 0
     if not stays.any():
         raise MeshError(f"nothing would be left: every body is smaller than {dust_mm3:g} mm3")
-    if keep == "largest":
-        stays &= np.arange(len(stays)) == np.argmax(np.where(hollow, 0, material))
+    if keep is not None:
+        largest = np.argsort(np.where(stays, -material, 0), kind="stable")[:keep]
+        stays &= np.isin(np.arange(len(stays)), largest)
     lost = ~hollow & ~stays
     filled = hollow & stays[shells.body] & (cavities == "fill")
     open_cavities = hollow & stays[shells.body] & ~filled

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from ..volume.lattice import BRICK
 from ..work import Work
 from .crossings import Refiner
 from .model import Mesh
-from .projection import TrustRegions, project
+from .projection import project
 
 if TYPE_CHECKING:
     from .._native import Cells
@@ -101,7 +100,7 @@ class SurfaceContours:
         MeshError, Cancelled
             As `contour`.
         """
-        from .._native import Contouring
+        from .._native import Contouring, trust_regions
 
         cells, signs = self._cells, self.signs
         surface = Contouring(cells, first, last, *self._placement)
@@ -110,7 +109,10 @@ class SurfaceContours:
             called(surface.advance, end, known.first, known.t, known.normals)
         vertices, triangles, count, cases, to_means = surface.finish()
         features = vertices[count:]
-        regions = partial(_trust_regions, (features, cases, to_means), self._placement)
+
+        def regions(which: np.ndarray, inside: np.ndarray) -> np.ndarray:
+            return trust_regions(features, cases, to_means, which, inside, *self._placement)
+
         project(self.root, features, regions, signs.voxel, work)
         mesh, border = Mesh(vertices, triangles), np.inf
         if last < len(signs.index):  # Unused vertices belong to the next piece.
@@ -154,18 +156,6 @@ def layers(bricks: SignBricks, most: int) -> list[tuple[int, int]]:
             size = 0
         size += count
     return list(zip(cuts, [*cuts[1:], len(counts)], strict=True))
-
-
-def _trust_regions(
-    features: tuple[np.ndarray, np.ndarray, np.ndarray],
-    placement: tuple[tuple[float, float, float], float, float],
-    which: np.ndarray,
-    inside: np.ndarray,
-) -> TrustRegions:
-    """Trust regions of feature vertices."""
-    from .._native import trust_regions
-
-    return TrustRegions(*trust_regions(*features, which, inside, *placement))
 
 
 def placement(bricks: Bricks | SignBricks) -> tuple[tuple[float, float, float], float, float]:

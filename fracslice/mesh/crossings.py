@@ -7,18 +7,16 @@ fold a mesh or make it self-intersect if its triangles stay in their cells.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from .._native import Cells, RootLoops
 from ..kernel import Field
 from ..work import Work
-from .roots import MOST, QUICK, Roots
+from .roots import MOST, QUICK, SURE, Roots
 
-SURE = 1e-4
-"""Length of Newton's last step, as a fraction of a voxel, below which a root is exact: the error is of the
-order of its square.
-"""
+Point = tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +36,67 @@ class Crossings:
     first: int
     t: np.ndarray
     normals: np.ndarray
+
+
+class Search(Protocol):
+    """Search for intersections on numbered grid edges."""
+
+    def memory(self, size: int) -> tuple[np.ndarray, np.ndarray]:
+        """Allocate memory for intersections.
+
+        Parameters
+        ----------
+        size
+            Number of intersections.
+
+        Returns
+        -------
+        tuple of ndarray
+            Positions along the edges, float64 [size], and normals, float32 [3, size].
+        """
+
+    def find(self, begin: int, end: int, t: np.ndarray, normals: np.ndarray) -> None:
+        """Find intersections `begin` to `end` - 1.
+
+        Parameters
+        ----------
+        begin, end
+            Numbers between bricks.
+        t, normals
+            Receive the positions and the normals; rows are contiguous.
+        """
+
+
+class LaneSearch:
+    """Search by native code.
+
+    Parameters
+    ----------
+    root
+        Field.
+    fast, exact
+        Its loops in float32 and float64.
+    cells
+        Grid cells with sign changes.
+    origin, voxel
+        First grid point and spacing, scene units.
+    """
+
+    def __init__(
+        self, root: Field, fast: Roots, exact: Roots, cells: Cells, origin: Point, voxel: float
+    ) -> None:
+        loops = fast.native("find"), exact.native("find"), exact.native("polish")
+        entry = root.kernel("cpu", "float64").entry
+        self._loops = RootLoops(fast.width, fast.batch, *loops, entry, (QUICK, MOST), SURE)
+        self._cells, self._placement = cells, (origin, voxel)
+
+    def memory(self, size: int) -> tuple[np.ndarray, np.ndarray]:
+        """See `Search.memory`."""
+        return np.empty(size), np.empty((3, size), np.float32)
+
+    def find(self, begin: int, end: int, t: np.ndarray, normals: np.ndarray) -> None:
+        """See `Search.find`."""
+        self._cells.find_crossings(begin, end, *self._placement, self._loops, t, normals)
 
 
 class Refiner:
@@ -63,17 +122,18 @@ class Refiner:
         self,
         root: Field,
         cells: Cells,
-        origin: tuple[float, float, float],
+        origin: Point,
         voxel: float,
         work: Work | None = None,
     ) -> None:
-        work = work or Work()
-        fast, exact = (Roots(root, precision, voxel, work.device) for precision in ("float32", "float64"))
-        loops = fast.native("find"), exact.native("find"), exact.native("polish")
-        entry = root.kernel(work.device, "float64").entry
-        self._loops = RootLoops(fast.width, fast.batch, *loops, entry, (QUICK, MOST), SURE)
-        self._placement = origin, voxel
-        self._cells, self._work = cells, work
+        self._cells, self._work = cells, work or Work()
+        fast, exact = (Roots(root, p, voxel, self._work.device) for p in ("float32", "float64"))
+        if fast.on_gpu:
+            from .cuda_crossings import CudaSearch
+
+            self._search: Search = CudaSearch(fast, exact, cells, origin, voxel)
+        else:
+            self._search = LaneSearch(root, fast, exact, cells, origin, voxel)
         self._memory: tuple[np.ndarray, np.ndarray] = np.empty(0), np.empty((3, 0), np.float32)
         self._first, self._end = 0, 0  # computed intersections: first in memory, one past the last
 
@@ -103,8 +163,7 @@ class Refiner:
         known, end = max(self._end - begin, 0), max(self._end, end)
         t, normals = self._space(begin, end - begin, known)
         if end > self._end:
-            new = t[known:], normals[:, known:]
-            self._cells.find_crossings(begin + known, end, *self._placement, self._loops, *new)
+            self._search.find(begin + known, end, t[known:], normals[:, known:])
             self._end = end
         return Crossings(begin, t, normals)
 
@@ -115,7 +174,7 @@ class Refiner:
         memory, here = self._memory, begin - self._first
         if here + size > len(memory[0]):
             if 2 * size > len(memory[0]):
-                self._memory = np.empty(2 * size), np.empty((3, 2 * size), np.float32)
+                self._memory = self._search.memory(2 * size)
             for old, new in zip(memory, self._memory, strict=True):
                 new[..., :known] = old[..., here : here + known]
             self._first, here = begin, 0

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fracslice.mesh.collapse import Collapsed
-from fracslice.mesh.model import Mesh
-from fracslice.mesh.nearest import Nearest
-from fracslice.mesh.self_intersections import self_intersecting_triangles
-from fracslice.mesh.topology import component_sizes, connected_components
-from fracslice.mesh.tree import build
-from fracslice.work import Work
+from .._native import connected_components
+from ..work import Work
+from .collapse import Collapsed
+from .model import Mesh
+from .nearest import Nearest
+from .self_intersections import self_intersecting_triangles
+from .topology import component_sizes
+from .tree import build
 
 
 class Examination:

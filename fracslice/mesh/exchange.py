@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from fracslice.common.extras import lacking
-from fracslice.errors import MeshError
-from fracslice.providers import provider
+from ..common.extras import lacking
+from ..errors import MeshError
+from ..providers import provider
 
 if TYPE_CHECKING:
     import trimesh
 
-    from fracslice.mesh.model import Mesh
+    from .model import Mesh
 
 CLAY = "#efe3d0"
 

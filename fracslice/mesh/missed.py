@@ -7,17 +7,17 @@ from collections.abc import Callable, Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from fracslice._native import near
-from fracslice.mesh.model import Mesh
-from fracslice.mesh.nearest import Nearest
-from fracslice.volume import Plan
-from fracslice.volume.accuracy import NEAR, surface_error, surface_points
-from fracslice.work import Work
+from .._native import near
+from ..volume import Plan
+from ..volume.accuracy import NEAR, surface_error, surface_points
+from ..work import Work
+from .model import Mesh
+from .nearest import Nearest
 
 POINTS = 256
 """Random points on the field's surface, besides its extreme points."""
 
-NEARBY, FARTHER = 3.0, 4.0
+NEARBY, FARTHER = 2.5, 2.0
 """First distance within which triangles are searched, voxels, and its growth."""
 
 

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fracslice.mesh.exchange import Exchange
-from fracslice.mesh.topology import Sizes, component_sizes, edge_topology
+from ..common.digits import counted
+from .exchange import Exchange
+from .topology import Sizes, component_sizes, edge_topology
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -43,17 +44,23 @@ class Mesh(Exchange):
     vertices: NDArray[np.float64]
     triangles: NDArray[np.int32]
     colours: NDArray[np.uint8] | None = None
-    scalars: Mapping[str, NDArray[np.float32]] = field(default_factory=lambda: MappingProxyType({}))
+    scalars: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name, kind in (("vertices", np.float64), ("triangles", np.int32)):
             array = np.asarray(getattr(self, name), kind).view()
             array.flags.writeable = False
             object.__setattr__(self, name, array)
+        object.__setattr__(self, "scalars", MappingProxyType(dict(self.scalars)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle and copy the arrays, as mapping proxies and read-only flags are not."""
+        return Mesh, (self.vertices, self.triangles, self.colours, dict(self.scalars))
 
     def __repr__(self) -> str:
         x, y, z = self.size
-        counts = f"{len(self.triangles)} triangles, {len(self.vertices)} vertices"
+        triangles, vertices = len(self.triangles), len(self.vertices)
+        counts = f"{counted(triangles, 'triangle')}, {counted(vertices, 'vertex', 'vertices')}"
         return f"<{type(self).__name__} of {counts}, {x:.6g} x {y:.6g} x {z:.6g}>"
 
     @property
@@ -77,7 +84,7 @@ class Mesh(Exchange):
         """Low and high corner of the bounding box, float64 [2, 3]; zeros for an empty mesh."""
         if not len(self.vertices):
             return np.zeros((2, 3))
-        from fracslice._native import bounds
+        from .._native import bounds
 
         return np.array(bounds(self.vertices, 1))
 
@@ -172,7 +179,7 @@ class Mesh(Exchange):
         Mesh
             The selection; this mesh if nothing is removed.
         """
-        from fracslice._native import selected
+        from .._native import selected
 
         if self.colours is not None or self.scalars:
             used = np.zeros(len(self.vertices), bool)

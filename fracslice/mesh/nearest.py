@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fracslice._native import Nearest as _Nearest
-from fracslice.mesh.model import Mesh
-from fracslice.mesh.tree import Tree, build
-from fracslice.work import Work, chunks
+from .._native import Nearest as _Nearest
+from ..work import Work, chunks
+from .model import Mesh
+from .tree import Tree, build
 
 CHUNK = 1 << 17
 """Triangles between two checks for cancellation."""

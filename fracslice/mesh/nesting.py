@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fracslice._native import nesting as _nesting
-from fracslice.mesh.model import Mesh
+from .._native import nesting as _nesting
+from .model import Mesh
 
 
 class Nesting(NamedTuple):

@@ -107,7 +107,8 @@ class Pointed:
             self.join(pointed, piece.end)
 
     def join(self, piece: PointedPiece, end: float) -> None:
-        """Add the pointed vertices of a piece, and those at its seam with the piece before.
+        """Add the pointed vertices of a piece, or of consecutive ones, and those at its seam with the piece
+        before.
 
         Parameters
         ----------
@@ -125,6 +126,23 @@ class Pointed:
             self._points.append(_pointed(both, seam - reach, seam + reach, self._threads))
         self._points.append(piece.points)
         self._tail, self._seam = piece.tail, end
+
+    def before(self, head: Mesh) -> PointedPiece:
+        """Pointed vertices of the pieces so far.
+
+        Parameters
+        ----------
+        head : Mesh
+            Triangles at the begin of the first piece.
+
+        Returns
+        -------
+        PointedPiece
+            As for one piece.
+        """
+        if self.rough:
+            return PointedPiece(np.concatenate(self._points)[: MANY + 1], NOTHING, NOTHING)
+        return PointedPiece(self.points, head, self._tail)
 
     @property
     def rough(self) -> bool:

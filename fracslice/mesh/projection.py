@@ -3,44 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
+from .. import _native
 from ..kernel import Field
 from ..work import Work, chunks
-from .roots import Roots
+from .roots import MOST, QUICK, Roots
 
-NEAR, CONVERGED = 1e-9, 1e-8
-"""Values of |f| in voxels: below `NEAR` a point needs no projection (a corner has no gradient to follow); a
-projected point should be below `FOUND`.
+TrustRegions = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""Function of point numbers, [n], and of a mask of the interior ones, [n]; float64 [4, 3, n], scene units.
+
+The rows are the lower and upper corners of boxes that the points must not leave, which may be flat; points in
+the boxes or on their boundaries where the field has the opposite sign, or NaN; and points in the boxes in the
+middle of the known part of the surface there, or NaN.
 """
 
-
-@dataclass(frozen=True, eq=False)
-class TrustRegions:
-    """Boxes that points must not leave.
-
-    Attributes
-    ----------
-    low, high
-        Corners of the boxes, float64 [3, n], scene units; a box may be flat.
-    other
-        Points in the boxes or on their boundaries where the field has the opposite sign, [3, n], or None.
-    middle
-        Points in the boxes in the middle of the known part of the surface there, [3, n], or None.
-    """
-
-    low: np.ndarray
-    high: np.ndarray
-    other: np.ndarray | None = None
-    middle: np.ndarray | None = None
+AT_ONCE = 1 << 17
+"""Points projected between two checks for cancellation."""
 
 
 def project(
     root: Field,
     points: np.ndarray,
-    trust_regions: Callable[[np.ndarray, np.ndarray], TrustRegions],
+    trust_regions: TrustRegions,
     voxel: float,
     work: Work | None = None,
 ) -> None:
@@ -56,10 +42,9 @@ def project(
     root
         Field.
     points
-        Points, float64 [n, 3], scene units.
+        Points, float64 [n, 3], contiguous, scene units.
     trust_regions
-        Function of point numbers and of a mask of the interior ones, returns their trust regions. It may
-        read these points, not others.
+        Trust regions of some points. It is called by several threads and may read these points, not others.
     voxel
         Voxel size, scene units.
     work
@@ -70,33 +55,17 @@ def project(
     Cancelled
         If the job was cancelled; some points are moved then.
     """
-    work = work or Work()
-    kernel = root.kernel(work.device, "float64")
-    guess, exact = (Roots(root, precision, voxel, work.device) for precision in ("float32", "float64"))
-
-    def task(part: slice) -> None:
-        values = kernel.points(*points[part].T)
-        away = np.flatnonzero(np.abs(values) > NEAR * voxel)
-        if len(away):
-            own = guess.padded(away)
-            points[part.start + away] = brought(part.start + own, values[own])[:, : len(away)].T
-
-    def brought(which: np.ndarray, f: np.ndarray) -> np.ndarray:
-        p, region = np.ascontiguousarray(points[which].T), trust_regions(which, f < 0)
-        rays = np.concatenate([p, guess.lead(_relative(p, region))])
-        t, miss = exact.aimed(rays, guess.find(rays.astype(np.float32)))
-        left = np.flatnonzero(miss > CONVERGED)
-        if len(left):
-            left = exact.padded(left)
-            slow = rays.take(left, 1)
-            t[left], miss[left] = exact.aimed(slow, exact.find(slow))
-        there = np.clip(p + t * rays[3:], region.low, region.high)
-        return np.where(miss * voxel < np.abs(f), there, p)
-
-    work.map(task, chunks(len(points), kernel.batch >> 3))
+    work = work or Work()  # on the CPU: copies to a GPU and back take longer
+    guess, exact = (Roots(root, precision, voxel) for precision in ("float32", "float64"))
+    lead, find, entry = guess.native("lead"), guess.native("find"), root.kernel("cpu", "float64").entry
+    exactly = exact.native("find"), exact.native("aim")
+    loops = _native.ProjectionLoops(guess.width, lead, find, *exactly, entry, (QUICK, MOST))
+    for part in chunks(len(points), AT_ONCE):
+        work.check()
+        _native.project(points, part.start, part.stop, loops, trust_regions, voxel, work.threads)
 
 
-def anywhere(which: np.ndarray, inside: np.ndarray) -> TrustRegions:
+def anywhere(which: np.ndarray, inside: np.ndarray) -> np.ndarray:
     """Return unbounded trust regions.
 
     Parameters
@@ -108,18 +77,8 @@ def anywhere(which: np.ndarray, inside: np.ndarray) -> TrustRegions:
 
     Returns
     -------
-    TrustRegions
-        Infinite boxes.
+    ndarray
+        Infinite boxes, [4, 3, n].
     """
-    return TrustRegions(np.full((3, len(which)), -np.inf), np.full((3, len(which)), np.inf))
-
-
-def _relative(p: np.ndarray, region: TrustRegions) -> np.ndarray:
-    """Argument of `Roots.lead`: positions relative to the points, since float32 resolves distances better
-    than positions.
-    """
-    rows = np.empty((15, p.shape[1]), np.float32)
-    rows[:3], rows[3:6], rows[6:9] = p, p - region.low, region.high - p
-    rows[9:12] = np.nan if region.other is None else region.other - p
-    rows[12:] = np.nan if region.middle is None else region.middle - p
-    return rows
+    sides = np.array([-np.inf, np.inf, np.nan, np.nan])
+    return np.tile(sides[:, None, None], (1, 3, len(which)))

@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fracslice import _native
-from fracslice.errors import MeshError
-from fracslice.mesh.model import Mesh
-from fracslice.volume.bricks import SignBricks
-from fracslice.volume.lattice import BRICK
+from .. import _native
+from ..errors import MeshError
+from ..volume.bricks import SignBricks
+from ..volume.lattice import BRICK
+from .model import Mesh
 
 Frame = tuple[float, tuple[float, float, float], float]
 """Placement of vertices: scale, translation, and height below which they are moved to the bed, z = 0."""

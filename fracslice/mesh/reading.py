@@ -14,9 +14,9 @@ from xml.parsers import expat
 import numpy as np
 from numpy.typing import NDArray
 
-from fracslice.errors import MeshError
-from fracslice.mesh.model import Mesh
-from fracslice.mesh.quantisation import quantised
+from ..errors import MeshError
+from .model import Mesh
+from .quantisation import quantised
 
 STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 MILLIMETRES = {

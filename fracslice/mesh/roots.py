@@ -21,6 +21,11 @@ FRAMES = {"float32": (1e-6, 1e-5, 5e-2, 1e-6, 3e-4), "float64": (1e-9, 1e-7, 1e-
 QUICK, MOST = 8, 48
 """Steps for all segments, and further steps for those not finished."""
 
+SURE = 1e-4
+"""Length of Newton's last step, as a fraction of a voxel, below which a root is exact: the error is of the
+order of its square.
+"""
+
 LOOPS = {"float32": (find, lead), "float64": (find, polish, aim)}
 """Loops compiled for each precision."""
 
@@ -51,6 +56,10 @@ class Roots:
         Lanes.
     batch
         Segments per call that amortise its overhead.
+    runs
+        Compiled loops by name.
+    on_gpu
+        Whether they can be launched on arrays in GPU memory.
     """
 
     def __init__(self, root: Field, precision: Precision, voxel: float, device: Device = "cpu") -> None:
@@ -59,51 +68,7 @@ class Roots:
         frame = np.array([1 / voxel, small, near, reach * voxel, tight * voxel, close])
         self.frame = constant(frame, self.dtype)
         loops = root.loops(LOOPS[precision], precision, device)
-        self.width, self.batch, self._runs = loops.width, loops.batch, loops.runs
-
-    def padded(self, index: np.ndarray) -> np.ndarray:
-        """Pad segment numbers to a multiple of the lanes by repeating the last one.
-
-        Parameters
-        ----------
-        index
-            Segment numbers, int [n], n > 0.
-
-        Returns
-        -------
-        ndarray
-            Segment numbers, int [m], m a multiple of `width`.
-        """
-        return np.concatenate([index, np.repeat(index[-1:], -len(index) % self.width)])
-
-    def find(self, segments: np.ndarray) -> np.ndarray:
-        """Find the roots on segments.
-
-        Parameters
-        ----------
-        segments
-            Starts and vectors, [6, n].
-
-        Returns
-        -------
-        ndarray
-            Roots as fractions of the segments, [n]; where both ends have the same sign, the end nearer to
-            zero.
-        """
-        roots = self._stepped(segments, QUICK)
-        slow = np.flatnonzero(roots > 1)
-        if len(slow):
-            slow = self.padded(slow)
-            left = self._stepped(segments.take(slow, 1), MOST)
-            roots[slow] = np.where(left > 1, left - 2, left)
-        return roots
-
-    def _stepped(self, segments: np.ndarray, steps: int) -> np.ndarray:
-        """Run `find` with a limit of steps."""
-        roots = np.empty((1, segments.shape[1]), self.dtype)
-        self._runs["find"](self.frame, segments, roots, steps)
-        result: np.ndarray = roots[0]
-        return result
+        self.width, self.batch, self.runs, self.on_gpu = loops.width, loops.batch, loops.runs, loops.on_gpu
 
     def native(self, name: str) -> tuple[Any, ...] | Callable[..., None]:
         """Return a loop for native code.
@@ -118,44 +83,4 @@ class Roots:
         tuple or Callable
             Machine code and its constant arguments, or a Python function.
         """
-        return self._runs[name].native(self.frame)
-
-    def aimed(self, segments: np.ndarray, roots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Refine roots by one step.
-
-        Parameters
-        ----------
-        segments
-            Starts and vectors, [6, n].
-        roots
-            Roots as fractions of the segments, [n].
-
-        Returns
-        -------
-        roots : ndarray
-            Refined roots, [n].
-        miss : ndarray
-            Values of |f| there in voxels, [n].
-        """
-        out = np.empty((2, len(roots)), self.dtype)
-        out[0] = roots
-        self._runs["aim"](self.frame, segments, out)
-        return out[0], out[1]
-
-    def lead(self, trust_regions: np.ndarray) -> np.ndarray:
-        """Compute directions from points to the surface.
-
-        Parameters
-        ----------
-        trust_regions
-            Rows [15, n]: the points, the distances to the lower and upper sides of their trust regions, and
-            the vectors to a point of opposite sign and to the middle of the surface, or NaN.
-
-        Returns
-        -------
-        ndarray
-            Directions, [3, n].
-        """
-        rays = np.empty((3, trust_regions.shape[1]), self.dtype)
-        self._runs["lead"](self.frame, trust_regions, rays)
-        return rays
+        return self.runs[name].native(self.frame)

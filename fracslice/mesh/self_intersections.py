@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fracslice._native import self_intersecting_triangles as _self_intersecting_triangles
-from fracslice._native import surroundings
-from fracslice.mesh.model import Mesh
-from fracslice.mesh.tree import Tree, build
+from .._native import self_intersecting_triangles as _self_intersecting_triangles
+from .._native import surroundings
+from .model import Mesh
+from .tree import Tree, build
 
 
 def self_intersecting_triangles(

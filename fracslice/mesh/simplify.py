@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fracslice.errors import MeshError
-from fracslice.formulas.parameters import Number, validated
-from fracslice.mesh.model import Mesh
-from fracslice.scene import parse_length
-from fracslice.work import Work
+from ..errors import MeshError
+from ..formulas.parameters import Number
+from ..formulas.records import validated
+from ..scene import parse_length
+from ..work import Work
+from .model import Mesh
 
 ROUNDS, PATIENT = 200, 40
 """Maximum rounds of verification and undo, and number of the first rounds in which new collapses may replace
@@ -74,9 +75,9 @@ def simplify(mesh: Mesh, tolerance: float, work: Work | None = None) -> tuple[Me
     Cancelled
         If the work is cancelled.
     """
-    from fracslice.mesh.collapse import FIRST, Collapse
-    from fracslice.mesh.examination import Examination
-    from fracslice.mesh.topology import edge_topology
+    from .collapse import FIRST, Collapse
+    from .examination import Examination
+    from .topology import edge_topology
 
     work = work or Work()
     if isinstance(tolerance, str):

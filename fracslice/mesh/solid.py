@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fracslice.common.extras import lacking
-from fracslice.errors import MeshError
-from fracslice.mesh.model import Mesh
+from ..common.extras import lacking
+from ..errors import MeshError
+from .model import Mesh
 
 if TYPE_CHECKING:
     from manifold3d import Manifold

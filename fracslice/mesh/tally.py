@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._native import bounds
 from ..formulas.algebra import dot
-from .check import MeshReport, duplicates
 from .halo import Finished
+from .mesh_report import MeshReport
 
 
 @dataclass
@@ -47,8 +48,10 @@ class Tally:
         ends = edge_ends(mesh.triangles, piece.counted, self.threads)
         crossing = np.empty(0, np.int64)
         if len(piece.suspects):
-            among = np.zeros(len(mesh.triangles), bool)
-            among[piece.suspects] = True
+            among = None
+            if len(piece.suspects) < len(mesh.triangles):
+                among = np.zeros(len(mesh.triangles), bool)
+                among[piece.suspects] = True
             crosses = self_intersecting_triangles(mesh, threads=self.threads, among=among)
             crossing = np.flatnonzero(crosses[: piece.done])
         sizes = passed.sizes(self.threads)
@@ -62,7 +65,7 @@ class Tally:
         self.self_intersections += len(crossing)
         self.searched_triangles += int(np.searchsorted(piece.suspects, piece.done))
         self.degenerate_triangles += int(sizes.flat[0])
-        self.duplicate_triangles += duplicates(mesh.triangles[crossing])
+        self.duplicate_triangles += _duplicates(mesh.triangles[crossing])
         self.volume += float(sizes.volumes[0] + dot(apex, sizes.vectors[0]) / 3)  # cones over the origin
         self.area += float(sizes.areas[0])
         if len(piece.points):
@@ -122,3 +125,9 @@ class Tally:
             area_mm2=self.area,
             bbox_mm=((x0, y0, z0), (x1, y1, z1)),
         )
+
+
+def _duplicates(triangles: NDArray[np.int32]) -> int:
+    """Number of triangles with the three corners of an earlier one, in any order."""
+    distinct = np.unique(np.sort(triangles, axis=1), axis=0) if len(triangles) else triangles
+    return len(triangles) - len(distinct)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..volume import Plan
 from ..volume.climbing import SLANTS, climb
-from ..volume.values import values_at
+from ..volume.evaluation import values_at
 from ..work import Work
 from .caps import Cap, Rings, best, capped, disjoint
 from .contouring import Piece

@@ -7,10 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fracslice._native import component_sizes as _component_sizes
-from fracslice._native import connected_components as _connected_components
-from fracslice._native import corners_by_vertex as _corners_by_vertex
-from fracslice._native import edge_topology as _edge_topology
+from .._native import component_sizes as _component_sizes
+from .._native import edge_topology as _edge_topology
 
 
 class EdgeTopology(NamedTuple):
@@ -86,54 +84,6 @@ def edge_ends(triangles: NDArray[np.int32], counted: NDArray[np.bool_], threads:
         Counts of edge ends and of non-manifold vertices.
     """
     return EdgeTopology(*_edge_topology(triangles, counted, threads))
-
-
-def corners_by_vertex(
-    triangles: NDArray[np.int32], vertices: int, threads: int = 0
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Corners of triangles grouped by vertex. Corner k of triangle t has the number 3 t + k.
-
-    Parameters
-    ----------
-    triangles : ndarray of int32, shape (m, 3)
-        Triangles.
-    vertices : int
-        Number of vertices.
-    threads : int, optional
-        Threads; 0 for all cores.
-
-    Returns
-    -------
-    start : ndarray of int64, shape (n + 1,)
-        Index of the first corner of each vertex.
-    corner : ndarray of int64, shape (3 m,)
-        Corners.
-    """
-    return _corners_by_vertex(triangles, vertices, threads)
-
-
-def connected_components(
-    triangles: NDArray[np.int32], vertices: int, threads: int = 0
-) -> tuple[NDArray[np.int32], int]:
-    """Connected components of a mesh. Triangles with a common vertex are connected.
-
-    Parameters
-    ----------
-    triangles : ndarray of int32, shape (m, 3)
-        Triangles.
-    vertices : int
-        Number of vertices.
-    threads : int, optional
-        Threads; 0 for all cores.
-
-    Returns
-    -------
-    ndarray of int32, shape (n,)
-        Component of each vertex, numbered by their first vertices; -1 for unused vertices.
-    int
-        Number of components.
-    """
-    return _connected_components(triangles, vertices, threads)
 
 
 class Sizes(NamedTuple):

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from .._native import near_bodies
+from ..kernel.depth import WIDE
+from ..meshjob import JOINING
 from .whole_shells import WholeShells
 
 REACH = 2
@@ -46,6 +50,21 @@ class NearBodies:
         """Number of near bodies of the pieces so far; cavities are none."""
         return int(self._near.sum())
 
+    @property
+    def bodies(self) -> NDArray[np.int64]:
+        """Shells of the near bodies of the pieces so far, ascending."""
+        return np.flatnonzero(self._near)
+
+    def include(self, bodies: NDArray[np.int64]) -> None:
+        """Add near bodies that another process searched.
+
+        Parameters
+        ----------
+        bodies : ndarray of int64, shape (k,)
+            Their shells.
+        """
+        self._near[bodies] = True
+
     def add(self, points: NDArray[np.float64], labels: NDArray[np.int32], end: float) -> None:
         """Add the next piece.
 
@@ -74,8 +93,8 @@ class NearBodies:
         self._near[near_bodies(points, labels, self._body, len(self._near), self._largest, *at)] = True
 
 
-def touching_note(near: int, voxel: float) -> tuple[str, ...]:
-    """Describe the bodies that touch at points or edges only, and the option that joins them.
+def touching_note(near: int, voxel: float, settings: Sequence[str], off: Sequence[str]) -> tuple[str, ...]:
+    """Describe the bodies that touch at points or edges only, and the options that help.
 
     Parameters
     ----------
@@ -83,16 +102,25 @@ def touching_note(near: int, voxel: float) -> tuple[str, ...]:
         Number of these bodies.
     voxel : float
         Voxel size, mm.
+    settings : sequence of str
+        Changes of the scene, such as "flake.level=3", whose bodies are several voxels wide.
+    off : sequence of str
+        Note on missing volume, if any.
 
     Returns
     -------
     tuple of str
-        One note, or none.
+        One note, which ends with `off`, or `off` if no body is near another.
     """
     if not near:
-        return ()
-    return (
-        f"{near} bodies come within two voxels of another: solids that touch at points or edges only are not "
-        f"joined, and tips thinner than a voxel come off; --thickness {3 * voxel:.2g}mm joins them, --bridge "
-        f"adds struts between separate bodies, --keep largest leaves one, a smaller voxel keeps tips",
+        return tuple(off)
+    whole = (
+        [f"--set {' --set '.join(settings)} makes them about {WIDE} voxels wide or more"] if settings else []
     )
+    width = f"{JOINING * voxel:.2g}mm"
+    options = [*whole, f"--thickness {width} or --bridge {width} joins them", "--keep largest leaves one"]
+    line = (
+        f"{near} bodies come within two voxels of another: they touch at corners or edges only, or are tips "
+        f"and walls thinner than the voxel of {voxel:.2g}mm; {', '.join(options)}"
+    )
+    return ("; ".join([line, *off]),)

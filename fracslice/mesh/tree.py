@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fracslice._native import tree as _tree
-from fracslice.mesh.model import Mesh
+from .._native import tree as _tree
+from .model import Mesh
 
 LEAF = 8
 """Triangles per leaf; equal to the constant in `fracslice/native/mesh/triangles.h`."""

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import MeshError
-from .components import PIECES, Shells
+from ..meshjob import PIECES
+from .components import Shells
 from .gathering import gathered
 from .model import Mesh
 from .pieces import Pieces

@@ -13,6 +13,7 @@ void bind_reduction(nanobind::module_& module);
 }  // namespace fracslice::mesh
 
 NB_MODULE(_native, module) {
+    nanobind::set_leak_warnings(false);  // the command exits without a search for garbage
     fracslice::volume::bind_extent(module);
     fracslice::volume::bind_signs(module);
     fracslice::mesh::bind_contour(module);

@@ -9,8 +9,8 @@ import numpy as np
 from ..common.compiled import compiled
 from ..volume import Bricks
 from ..volume.bricks import INSIDE, OUTSIDE
-from .components import Components
 from .samples import Samples
+from .solid_components import SolidComponents
 
 FAR = 255
 """Number of grid steps at which the search stops; unreached samples keep this value."""
@@ -21,7 +21,7 @@ cannot cross.
 """
 
 
-def nearer(components: Components, these: np.ndarray, others: np.ndarray) -> Samples:
+def nearer(components: SolidComponents, these: np.ndarray, others: np.ndarray) -> Samples:
     """A field that is negative nearer to some components than to others.
 
     The value is half the difference of the grid steps to either, so the border lies midway between them. The
@@ -29,7 +29,7 @@ def nearer(components: Components, these: np.ndarray, others: np.ndarray) -> Sam
 
     Parameters
     ----------
-    components : Components
+    components : SolidComponents
         Components of a sampled solid.
     these, others : int64 [k]
         Numbers of the components on the negative and on the positive side.

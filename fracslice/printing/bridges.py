@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .components import Components
 from .samples import positions
+from .solid_components import SolidComponents
 
 NONE = -1
 """Marks samples in no body and cells without an entry."""
@@ -17,7 +17,9 @@ CHUNK = 2048
 """Bricks processed at a time."""
 
 
-def struts(components: Components, bodies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def bridging_struts(
+    components: SolidComponents, bodies: np.ndarray, groups: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Struts that join n bodies with minimum total length.
 
     Each cell of the empty space belongs to its nearest body, by exact Euclidean distances (Maurer, Qi and
@@ -26,15 +28,17 @@ def struts(components: Components, bodies: np.ndarray) -> tuple[np.ndarray, np.n
 
     Parameters
     ----------
-    components : Components
+    components : SolidComponents
         Connected components of a sampled solid.
     bodies : int64 [n]
         Numbers of the components to join.
+    groups : int64 [n], optional
+        Group of each body; only bodies of one group are joined. By default all are of one.
 
     Returns
     -------
-    start, end : float64 [n - 1, 3]
-        Ends of the struts, scene units.
+    start, end : float64 [m, 3]
+        Ends of the struts, scene units: n - 1 of them for one group.
     """
     from scipy.ndimage import distance_transform_edt
     from scipy.sparse import coo_array
@@ -50,6 +54,10 @@ def struts(components: Components, bodies: np.ndarray) -> tuple[np.ndarray, np.n
     of.flat[cell] = np.arange(len(cell))
     nearest = distance_transform_edt(of == NONE, return_distances=False, return_indices=True)
     meeting = np.concatenate([_sharing(cell), _meetings(of[tuple(nearest)], body)])
+    if groups is not None:
+        meeting = meeting[groups[body[meeting[:, 0]]] == groups[body[meeting[:, 1]]]]
+    if not len(meeting):
+        return np.empty((0, 3)), np.empty((0, 3))
     pairs, ends, length = _nearest(body[meeting], place[meeting], times)
     tree = minimum_spanning_tree(coo_array((length, pairs.T), (len(bodies),) * 2)).tocoo()
     chosen = {(int(i), int(j)) for i, j in zip(*tree.coords, strict=True)}
@@ -82,7 +90,7 @@ def _nearest(pairs: np.ndarray, ends: np.ndarray, slack: int) -> tuple[np.ndarra
 
 
 def _cells(
-    components: Components, bodies: np.ndarray, times: int
+    components: SolidComponents, bodies: np.ndarray, times: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Cells of `times` samples along each side that contain bodies, once for each body in a cell.
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
+from ..common.quantiles import weighted_quantiles
 from ..errors import VolumeError
 from ..formulas import Box
 from ..kernel import Field, Kernel
@@ -26,7 +25,7 @@ AGAIN = 3.0
 """Refinement factor for fractals that appear disconnected."""
 
 
-def shown(root: Field, outer: Box, longest: float, samples: float, work: Work) -> Bricks:
+def sampled_object(root: Field, outer: Box, longest: float, samples: float, work: Work) -> Bricks:
     """Sample an object, finer until a surface appears: a plate may lie between all samples.
 
     Parameters
@@ -117,11 +116,5 @@ def _times(bricks: Bricks, thin: Walls, least: float, most: float) -> float:
     if thin.chosen(thin.width < 2 * voxel).area.sum() < least:
         return 1.0
     count = max(len(bricks), float(thin.area.sum()) / (BRICK * voxel) ** 2)
-    return float(min(2 * voxel / _thinnest(thin), (most / count) ** 0.5))
-
-
-def _thinnest(walls: Walls) -> float:
-    """Width of the thinnest hundredth, by area."""
-    order = np.argsort(walls.width, kind="stable")
-    upto = np.cumsum(walls.area[order])
-    return float(walls.width[order][np.searchsorted(upto, 0.01 * upto[-1])])
+    (thinnest,) = weighted_quantiles(thin.width, thin.area, 0.01)
+    return float(min(2 * voxel / thinnest, (most / count) ** 0.5))

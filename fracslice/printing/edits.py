@@ -47,6 +47,7 @@ class EditedField(ArrayField):
             own.exterior_only or other.exterior_only,
             max(own.steepening, other.steepening),
             own.boxless,
+            tuple(dict.fromkeys([*own.measured, *other.measured])),
         )
 
     @property

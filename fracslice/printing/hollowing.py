@@ -10,8 +10,8 @@ from ..formulas import Box, Node, cylinder, transform, union
 from ..kernel import Field
 from ..volume import Bricks, Drain
 from ..volume.grid import from_grid, to_grid
-from .components import components_of
 from .samples import Samples, positions
+from .solid_components import components_of
 
 POCKET = 0.1
 """Fraction of the largest hollow's volume below which another hollow stays solid instead of being drained."""
@@ -51,25 +51,35 @@ def hollows(solid: Bricks, wall: float, drain: float, outer: Box) -> tuple[list[
     for number in numbers[large]:
         at = (components.labels == number) & (inner.values > -inner.voxel)
         points = np.array(inner.origin) + inner.voxel * positions(inner, *np.nonzero(at))
-        holes += _drains(points, -inner.values[at], drain / 2, outer)
+        holes += _drains(points, -inner.values[at], drain / 2, outer, inner.voxel)
     cuts = [Samples(components.without(numbers[~large])), union(*map(_cylinder, holes))]
     return cuts, tuple(holes)
 
 
-def _drains(hollow: np.ndarray, depth: np.ndarray, radius: float, outer: Box) -> Iterator[Drain]:
+def _drains(
+    hollow: np.ndarray, depth: np.ndarray, radius: float, outer: Box, voxel: float
+) -> Iterator[Drain]:
     """Drain holes of one hollow: one sideways, one upwards.
 
     The first leads from the lowest point to the nearer side along x, as the plate would close a hole
     downwards. The second leads upwards from the highest point, which hangs lowest on the printer. hollow:
     points in the hollow next to its wall, [n, 3]. depth: their distances from the wall, [n].
     """
-    lowest, highest = (hollow[:, 2] - depth).argmin(), (hollow[:, 2] + depth).argmax()
-    x, y, z = hollow[lowest].tolist()
-    z -= float(depth[lowest])
+    (x, y, _), z = _middle(hollow, hollow[:, 2] - depth, voxel)
     to = outer.hi[0] + radius if x - outer.lo[0] > outer.hi[0] - x else outer.lo[0] - radius
     yield Drain((x, y, z + radius), (to, y, z + radius), radius)
-    x, y, z = hollow[highest].tolist()
-    yield Drain((x, y, z - radius), (x, y, outer.hi[2] + radius), radius)
+    (x, y, _), z = _middle(hollow, -hollow[:, 2] - depth, voxel)
+    yield Drain((x, y, -z - radius), (x, y, outer.hi[2] + radius), radius)
+
+
+def _middle(points: np.ndarray, low: np.ndarray, voxel: float) -> tuple[list[float], float]:
+    """Of the lowest points, within half a voxel, the one nearest their middle, and the lowest value.
+
+    The floor of a box has no lowest point. A hole in its corner would cut the box's edge.
+    """
+    floor = points[low <= low.min() + voxel / 2]
+    nearest = np.square(floor - floor.mean(axis=0)).sum(axis=1).argmin()
+    return floor[nearest].tolist(), float(low.min())
 
 
 def _cylinder(drain: Drain) -> Node:

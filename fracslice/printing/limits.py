@@ -10,7 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..errors import SceneError
-from ..formulas.parameters import Number, validate
+from ..formulas.parameters import Number
+from ..formulas.records import attribute, validate
 from ..scene.lengths import Length
 
 
@@ -50,27 +51,17 @@ class Limits:
         For an invalid value.
     """
 
-    speck: float = 0.02
-    cup: float = 1.0
-    deep: float = 2.0
-    wall: float = 0.1
-    floor: float = 0.1
-    thin: float = 1.0
-    overhang: float = 5.0
-    span: float = 20.0
-    neck: float = 50.0
-    heavy: float = 20.0
-    density: float = 1.1
+    speck: float = attribute(Number, 0.02, "an area", least=0)
+    cup: float = attribute(Number, 1.0, "an area", least=0)
+    deep: float = attribute(Length, 2.0, "a height", zero=True)
+    wall: float = attribute(Length, 0.1, "a thickness", zero=True)
+    floor: float = attribute(Length, 0.1, "a thickness", zero=True)
+    thin: float = attribute(Number, 1.0, "an area", least=0)
+    overhang: float = attribute(Length, 5.0, "a length")
+    span: float = attribute(Length, 20.0, "a length")
+    neck: float = attribute(Number, 50.0, "a ratio", above=0)
+    heavy: float = attribute(Number, 20.0, "an area", least=0)
+    density: float = attribute(Number, 1.1, "of the resin", above=0)
 
     def __post_init__(self) -> None:
-        validate(self, _KINDS, SceneError)
-
-
-_KINDS = {
-    **dict.fromkeys(("speck", "cup", "thin", "heavy"), Number(0.0, "an area", least=0)),
-    "deep": Length(2.0, "a height", zero=True),
-    **dict.fromkeys(("overhang", "span"), Length(5.0, "a length")),
-    "neck": Number(50.0, "a ratio", above=0),
-    **dict.fromkeys(("wall", "floor"), Length(0.1, "a thickness", zero=True)),
-    "density": Number(1.1, "of the resin", above=0),
-}
+        validate(self, SceneError)

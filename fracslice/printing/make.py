@@ -7,34 +7,28 @@ Distances come from the field where its values are distances, else from its samp
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import VolumeError
 from ..kernel import Field
-from ..meshjob import DUST
+from ..meshjob import PIECES
 from ..scene import Print
-from ..volume import Bricks, Plan, extent, sample_scene
+from ..volume import Plan, sample_scene
 from ..volume.sizing import Sizing
 from ..work import Work
 from .edits import edited_field
+from .preparation import FINE, SHARP, Preparation, large_bodies
 from .standing import standing
 
 # Measuring needs Numba and SciPy, whose import takes as long as a small mesh: import where needed.
 if TYPE_CHECKING:
-    from .components import Components
     from .samples import Samples
 
-COARSE, FINE = 128, 640
-"""Minimum and maximum number of samples along the longest side for measuring lengths."""
-
-SHARP = 6
-"""Samples across a length to thicken, close or keep, as far as `FINE` permits."""
-
-THIN = 1.0
-"""Area of walls or gaps that samples may miss, from which finer samples are taken, mm^2."""
+REPEATS = 4
+"""Maximum number of times that fragments are joined."""
 
 
 def printable(planned: Plan, size: Sizing, how: Print, work: Work | None = None) -> tuple[Plan, float]:
@@ -72,7 +66,7 @@ def printable(planned: Plan, size: Sizing, how: Print, work: Work | None = None)
             raise VolumeError(
                 f"{name} {length:g} mm: expected at most the object's size, {size.longest:g} mm"
             )
-    job = _Preparation(planned, size, how, work or Work())
+    job = _Edits(planned, size, how, work or Work())
     for stage, change in job.changes():
         job.work.check()
         job.work.progress(stage, 0.0)
@@ -81,37 +75,8 @@ def printable(planned: Plan, size: Sizing, how: Print, work: Work | None = None)
     return standing(job.planned, how, job.scale), job.scale
 
 
-@dataclass
-class _Preparation:
-    """The object during its edits."""
-
-    planned: Plan
-    sizing: Sizing
-    how: Print
-    work: Work
-    scale: float = 1.0
-    """mm per scene unit, set once the bodies that stay are known."""
-    known: Components | None = None
-    """Components, once computed."""
-
-    @property
-    def size(self) -> float:
-        """Approximate longest side, mm."""
-        return self.sizing.longest
-
-    @property
-    def root(self) -> Field:
-        """The current field."""
-        return self.planned.root
-
-    def put(self, root: Field) -> None:
-        """Replace the current field."""
-        self.planned = replace(self.planned, root=root)
-
-    def bound(self) -> None:
-        """Recompute the extent of the object."""
-        extents = extent(self.root, max(self.planned.box.size) / self.planned.voxel, self.work)
-        self.planned = replace(self.planned, box=extents.box, outer=extents.outer, tips=extents.tips)
+class _Edits(Preparation):
+    """The edits."""
 
     @property
     def grown(self) -> bool:
@@ -123,7 +88,7 @@ class _Preparation:
         how = self.how
         if how.cavities == "fill":
             yield "filling cavities", self.filled
-        if how.keep == "largest":
+        if how.bodies is not None:
             before = self.root
             yield "keeping the largest", self.largest
             if self.root is not before:
@@ -136,42 +101,12 @@ class _Preparation:
         if how.bridge:
             yield "bridging", self.bridged
         if self.grown:
-            middle = self.planned.outer.centre
-            self.bound()
-            self.planned = replace(self.planned, outer=self.planned.outer.about(middle))
+            self.enlarged()
+            yield "joining fragments", self.rejoined
             if how.thickness and self.known and self.known.solid.voxel < self.planned.voxel:
                 yield "filling pores", self.unsealed
         if how.hollow:
             yield "hollowing", self.hollowed
-
-    def sampled(self, length: float = np.inf) -> Bricks:
-        """Samples of the current object, fine enough for a length in mm."""
-        samples = min(max(COARSE, SHARP * self.size / length), FINE)
-        if length < 2 * self.size / samples:
-            least = 2 * self.size / samples
-            raise VolumeError(f"{length:g} mm in {self.size:g} mm: expected at least {least:.3g} mm, or 0")
-        from .connectivity import shown
-
-        return shown(self.root, self.planned.outer, max(self.planned.box.size), samples, self.work)
-
-    def connected(self) -> Components:
-        """Components of samples that resolve connectivity; shared by cavities, bodies and bridges."""
-        from .components import components_of
-        from .connectivity import resolved
-
-        if self.known is None:
-            coarse = self.sampled()
-            components = components_of(coarse)
-            unit = max(self.planned.box.size) / self.size
-            bricks = resolved(self.root, coarse, THIN * unit**2, len(_large(components)) > 1, self.work)
-            self.known = components if bricks is coarse else components_of(bricks)
-        return self.known
-
-    def seen(self, length: float) -> Samples:
-        """The samples of `sampled` as an interpolated field."""
-        from .samples import Samples
-
-        return Samples(self.sampled(length))
 
     def filled(self) -> Field:
         """Fill enclosed cavities."""
@@ -188,11 +123,11 @@ class _Preparation:
         return edited_field(self.root, "add", nearer(components, cavities, np.array([0])))
 
     def largest(self) -> Field:
-        """Keep only the largest body."""
+        """Keep only the largest bodies."""
         from .border import nearer
 
         components = self.connected()
-        first, others = np.split(components.bodies, [1])
+        first, others = np.split(components.bodies, [self.how.bodies or 0])
         if not len(others):
             return self.root
         return edited_field(self.root, "keep", nearer(components, first, others))
@@ -200,23 +135,50 @@ class _Preparation:
     def bridged(self) -> Field:
         """Join bodies by struts of minimum total length, and drop dust."""
         from .border import nearer
-        from .bridges import struts
+        from .bridges import bridging_struts
         from .capsules import capsules
 
         components = self.connected()
-        large = _large(components)
+        large = large_bodies(components)
         dust = np.setdiff1d(components.bodies, large)
-        start, end = struts(components, large)
+        start, end = bridging_struts(components, large)
         if len(dust):
             self.put(edited_field(self.root, "cut", nearer(components, dust, large)))
         if not len(start):
             return self.root
-        width = max(self.how.bridge, self.how.thickness) / self.scale
-        return self.with_capsules(capsules(start, end, width / 2, components.solid), width)
+        return self.with_capsules(capsules(start, end, self.width / 2, components.solid), self.width)
+
+    @property
+    def width(self) -> float:
+        """Diameter of struts and minimum thickness of walls, scene units."""
+        return max(self.how.bridge, self.how.thickness) / self.scale
+
+    def rejoined(self) -> Field:
+        """Join the fragments of bodies that the voxels of the mesh break, and drop broken tips."""
+        from .border import nearer
+        from .capsules import capsules
+        from .fragments import fragments
+        from .solid_components import components_of
+
+        known, voxel = self.known, max(self.planned.voxel, max(self.planned.box.size) / FINE)
+        for _ in range(REPEATS if known or self.how.bridge else 0):
+            meshed = components_of(sample_scene(replace(self.planned, voxel=voxel), self.work))
+            if meshed.thin_share >= PIECES:  # crumbs of walls; `thickness` is for them
+                break
+            tips, others, (start, end) = fragments(meshed, None if self.how.bridge else known)
+            if len(tips):
+                self.put(edited_field(self.root, "cut", nearer(meshed, tips, others)))
+            if not len(start):
+                break
+            grid = replace(meshed.solid, voxel=min(voxel, self.width / SHARP))
+            self.put(self.with_capsules(capsules(start, end, self.width / 2, grid), self.width))
+            self.known = known
+            self.enlarged()
+        return self.root
 
     def unsealed(self) -> Field:
         """Fill cavities that are sealed only at the sample spacing of the mesh."""
-        from .components import components_of
+        from .solid_components import components_of
 
         fine, self.known = self.known, components_of(sample_scene(self.planned, self.work))
         return self.without(self.known.sealed(fine)) if fine else self.root
@@ -239,21 +201,25 @@ class _Preparation:
         """Add balls as wide as the minimum thickness along the medial axis of thinner walls.
 
         They restore what opening with such a ball would remove (Serra 1982), along the part of the medial
-        axis between opposite faces. Pores that they seal are filled.
+        axis between opposite faces. Bodies that touch are joined. Pores that this seals are filled.
         """
         from .capsules import capsules
-        from .components import components_of
+        from .contacts import contacts
         from .samples import together
+        from .solid_components import components_of
         from .thin_features import all_walls
 
         solid, least = self.seen(self.how.thickness), self.how.thickness / self.scale
         middle = all_walls(self.root, solid, least, self.work).middle
         middle = middle[_spaced(middle, solid.bricks.voxel)]
-        if not len(middle):
+        before, start, end = components_of(solid.bricks), *np.empty((2, 0, 3))
+        if not self.root.bounds.exterior_only:
+            start, end = contacts(before, large_bodies(before), self.root.kernel(), self.work)
+        if not len(middle) + len(start):
             return self.root
-        balls = capsules(middle, middle, least / 2, solid.bricks)
+        start, end = np.concatenate([middle, start]), np.concatenate([middle, end])
+        balls = capsules(start, end, least / 2, solid.bricks)
         self.put(self.with_capsules(balls, least))
-        before = components_of(solid.bricks)
         self.known = components_of(together(solid.bricks, balls.bricks))
         return self.without(self.known.sealed(before))
 
@@ -285,9 +251,3 @@ def _spaced(points: np.ndarray, voxel: float) -> np.ndarray:
     cells -= cells.min(0)
     _, first = np.unique(np.ravel_multi_index(tuple(cells.T), tuple(cells.max(0) + 1)), return_index=True)
     return np.asarray(first)
-
-
-def _large(components: Components) -> np.ndarray:
-    """Numbers of the bodies that are not dust."""
-    bodies = components.bodies
-    return np.asarray(bodies[components.count[bodies] > DUST * components.count[components.inside].sum()])

@@ -48,24 +48,6 @@ class Problem:
         )
 
 
-def counted(things: Sequence[object], one: str, more: str = "") -> str:
-    """Count with its noun: "1 suction cup", "2 suction cups".
-
-    Parameters
-    ----------
-    things : sequence
-        Things to count.
-    one, more : str
-        Singular and plural; the plural is the singular and an s if not given.
-
-    Returns
-    -------
-    str
-        The number and the noun.
-    """
-    return f"{len(things)} {one if len(things) == 1 else more or one + 's'}"
-
-
 def mended(problems: Sequence[Problem]) -> dict[str, str]:
     """Print settings that mend as many problems as they can.
 

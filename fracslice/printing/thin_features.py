@@ -15,13 +15,13 @@ import numpy as np
 from ..errors import VolumeError
 from ..kernel import Field, Kernel
 from ..volume import Lattice, sample
-from ..volume.values import values_at
+from ..volume.evaluation import values_at
 from ..work import Work
-from .crossings import crossed, slopes
+from .edge_crossings import edge_crossings, slopes
 from .offset_field import OffsetField
 from .rays import Rays, first_negative
 from .samples import Samples
-from .walls import AT_ONCE, OPPOSITE, Direction, Walls, gathered, walls
+from .walls import AT_ONCE, OPPOSITE, Direction, Walls, in_blocks, walls
 
 NEAR = 0.9
 """Offset in voxels: more than the distance from any point to the nearest sample, half the diagonal."""
@@ -181,14 +181,14 @@ class _Look:
         offset_field = self.offset_field(sign * reach)
 
         def look(rows: slice) -> Rays:
-            start, normals, area = crossed(offset_field, rows)
+            start, normals, area = edge_crossings(offset_field, rows)
             far = np.full(len(start), 2 * (reach + self.voxel))
             rays = self.limited(Rays(start, -sign * normals, area, 0 * area, far), sign)
             enter = self.first(rays, np.full(len(rays.start), BEFORE * self.voxel), rays.leave, sign)
             rays = replace(rays, enter=enter).chosen(enter < rays.leave)
             return self.stretch(rays, rays.enter, -sign)
 
-        return gathered(look, len(offset_field.bricks), AT_ONCE, self.work)
+        return in_blocks(look, len(offset_field.bricks), AT_ONCE, self.work)
 
     def limited(self, rays: Rays, sign: float) -> Rays:
         """Rays that may enter something thin, with the distance up to which they are traced.
@@ -248,7 +248,7 @@ class _Look:
             result = Walls(ends[0].T, ends[1].T, some.leave - some.enter, some.area, facing)
             return result.chosen(facing < OPPOSITE)
 
-        return gathered(look, len(rays.start), RAYS, self.work)
+        return in_blocks(look, len(rays.start), RAYS, self.work)
 
     def normals(self, points: np.ndarray) -> np.ndarray:
         """Unit normals of the field at points [3, n], [3, n]."""

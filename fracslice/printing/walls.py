@@ -18,7 +18,7 @@ import numpy as np
 from ..common.compiled import compiled
 from ..common.rows import Rows
 from ..work import Work, chunks
-from .crossings import crossed, slopes
+from .edge_crossings import edge_crossings, slopes
 from .interpolation import STRIDE, between, is_beside
 from .samples import Samples
 
@@ -99,7 +99,6 @@ def walls(
     work: Work,
     *,
     gaps: bool = False,
-    direction: Direction | None = None,
 ) -> Walls:
     """Measure walls, or gaps, on samples.
 
@@ -116,8 +115,6 @@ def walls(
         Threads and cancellation.
     gaps : bool
         Measure gaps instead of walls.
-    direction : three floats, optional
-        Measure along this unit vector instead of the normal, through faces that look along it or against it.
 
     Returns
     -------
@@ -129,13 +126,21 @@ def walls(
     Cancelled
         When the work is cancelled.
     """
-    (one,) = walls_of(solid, limit, work, [Measure(gaps, direction)])
+    (one,) = walls_of(solid, limit, work, [Measure(gaps)])
     return one
 
 
 @dataclass(frozen=True)
 class Measure:
-    """How walls are measured: `walls` has the attributes."""
+    """How walls are measured.
+
+    Attributes
+    ----------
+    gaps : bool
+        Measure gaps instead of walls.
+    direction : three floats, optional
+        Measure along this unit vector instead of the normal, through faces that look along it or against it.
+    """
 
     gaps: bool = False
     direction: Direction | None = None
@@ -163,7 +168,7 @@ def walls_of(solid: Samples, limit: float, work: Work, kinds: Sequence[Measure])
     """
 
     def look(rows: slice) -> list[Walls]:
-        crossings = crossed(solid, rows)
+        crossings = edge_crossings(solid, rows)
         return [_measured(solid, limit, work, how, *crossings) for how in kinds]
 
     blocks = work.collect(look, chunks(len(solid.bricks), AT_ONCE) or [slice(0, 0)])
@@ -196,7 +201,7 @@ def _measured(
     return Walls(points, ends, width, area[thin], facing).chosen(facing < OPPOSITE)
 
 
-def gathered(look: Callable[[slice], R], count: int, size: int, work: Work) -> R:
+def in_blocks(look: Callable[[slice], R], count: int, size: int, work: Work) -> R:
     """Process rows in blocks on all threads and join the results in order.
 
     Parameters

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..common.quantiles import weighted_quantiles
+
 BINS = 0.05 * np.arange(41)
 """Bin edges of the histogram, mm; the last bin includes everything thicker."""
 
@@ -49,9 +51,6 @@ def widths_of(values: np.ndarray, weights: np.ndarray | None = None) -> Widths |
     if not len(values):
         return None
     weight = np.ones(len(values)) if weights is None else weights
-    order = np.argsort(values, kind="stable")
-    upto = np.cumsum(weight[order])
-    at = np.searchsorted(upto, np.array([0, 0.01, 0.5]) * upto[-1])
-    low, hundredth, middle = values[order][np.minimum(at, len(values) - 1)].tolist()
+    low, hundredth, middle = weighted_quantiles(values, weight, 0, 0.01, 0.5)
     counts = np.histogram(np.minimum(values, BINS[-1] - 1e-9), BINS, weights=weights)[0]
     return Widths(low, hundredth, middle, tuple(counts.tolist()))

@@ -11,7 +11,7 @@ from ..scene.view import View
 from ..work import Work, chunks
 from .crops import BYTES, MARGIN, Crop
 from .passes import Pass
-from .progressive import TOLERANCE, Renderer
+from .progressive import Renderer
 from .sequence import SampleRange
 
 SHARE = 0.5
@@ -74,7 +74,6 @@ def render_bands(
     device: str = "auto",
     sequence: SampleRange | None = None,
     samples: int | None = None,
-    tolerance: float = TOLERANCE,
 ) -> Iterator[Pass]:
     """Render a picture band by band; each has the pixels of the whole picture.
 
@@ -90,7 +89,7 @@ def render_bands(
         Rows of a band.
     work, device, sequence
         As for `Renderer`.
-    samples, tolerance
+    samples
         As for `Renderer.passes`.
 
     Yields
@@ -100,5 +99,5 @@ def render_bands(
     """
     for part in chunks(film[1], rows):
         crop = 0, part.start, film[0], part.stop - part.start
-        *_, last = Renderer(root, view, film, work, device, sequence, crop).passes(samples, tolerance)
+        *_, last = Renderer(root, view, film, work, device, sequence, crop).passes(samples)
         yield last

@@ -9,7 +9,7 @@ from ..formulas.registry import Fixed, Node
 from ..kernel.linker import Linker
 from ..kernel.structure import link_tree
 from .glow import glowing_bodies
-from .pictures import load_picture
+from .image_files import load_picture
 from .tracing import TraceDialect, traps
 from .units import shade
 from .units.pixel import linear

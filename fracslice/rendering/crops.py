@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import RenderError
-from ..formulas.parameters import Vector, validated
+from ..formulas.parameters import Vector
+from ..formulas.records import validated
 from .accumulator import CHANNELS, COARSE
 
 BYTES = 4 * (CHANNELS + 4 + 3)

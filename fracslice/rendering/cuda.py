@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from ..formulas.field import Precision
-from ..kernel.cuda import launched, load_loops, parameters, require
+from ..kernel.cuda_driver import require
+from ..kernel.cuda_launching import launched, load_loops, parameters
 from ..work import Work
 from .accumulator import PassPlan
 from .cpu import BLOCK, STEPS

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..formulas.field import Precision
-from ..kernel.cuda import launched, load_loops, require
+from ..kernel.cuda_driver import require
+from ..kernel.cuda_launching import launched, load_loops
 from ..kernel.linker import Linked
 from ..scene.view import View
 from .accumulator import TRUSTED, PassPlan, grids, least_gain, next_choice

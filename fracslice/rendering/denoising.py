@@ -11,8 +11,8 @@ from ..common.extras import lacking
 from .accumulator import COUNT, COVER, GOAL
 from .crops import Crop
 from .host_accumulator import HostAccumulator
-from .layers import layer
 from .passes import Pass
+from .picture_layers import layer
 from .progressive import Renderer
 from .units.pixel import UNKNOWN, squared_error
 

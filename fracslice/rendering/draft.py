@@ -95,7 +95,7 @@ class Follower:
         """True if depth and precision suit the camera's distance to the surface."""
         assert self._renderer
         try:
-            distance = clearance(self._renderer.setup.roots[-1], camera)
+            distance = clearance(self._renderer.setup.root, camera)
         except SceneError:  # inside the solid at this depth
             return False
         return self._distance_then / NEARER < distance < self._distance_then * NEARER
@@ -104,4 +104,4 @@ class Follower:
     def distance(self) -> float:
         """Lower bound of the distance from the camera to the surface, scene units."""
         assert self._renderer
-        return clearance(self._renderer.setup.roots[-1], self._renderer.setup.camera)
+        return clearance(self._renderer.setup.root, self._renderer.setup.camera)

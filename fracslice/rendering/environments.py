@@ -8,7 +8,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from .pictures import LinearImage
+from .image_files import LinearImage
 
 PIXELS = 2048 * 1024
 """Maximum number of pixels of a sky."""

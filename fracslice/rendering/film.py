@@ -19,7 +19,7 @@ LEAST = np.float32(1e-6)
 
 
 def picture(mean: np.ndarray, mode: str = "light") -> np.ndarray:
-    """Return linear light, or in another mode the mean value of what is visible.
+    """Return linear light, or in another mode the mean value of the visible surface.
 
     Parameters
     ----------

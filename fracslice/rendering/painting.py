@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.srgb import from_linear
 from ..formulas import vocabulary
 from ..formulas.material import material
 from ..formulas.registry import Node
@@ -103,8 +104,6 @@ def _linked(root: Node) -> tuple[str, NDArray[np.float64]]:
 
 
 def _encoded(light: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Linear light in sRGB (IEC 61966-2-1)."""
-    light = light.clip(0.0, 1.0)
-    encoded = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
-    colours: NDArray[np.uint8] = np.rint(255 * encoded).astype(np.uint8)
+    """Linear light in sRGB."""
+    colours: NDArray[np.uint8] = np.rint(255 * from_linear(light.clip(0.0, 1.0))).astype(np.uint8)
     return colours

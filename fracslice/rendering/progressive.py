@@ -13,7 +13,8 @@ import numpy as np
 from ..common.keys import key, program
 from ..common.memory import available_bytes
 from ..errors import RenderError
-from ..formulas.parameters import Number, Vector, validated
+from ..formulas.parameters import Number, Vector
+from ..formulas.records import validated
 from ..formulas.registry import Node
 from ..kernel.devices import chosen
 from ..scene.view import Camera, Film, View

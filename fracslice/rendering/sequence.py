@@ -90,29 +90,24 @@ def points(count: int, dimensions: int, first: int = 0) -> np.ndarray:
     index = np.arange(first, first + count, dtype=np.uint32)[:, None]
     result = np.zeros((count, DIMENSIONS), np.uint32)
     for bit in range(max(first + count - 1, 0).bit_length()):
-        columns = np.array([_columns(d)[bit] for d in range(DIMENSIONS)], np.uint32)
+        columns = np.array([_column(d, bit) for d in range(DIMENSIONS)], np.uint32)
         result ^= (index >> np.uint32(bit) & np.uint32(1)) * columns
     return np.ascontiguousarray(result[:, np.arange(dimensions) % DIMENSIONS]).view(np.int32)
 
 
-@lru_cache(maxsize=DIMENSIONS)
-def _columns(dimension: int) -> list[int]:
-    """Generator matrix of a dimension.
+@lru_cache(maxsize=32 * DIMENSIONS)
+def _column(dimension: int, bit: int) -> int:
+    """Column of the generator matrix of a dimension.
 
-    Column k holds the bits that index bit k toggles, the first fractional bit lowest.
+    It holds the bits that an index bit toggles, the first fractional bit lowest.
     """
     element, reads = _DIMENSIONS[dimension]
-    columns = []
-    for bit in range(32):
-        place, value, column = bit // 4, 1 << bit % 4, 0
-        for digit in range(place, -1, -1):
-            if place & digit == digit:  # Pascal's matrix entry is odd (Lucas' theorem)
-                column |= sum(
-                    ((value & read).bit_count() & 1) << 4 * digit + k for k, read in enumerate(reads)
-                )
-            value = _product(value, element)
-        columns.append(column)
-    return columns
+    place, value, column = bit // 4, 1 << bit % 4, 0
+    for digit in range(place, -1, -1):
+        if place & digit == digit:  # Pascal's matrix entry is odd (Lucas' theorem)
+            column |= sum(((value & read).bit_count() & 1) << 4 * digit + k for k, read in enumerate(reads))
+        value = _product(value, element)
+    return column
 
 
 def _product(a: int, b: int) -> int:

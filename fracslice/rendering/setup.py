@@ -56,11 +56,6 @@ class RenderSetup:
     optics: Optics
     precision: str
 
-    @property
-    def roots(self) -> tuple[Node, ...]:
-        """The tree, as a tuple."""
-        return (self.root,)
-
 
 def prepare(root: Node, view: View, size: tuple[int, int]) -> RenderSetup:
     """Resolve the defaults of a view.

@@ -9,7 +9,7 @@ from typing import Any
 from ..kernel.linker import Linker
 from ..scene.view import Light
 from .environments import PIXELS, Environment, environment
-from .pictures import load_picture
+from .image_files import load_picture
 from .units import environment as units
 from .units.pixel import linear
 from .units.weights import behind, sun_density, sunshine

@@ -22,7 +22,8 @@ from .trace_syntax import KeepChild, KeepNearest
 
 TRAP, NEAREST = "trap", "point"
 
-_SMALLEST = "sqrt(minimum(nearest, 1.0))"
+_ORBIT = "where(nearest < 1e29, {}, 1.0)"
+_SMALLEST = _ORBIT.format("sqrt(nearest)")
 _TRAPS = {
     "point": ("1e30", "minimum(nearest, {r2})", _SMALLEST),
     "axes": (
@@ -31,11 +32,11 @@ _TRAPS = {
         _SMALLEST,
     ),
     "planes": ("1e30", "minimum(nearest, minimum({x} * {x}, minimum({y} * {y}, {z} * {z})))", _SMALLEST),
-    "sphere": ("1e30", "minimum(nearest, absolute({r2} - 1.0))", "minimum(nearest, 1.0)"),
+    "sphere": ("1e30", "minimum(nearest, absolute({r2} - 1.0))", _ORBIT.format("nearest")),
     "steps": ("0.0", "nearest + 0.0625", "nearest"),
     "direction": ("0.5", "0.5 + 0.15915494309189535 * atan2({y}, {x})", "nearest"),
 }
-"""Start and update of each trap's running value, and its position in the palette."""
+"""Start and update of each trap's running value, and its position in the palette: 1 without an orbit."""
 
 
 def traps(root: Node, trap: str = NEAREST) -> dict[int, str]:

@@ -1,4 +1,3 @@
-# ruff: noqa: RUF009 -- `described` makes a field, as dataclasses.field does
 """Animation of a scene: the records behind `<animation>` and `<track>`."""
 
 from __future__ import annotations
@@ -10,7 +9,8 @@ from typing import Any
 
 from ..formulas.conversion import finite
 from ..formulas.parameters import REQUIRED, Choice, Count, Number, Parameter
-from .element import Part, described
+from ..formulas.records import attribute
+from .element import Part
 from .lengths import NUMBER
 
 LONGEST = 1e5
@@ -203,19 +203,21 @@ class Animation(Part):
     """
 
     element = "animation"
-    duration: float = described(Seconds(REQUIRED, "length of the film"))
-    fps: float = described(Number(24.0, "frames per second", least=0.1, most=240))
-    shutter: float = described(
-        Number(
-            0.0, "fraction of a frame's time for which the shutter is open: 0.5 is a film's", least=0, most=1
-        )
+    duration: float = attribute(Seconds, REQUIRED, "length of the film")
+    fps: float = attribute(Number, 24.0, "frames per second", least=0.1, most=240)
+    shutter: float = attribute(
+        Number,
+        0.0,
+        "fraction of a frame's time for which the shutter is open: 0.5 is a film's",
+        least=0,
+        most=1,
     )
-    times: int = described(Count(8, "times within the open shutter that a frame averages", least=1, most=256))
-    clearance: float = described(
-        Number(0.0, "least distance of the camera to the surface, in scene units: it is moved away", least=0)
+    times: int = attribute(Count, 8, "times within the open shutter that a frame averages", least=1, most=256)
+    clearance: float = attribute(
+        Number, 0.0, "least distance of the camera to the surface, in scene units: it is moved away", least=0
     )
-    noise: str = described(
-        Choice("moving", "whether the pattern of the noise changes from frame to frame", ("moving", "fixed"))
+    noise: str = attribute(
+        Choice, "moving", "whether the pattern of the noise changes from frame to frame", ("moving", "fixed")
     )
 
     @property
@@ -239,15 +241,9 @@ class Track(Part):
 
     element = "track"
     many = True
-    of: str = described(AttributePath(REQUIRED, "the attribute to move"))
-    keys: Keyframes = described(Keys(REQUIRED, "keyframes: the value at each time"))
-    curve: str = described(
-        Choice(
-            "auto",
-            "curve between keyframes",
-            CURVES,
-        )
-    )
-    ease: str = described(
-        Choice("none", "ends at which the motion begins or ends at rest", ("none", "in", "out", "both"))
+    of: str = attribute(AttributePath, REQUIRED, "the attribute to move")
+    keys: Keyframes = attribute(Keys, REQUIRED, "keyframes: the value at each time")
+    curve: str = attribute(Choice, "auto", "curve between keyframes", CURVES)
+    ease: str = attribute(
+        Choice, "none", "ends at which the motion begins or ends at rest", ("none", "in", "out", "both")
     )

@@ -1,4 +1,3 @@
-# ruff: noqa: RUF009 -- `described` makes a field, as dataclasses.field does
 """Position, direction and lens of the camera."""
 
 from __future__ import annotations
@@ -8,8 +7,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from ..formulas.box import Box
-from ..formulas.parameters import Choice, Number, Vector, validated
-from .element import Part, described
+from ..formulas.parameters import Choice, Number, Vector
+from ..formulas.records import attribute, validated
+from .element import Part
 
 if TYPE_CHECKING:
     import numpy as np
@@ -32,49 +32,36 @@ class Camera(Part):
     """
 
     element = "camera"
-    kind: str = described(
-        Choice(
-            "perspective",
-            "projection of the scene to the picture",
-            ("perspective", "orthographic", "fisheye", "equirectangular"),
-        )
+    kind: str = attribute(
+        Choice,
+        "perspective",
+        "projection of the scene to the picture",
+        ("perspective", "orthographic", "fisheye", "equirectangular"),
     )
-    eye: Triple = described(Vector((2.2, -2.0, 1.4), "where the camera is, in scene units"))
-    target: Triple = described(Vector((0.0, 0.0, 0.0), "the point in the middle of the picture"))
-    up: Triple = described(Vector((0.0, 0.0, 1.0), "the direction that is up in the picture", nonzero=True))
-    fov: float = described(
-        Number(
-            40.0,
-            "the angle between the picture's upper and lower edge, in degrees: below 179, or up to 360 of a "
-            "fisheye",
-            above=0,
-            most=360,
-        )
+    eye: Triple = attribute(Vector, (2.2, -2.0, 1.4), "where the camera is, in scene units")
+    target: Triple = attribute(Vector, (0.0, 0.0, 0.0), "the point in the middle of the picture")
+    up: Triple = attribute(Vector, (0.0, 0.0, 1.0), "the direction that is up in the picture", nonzero=True)
+    fov: float = attribute(
+        Number,
+        40.0,
+        "the angle between the picture's upper and lower edge, in degrees: below 179, or up to 360 of a "
+        "fisheye",
+        above=0,
+        most=360,
     )
-    aperture: float = described(
-        Number(
-            0.0,
-            "radius of the lens, in scene units: a larger one blurs more; 0: all is sharp",
-            least=0,
-        )
+    aperture: float = attribute(
+        Number, 0.0, "radius of the lens, in scene units: a larger one blurs more; 0: all is sharp", least=0
     )
-    focus: float | None = described(
-        Number(None, "distance that is in focus; without it, that of the target", above=0)
+    focus: float | None = attribute(
+        Number, None, "distance that is in focus; without it, that of the target", above=0
     )
-    stereo: float = described(
-        Number(
-            0.0,
-            "distance between two eyes, in scene units; 0: one eye",
-            least=0,
-        )
-    )
+    stereo: float = attribute(Number, 0.0, "distance between two eyes, in scene units; 0: one eye", least=0)
 
-    clip: float = described(
-        Number(
-            0.0,
-            "distance from the eye of a plane in front of which all is cut away, in scene units; 0: none",
-            least=0,
-        )
+    clip: float = attribute(
+        Number,
+        0.0,
+        "distance from the eye of a plane in front of which all is cut away, in scene units; 0: none",
+        least=0,
     )
 
     def validate(self) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Callable, Iterator, Mapping
-from html import escape
 from math import isfinite
 from typing import Any
 
@@ -101,6 +100,8 @@ def written(definition: Definition) -> Iterator[str]:
         limits = {limit: value for limit in ("least", "most") if isfinite(value := getattr(kind, limit))}
         given = {"name": name, "default": default, **limits}
         yield f"    <{PARAMETER.name}{attributes(PARAMETER, given)}/>"
+    from html import escape  # its table of entities takes a millisecond
+
     for line in definition.text.split("\n"):
         yield f"    {escape(line, quote=False)}".rstrip()
     yield f"  </{DEFINE.name}>"
@@ -108,6 +109,8 @@ def written(definition: Definition) -> Iterator[str]:
 
 def attributes(element: Element, values: Mapping[str, Any]) -> str:
     """Attributes that differ from their defaults, as XML."""
+    from html import escape
+
     kinds = element.parameters
     changed = {name: value for name, value in values.items() if value != kinds[name].default}
     return "".join(f' {name}="{escape(kinds[name].text(value))}"' for name, value in changed.items())

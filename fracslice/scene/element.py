@@ -5,29 +5,13 @@ Every field carries a parameter kind that reads, validates, writes and documents
 
 from __future__ import annotations
 
-from dataclasses import Field, dataclass, field, fields
+from dataclasses import Field, dataclass, field
 from inspect import cleandoc
 from typing import Any, ClassVar
 
 from ..errors import SceneError
-from ..formulas.parameters import validate
+from ..formulas.records import kinds_of, validate
 from ..formulas.signatures import parameter_lines
-
-
-def described(kind: Any) -> Any:
-    """Return a dataclass field with a parameter kind.
-
-    Parameters
-    ----------
-    kind : Parameter
-        Parameter kind; its default is the field's.
-
-    Returns
-    -------
-    Any
-        The field.
-    """
-    return field(default=kind.default, metadata={"kind": kind})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +49,7 @@ class Part:
         cls.__doc__ = "\n".join(lines)
 
     def __post_init__(self) -> None:
-        validate(self, self.kinds(), self.fail)
+        validate(self, self.fail)
         self.validate()
 
     def validate(self) -> None:
@@ -80,7 +64,7 @@ class Part:
         dict of str to Parameter
             Kinds by field name.
         """
-        return {f.name: f.metadata["kind"] for f in fields(cls) if "kind" in f.metadata}
+        return kinds_of(cls)
 
     def fail(self, message: str) -> SceneError:
         """Return the error to raise about this element.

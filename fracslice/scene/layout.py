@@ -50,6 +50,9 @@ Element = Formula | TopElement
 
 
 VERSION = "1"
+LISTED = '"fracslice formulas" lists them, --formulas FILE or <define> adds one'
+"""Where the elements of a solid are listed."""
+
 SCENE = TopElement(
     "scene",
     "The whole file.",
@@ -62,7 +65,7 @@ SOLID = TopElement(
     MappingProxyType(
         {
             "size": Length(None, "the longest side of the finished object"),
-            "unit": Length(None, "or the length of a scene unit"),
+            "unit": Length(None, "or the length of a scene unit; 1mm if neither is given"),
         }
     ),
     (1, None),

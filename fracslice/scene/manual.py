@@ -11,7 +11,7 @@ from ..errors import SceneError
 from ..formulas.parameters import REQUIRED
 from ..formulas.plugins import origin
 from ..formulas.registry import Formula
-from .layout import PARAMETER, SCENE, SECTIONS, Element, formulas
+from .layout import LISTED, PARAMETER, SCENE, SECTIONS, Element, formulas
 
 _GROUPS = {
     "shape": ("Shapes", "Solids. They contain no elements."),
@@ -158,7 +158,7 @@ def page(name: str) -> str:
     elements: list[Element] = [SCENE, PARAMETER, *SECTIONS.values(), *formulas()]
     known = {element.name: element for element in elements}
     if name not in known:
-        raise SceneError(f"{name}: no such formula; {hint(name, known)}")
+        raise SceneError(f"{name}: no such formula; {hint(name, known, where=LISTED)}")
     element = known[name]
     lines = [f"<{name}>", "", prose(element.doc)]
     for attribute, kind in element.parameters.items():

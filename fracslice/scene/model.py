@@ -98,7 +98,7 @@ class Scene:
         SceneError
             If the scene has no such element or attribute, or the value is invalid.
         """
-        from .values import changed
+        from .overrides import changed
 
         return changed(self, settings)
 

@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from ..formulas.parameters import Choice
-from .element import Part, described
+from ..formulas.parameters import Choice, Count
+from ..formulas.records import attribute
+from .element import Part
 from .lengths import Length
-
-
-def _length(doc: str, default: float = 0.0) -> Length:
-    return Length(default, doc, zero=True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,29 +20,45 @@ class Print(Part):
     """
 
     element = "print"
-    cavities: Literal["keep", "fill"] = described(
-        Choice("keep", "sealed cavities stay or are filled", ("keep", "fill"))
+    cavities: Literal["keep", "fill"] = attribute(
+        Choice, "keep", "sealed cavities stay or are filled", ("keep", "fill")
     )
-    keep: Literal["all", "largest"] = described(
-        Choice("all", "all bodies stay, or the largest alone", ("all", "largest"))
+    keep: int | Literal["all", "largest"] = attribute(
+        Count,
+        "all",
+        "all bodies stay, or the largest, or this number of the largest",
+        1,
+        1_000_000,
+        ("all", "largest"),
     )
-    bridge: float = described(_length("loose bodies are joined where they are nearest, by struts this thick"))
-    gap: float = described(_length("gaps up to this width are closed"))
-    thickness: float = described(_length("thinner walls are thickened to this"))
-    hollow: float = described(_length("the object is hollowed out, leaving walls this thick"))
-    drain: float = described(_length("diameter of the two holes that let the resin out of the hollow", 3.0))
-    base: float = described(_length("height that is cut off at the bottom, to stand flat"))
-    raft: float = described(_length("the object stands on a plate of this height"))
+    bridge: float = attribute(
+        Length, 0.0, "loose bodies are joined where they are nearest, by struts this thick", zero=True
+    )
+    gap: float = attribute(Length, 0.0, "gaps up to this width are closed", zero=True)
+    thickness: float = attribute(Length, 0.0, "thinner walls are thickened to this", zero=True)
+    hollow: float = attribute(Length, 0.0, "the object is hollowed out, leaving walls this thick", zero=True)
+    drain: float = attribute(
+        Length, 3.0, "diameter of the two holes that let the resin out of the hollow", zero=True
+    )
+    base: float = attribute(Length, 0.0, "height that is cut off at the bottom, to stand flat", zero=True)
+    raft: float = attribute(Length, 0.0, "the object stands on a plate of this height", zero=True)
 
     def validate(self) -> None:
         """Raise `SceneError` for `keep` combined with `bridge`."""
-        if self.keep == "largest" and self.bridge:
+        if self.bodies == 1 and self.bridge:
             raise self.fail("keep and bridge: expected one of them; where one body stays, none is loose")
+
+    @property
+    def bodies(self) -> int | None:
+        """Number of bodies that stay at most, the largest ones; None for all."""
+        if isinstance(self.keep, int):
+            return self.keep
+        return 1 if self.keep == "largest" else None
 
     @property
     def sorts(self) -> bool:
         """True if connected components or cavities may be removed."""
-        return self.keep == "largest" or self.cavities == "fill"
+        return self.bodies is not None or self.cavities == "fill"
 
     @property
     def whole(self) -> bool:

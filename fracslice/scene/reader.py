@@ -21,12 +21,26 @@ from ..formulas.registry import DEEPEST, TOO_DEEP
 from .animation import Animation, Track
 from .definitions import defined, parameter
 from .element import Part
-from .layout import DEFINE, PARAMETER, SCENE, SECTIONS, SOLID, Element, TopElement, formulas, registered
+from .layout import (
+    DEFINE,
+    LISTED,
+    PARAMETER,
+    SCENE,
+    SECTIONS,
+    SOLID,
+    Element,
+    TopElement,
+    formulas,
+    registered,
+)
 from .model import Scene, computing, scene
 from .printing import Print
 from .view import View
 
 LARGEST_FILE = 16 << 20
+UNIT = "1mm"
+"""Length of a scene unit where neither it nor the size is given, as for a shape in Python."""
+
 BEFORE = b"\0\xff\xfe\xef\xbb\xbf \t\r\n"
 """Bytes allowed before the first tag, or within it in UTF-16: byte order marks and white space."""
 
@@ -82,20 +96,21 @@ def reads(text: str | bytes, name: str = "scene") -> Scene:
 
 
 def _scene(data: bytes, source: str, name: str) -> Scene:
+    if data[:64].translate(None, BEFORE)[:1] not in (b"", b"<"):
+        raise SceneError(f'{source}: not a scene: expected XML that begins with <scene version="1">')
     if len(data) > LARGEST_FILE:
-        raise SceneError(f"{source}: expected a scene file of at most {LARGEST_FILE >> 20} MB")
+        raise SceneError(f"{source}: expected a scene of at most {LARGEST_FILE >> 20} MB")
     if not data.strip():
         raise SceneError(f"{source}: expected a scene, the file is empty")
-    if not data[:64].translate(None, BEFORE).startswith(b"<"):
-        raise SceneError(f'{source}: not a scene: expected XML that begins with <scene version="1">')
     builder = _Builder(source)
     solid = builder.sections(data)[SOLID.name]
     others = (Print, Animation, Track)
     printing = next((part for part in builder.parts if isinstance(part, Print)), Print())
     view = View.of(part for part in builder.parts if not isinstance(part, others))
-    if len(solid.values) != 1:
-        raise solid.fail('expected size="...", the longest side, or unit="...", the length of a scene unit')
-    made = scene(*solid.children, **solid.values, name=name, view=view, printing=printing)
+    if len(solid.values) > 1:
+        raise solid.fail("size and unit: expected one of them")
+    size = solid.values or {"unit": UNIT}
+    made = scene(*solid.children, **size, name=name, view=view, printing=printing)
     animation = next((part for part in builder.parts if isinstance(part, Animation)), None)
     return replace(
         made, animation=animation, tracks=tuple(part for part in builder.parts if isinstance(part, Track))
@@ -188,7 +203,7 @@ class _Builder:
         if name not in allowed:
             known = {SCENE.name, PARAMETER.name, *SECTIONS, *self.all_formulas()}
             wrong = "cannot stand here" if name in known else "is not a known element"
-            raise SceneError(f"{self.place}: <{name}> {wrong}; {hint(name, allowed, '<{}>')}")
+            raise SceneError(f"{self.place}: <{name}> {wrong}; {hint(name, allowed, '<{}>', LISTED)}")
         if name in self.done:
             raise SceneError(f"{self.place}: <{name}> may only stand once in a scene")
         return allowed[name]

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as Tree
 
-from ..formulas.parameters import AUTO, REQUIRED, Axis, Choice, Count, File, Number, Vector
+from ..formulas.parameters import REQUIRED, Axis, Choice, Count, File, Number, Vector
 from .animation import AttributePath, Keys, Seconds
 from .identifier import Identifier
 from .layout import DEFINE, PARAMETER, SCENE, SECTIONS, Element, formulas
@@ -116,9 +116,10 @@ def _number(parent: Tree.Element, kind: Number) -> None:
 
 
 def _count(parent: Tree.Element, kind: Count) -> None:
-    if kind.auto:
+    if kind.words:
         parent = Tree.SubElement(parent, "choice")
-        Tree.SubElement(parent, "value").text = AUTO
+    for word in kind.words:
+        Tree.SubElement(parent, "value").text = word
     _data(parent, "integer", kind)
 
 

@@ -17,6 +17,9 @@ from .model import Scene
 KEPT = {"material", "transform", "bounds"}
 """Elements that say how a solid looks and where it is, not what it is."""
 
+OF_A_HYBRID, OF_A_STEP = {"iterations", "bailout"}, {"repeat"}
+"""Parameters that a hybrid has for all of its steps, and those that a step alone has."""
+
 TRIES, POINTS = 100, 4096
 
 
@@ -40,24 +43,27 @@ def varied(scene: Scene, seed: tuple[int, ...], spread: float) -> Scene:
     Raises
     ------
     SceneError
-        If no variation that was tried is valid and holds a solid.
+        If no variation that was tried is another valid scene that holds a solid.
     """
     rng = np.random.default_rng(seed)
     for _ in range(TRIES):
         with suppress(FracsliceError, ArithmeticError):  # values that are valid alone but not together
             root = _node(scene.root, rng, spread)
-            if _holds_a_solid(root):
+            if root != scene.root and _holds_a_solid(root):
                 return replace(scene, root=root)
     raise SceneError(f"{scene.name}: none of {TRIES} variations is valid: expected a smaller spread")
 
 
-def _node(node: Node, rng: np.random.Generator, spread: float) -> Node:
-    children = tuple(_node(child, rng, spread) for child in node.children)
+def _node(node: Node, rng: np.random.Generator, spread: float, step: bool = False) -> Node:
+    """Varied node; `step` is True inside a hybrid."""
+    hybrid = step or node.formula.name == "orbit"
+    children = tuple(_node(child, rng, spread, hybrid) for child in node.children)
     if node.formula.name in KEPT:
         return node.changed(children)
-    kinds = node.formula.parameters.items()
+    fixed = OF_A_HYBRID if step else OF_A_STEP
+    kinds = {name: kind for name, kind in node.formula.parameters.items() if name not in fixed}
     return node.changed(
-        children, **{name: _value(name, kind, node[name], rng, spread) for name, kind in kinds}
+        children, **{name: _value(name, kind, node[name], rng, spread) for name, kind in kinds.items()}
     )
 
 

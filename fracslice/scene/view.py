@@ -1,4 +1,3 @@
-# ruff: noqa: RUF009 -- `described` makes a field, as dataclasses.field does
 """View of a scene: the records behind `<camera>`, `<film>`, `<light>`, `<fog>` and `<shading>`."""
 
 from __future__ import annotations
@@ -8,9 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..formulas.parameters import Choice, Count, File, Number, Vector
+from ..formulas.records import attribute
 from .camera import Camera as Camera
 from .camera import Triple
-from .element import Part, described
+from .element import Part
 
 WHITE = (1.0, 1.0, 1.0)
 
@@ -20,19 +20,19 @@ class Film(Part):
     """Size, sampling and tone mapping of the picture."""
 
     element = "film"
-    width: int = described(Count(1280, "pixels across", least=1, most=32768))
-    height: int = described(Count(720, "pixels down", least=1, most=32768))
-    samples: int = described(Count(64, "maximum number of samples of a pixel", least=1, most=1_000_000))
-    tone: str = described(Choice("filmic", "tone mapping of bright light", ("filmic", "reinhard", "none")))
-    exposure: float = described(Number(0.0, "exposure in stops; positive is brighter", least=-20, most=20))
-    bloom: float = described(
-        Number(0.0, "the part of bright light that spreads in the lens", least=0, most=1)
+    width: int = attribute(Count, 1280, "pixels across", least=1, most=32768)
+    height: int = attribute(Count, 720, "pixels down", least=1, most=32768)
+    samples: int = attribute(Count, 64, "maximum number of samples of a pixel", least=1, most=1_000_000)
+    tone: str = attribute(Choice, "filmic", "tone mapping of bright light", ("filmic", "reinhard", "none"))
+    exposure: float = attribute(Number, 0.0, "exposure in stops; positive is brighter", least=-20, most=20)
+    bloom: float = attribute(
+        Number, 0.0, "the part of bright light that spreads in the lens", least=0, most=1
     )
-    background: Triple = described(
-        Vector((0.08, 0.08, 0.12), "displayed colour behind the object, without a sky", least=0, most=1)
+    background: Triple = attribute(
+        Vector, (0.08, 0.08, 0.12), "displayed colour behind the object, without a sky", least=0, most=1
     )
-    alpha: str = described(
-        Choice("no", "whether the background and the sky are transparent, by an alpha channel", ("no", "yes"))
+    alpha: str = attribute(
+        Choice, "no", "whether the background and the sky are transparent, by an alpha channel", ("no", "yes")
     )
 
     @property
@@ -47,44 +47,40 @@ class Light(Part):
 
     element = "light"
     many = True
-    kind: str = described(
-        Choice(
-            "sun",
-            "far away, near, all around, a picture of the surroundings, or at the camera",
-            ("sun", "lamp", "sky", "environment", "camera"),
-        )
+    kind: str = attribute(
+        Choice,
+        "sun",
+        "far away, near, all around, a picture of the surroundings, or at the camera",
+        ("sun", "lamp", "sky", "environment", "camera"),
     )
-    position: Triple = described(
-        Vector((-1.0, -2.0, 3.0), "where a lamp is, or the direction in which the sun stands", nonzero=True)
+    position: Triple = attribute(
+        Vector, (-1.0, -2.0, 3.0), "where a lamp is, or the direction in which the sun stands", nonzero=True
     )
-    colour: Triple = described(Vector(WHITE, "red, green and blue; of a sky, at its zenith", least=0, most=1))
-    horizon: Triple = described(Vector(WHITE, "of a sky, its colour at the horizon", least=0, most=1))
-    ground: Triple = described(Vector((0.3, 0.28, 0.26), "of a sky, its colour from below", least=0, most=1))
-    strength: float = described(
-        Number(
-            1.0,
-            "multiplies the colour; of a lamp at distance 1, of a light at the camera at its target",
-            least=0,
-            most=1e6,
-        )
+    colour: Triple = attribute(Vector, WHITE, "red, green and blue; of a sky, at its zenith", least=0, most=1)
+    horizon: Triple = attribute(Vector, WHITE, "of a sky, its colour at the horizon", least=0, most=1)
+    ground: Triple = attribute(Vector, (0.3, 0.28, 0.26), "of a sky, its colour from below", least=0, most=1)
+    strength: float = attribute(
+        Number,
+        1.0,
+        "multiplies the colour; of a lamp at distance 1, of a light at the camera at its target",
+        least=0,
+        most=1e6,
     )
-    size: float = described(
-        Number(
-            0.0,
-            "of a lamp its radius, of a sun the angle in degrees it fills: above zero, shadows are soft",
-            least=0,
-            most=90,
-        )
+    size: float = attribute(
+        Number,
+        0.0,
+        "of a lamp its radius, of a sun the angle in degrees it fills: above zero, shadows are soft",
+        least=0,
+        most=90,
     )
-    shadows: str = described(Choice("yes", "whether objects cast shadows in it", ("yes", "no")))
-    file: str | None = described(
-        File(
-            None,
-            "of an environment, its picture, such as .hdr: longitude across, latitude down, +y in the middle",
-        )
+    shadows: str = attribute(Choice, "yes", "whether objects cast shadows in it", ("yes", "no"))
+    file: str | None = attribute(
+        File,
+        None,
+        "of an environment, its picture, such as .hdr: longitude across, latitude down, +y in the middle",
     )
-    rotation: float = described(
-        Number(0.0, "of an environment, its turn about the z axis in degrees", least=-360, most=360)
+    rotation: float = attribute(
+        Number, 0.0, "of an environment, its turn about the z axis in degrees", least=-360, most=360
     )
 
     @property
@@ -104,23 +100,22 @@ class Fog(Part):
     """Haze that hides distant surfaces; it does not cover the sky."""
 
     element = "fog"
-    colour: Triple | None = described(
-        Vector(None, "red, green and blue; without it, those of the sky behind", least=0, most=1)
+    colour: Triple | None = attribute(
+        Vector, None, "red, green and blue; without it, those of the sky behind", least=0, most=1
     )
-    density: float = described(
-        Number(0.1, "of light, exp(-density distance) comes through", least=0, most=1e6)
+    density: float = attribute(
+        Number, 0.1, "of light, exp(-density distance) comes through", least=0, most=1e6
     )
-    height: float | None = described(
-        Number(None, "height over which it thins to 1/e; without it, fog is the same everywhere", above=0)
+    height: float | None = attribute(
+        Number, None, "height over which it thins to 1/e; without it, fog is the same everywhere", above=0
     )
-    level: float = described(Number(0.0, "height z at which it has its density"))
-    scatter: float = described(
-        Number(
-            0.0,
-            "how much light of suns and lamps it scatters to the eye, where surfaces do not shadow it",
-            least=0,
-            most=1,
-        )
+    level: float = attribute(Number, 0.0, "height z at which it has its density")
+    scatter: float = attribute(
+        Number,
+        0.0,
+        "how much light of suns and lamps it scatters to the eye, where surfaces do not shadow it",
+        least=0,
+        most=1,
     )
 
 
@@ -134,20 +129,19 @@ class Shading(Part):
     """
 
     element = "shading"
-    mode: str = described(
-        Choice(
-            "light",
-            "quantity that the picture shows",
-            ("light", "normal", "position", "albedo", "trap", "depth", "distance", "steps"),
-        )
+    mode: str = attribute(
+        Choice,
+        "light",
+        "quantity that the picture shows",
+        ("light", "normal", "position", "albedo", "trap", "depth", "distance", "steps"),
     )
-    ambient: float = described(Number(0.0, "light that is everywhere", least=0, most=100))
-    occlusion: float = described(Number(0.0, "how much occlusion darkens ambient light", least=0, most=4))
-    reach: float = described(Number(0.2, "distance at which surfaces occlude, in scene units", above=0))
-    paths: str = described(
-        Choice("no", "whether surfaces light each other, and glowing ones the others", ("no", "yes"))
+    ambient: float = attribute(Number, 0.0, "light that is everywhere", least=0, most=100)
+    occlusion: float = attribute(Number, 0.0, "how much occlusion darkens ambient light", least=0, most=4)
+    reach: float = attribute(Number, 0.2, "distance at which surfaces occlude, in scene units", above=0)
+    paths: str = attribute(
+        Choice, "no", "whether surfaces light each other, and glowing ones the others", ("no", "yes")
     )
-    bounces: int = described(Count(4, "maximum number of reflections and refractions of a ray", most=16))
+    bounces: int = attribute(Count, 4, "maximum number of reflections and refractions of a ray", most=16)
 
 
 @dataclass(frozen=True)

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 from ..formulas import Node
 from ..formulas.definitions import definitions
 from .definitions import attributes, written
 from .element import Part
 from .layout import SCENE, SECTIONS, SOLID, VERSION
-from .model import Scene
 from .printing import Print
+
+if TYPE_CHECKING:
+    from .model import Scene
 
 
 def to_xml(scene: Scene) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..common.quantiles import quantile
 from ..errors import SliceError
-from ..formulas.parameters import validated
+from ..formulas.records import validated
 from ..scene.lengths import Length
 from ..work import Work
 from .layers import Layer, Slicer

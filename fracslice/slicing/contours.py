@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .._slices import Slab
+from ..common.digits import counted
 from ..kernel import Kernel
 from .bends import bends
 from .corners import corners
@@ -39,6 +40,9 @@ class Contours:
     points: np.ndarray
     starts: np.ndarray
     parent: np.ndarray
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {counted(len(self), 'polygon')}, {self.area:.6g} mm2>"
 
     def __len__(self) -> int:
         return len(self.parent)

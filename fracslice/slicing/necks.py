@@ -14,7 +14,7 @@ import numpy as np
 
 from ..common.compiled import compiled
 from ..common.disjoint import find
-from .graph import Graph
+from .feature_graph import Graph
 
 
 @dataclass(frozen=True)

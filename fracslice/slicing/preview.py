@@ -47,10 +47,8 @@ def _spread(stack: Stack, count: int) -> list[int]:
     return sorted({int((i + 0.5) * total / min(count, total)) for i in range(min(count, total))})
 
 
-def contact_sheet(
-    stack: Stack, file: BinaryIO, work: Work | None = None, layers: Sequence[int] | None = None
-) -> None:
-    """Write a PNG with layers, each with its height above the bed.
+def contact_sheet(stack: Stack, file: BinaryIO, work: Work | None = None) -> None:
+    """Write a PNG with 24 layers, evenly spaced, each with its height above the bed.
 
     Parameters
     ----------
@@ -60,8 +58,6 @@ def contact_sheet(
         Where to write.
     work : Work, optional
         Threads, progress and cancellation.
-    layers : sequence of int, optional
-        Numbers of the layers, ascending; 24, evenly spaced, if not given.
 
     Raises
     ------
@@ -70,7 +66,7 @@ def contact_sheet(
     Cancelled
         When the work is cancelled.
     """
-    chosen = list(layers) if layers is not None else _spread(stack, CELLS)
+    chosen = _spread(stack, CELLS)
     images = list(Slicer(stack, work or Work()).map(lambda layer: thumbnail(layer.coverage), chosen))
     _sheet(stack, chosen, images, math.ceil(math.sqrt(1.5 * max(len(images), 1)))).save(file, "PNG")
 

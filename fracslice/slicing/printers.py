@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 import csv
-import difflib
-import tomllib
-from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..common.tables import read_table
 from ..errors import SliceError
-from ..formulas.parameters import REQUIRED, Count, Number, Vector, validate
-
-KINDS = {
-    "pixels": Vector(REQUIRED, "pixels along x and y", sizes=(2,), least=1, most=65_536, whole=True),
-    "screen": Vector(REQUIRED, "size of the screen, mm", sizes=(2,), above=0, most=10_000),
-    "height": Number(REQUIRED, "highest print, mm", above=0, most=10_000),
-    "version": Count(1, "version of the format", most=65_536),
-    "motion": Vector((5.0, 65.0, 150.0, 0.5), "mm, mm/min, mm/min and s", sizes=(4,), least=0, most=10_000),
-}
+from ..formulas.parameters import REQUIRED, Count, Number, Vector
+from ..formulas.records import attribute, from_table, validate
 
 
 @dataclass(frozen=True)
@@ -57,18 +49,24 @@ class Printer:
 
     name: str
     title: str
-    pixels: tuple[int, int]
-    screen: tuple[float, float]
-    height: float
+    pixels: tuple[int, int] = attribute(
+        Vector, REQUIRED, "pixels along x and y", sizes=(2,), least=1, most=65_536, whole=True
+    )
+    screen: tuple[float, float] = attribute(
+        Vector, REQUIRED, "size of the screen, mm", sizes=(2,), above=0, most=10_000
+    )
+    height: float = attribute(Number, REQUIRED, "highest print, mm", above=0, most=10_000)
     mirror: bool = True
     portrait: bool = False
     file: str = ""
-    version: int = 1
-    motion: tuple[float, float, float, float] = (5.0, 65.0, 150.0, 0.5)
+    version: int = attribute(Count, 1, "version of the format", most=65_536)
+    motion: tuple[float, float, float, float] = attribute(
+        Vector, (5.0, 65.0, 150.0, 0.5), "mm, mm/min, mm/min and s", sizes=(4,), least=0, most=10_000
+    )
     settings: tuple[tuple[str, Any], ...] = ()
 
     def __post_init__(self) -> None:
-        validate(self, KINDS, SliceError)
+        validate(self, SliceError)
 
     @property
     def pixel(self) -> tuple[float, float]:
@@ -81,13 +79,28 @@ class Printer:
         return *self.screen, self.height
 
 
-def _table() -> Iterator[Printer]:
-    """Printers of the table, which states the source of each."""
-    lines = (Path(__file__).parent / "printers.csv").read_text(encoding="utf-8").splitlines()
-    for row in csv.DictReader(line for line in lines if not line.startswith("#")):
+class _Printers(Mapping[str, Printer]):
+    """Printers of a table, validated when they are looked up: all take a thirtieth of a small job."""
+
+    def __init__(self, path: Path) -> None:
+        lines = path.read_text(encoding="utf-8").splitlines()
+        rows = csv.DictReader(line for line in lines if not line.startswith("#"))
+        self._rows = {row["name"]: row for row in rows}
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._rows)
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._rows
+
+    def __getitem__(self, name: str) -> Printer:
+        row = self._rows[name]
         lift, up, down, wait = (float(row[key]) for key in ("lift", "lift_speed", "retract_speed", "wait"))
-        yield Printer(
-            name=row["name"],
+        return Printer(
+            name=name,
             title=row["title"],
             pixels=(int(row["pixels_x"]), int(row["pixels_y"])),
             screen=(float(row["width"]), float(row["depth"])),
@@ -100,7 +113,7 @@ def _table() -> Iterator[Printer]:
         )
 
 
-PRINTERS = {p.name: p for p in _table()}
+PRINTERS = _Printers(Path(__file__).parent / "printers.csv")
 
 
 def printer(name: str) -> Printer:
@@ -127,6 +140,8 @@ def printer(name: str) -> Printer:
         return _own(Path(name))
     if name in PRINTERS:
         return PRINTERS[name]
+    import difflib
+
     near = difflib.get_close_matches(name.lower().replace(" ", "-"), PRINTERS, 1, 0.4)
     raise SliceError(
         f"printer {name!r}: unknown; "
@@ -136,26 +151,14 @@ def printer(name: str) -> Printer:
 
 def _own(path: Path) -> Printer:
     """Printer of a file."""
-    try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise SliceError(f"{path}: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise SliceError(f"{path}: {error}") from None
+    values = read_table(path, SliceError)
     settings = values.pop("resin", {})
-    names = [f.name for f in fields(Printer) if f.name != "settings"]
-    if unknown := sorted(set(values) - set(names)):
-        raise SliceError(f"{path}: {unknown[0]!r}: unknown; expected {', '.join(names)} or a table resin")
-    if missing := [name for name in ("pixels", "screen", "height") if name not in values]:
-        raise SliceError(f"{path}: {missing[0]} is missing")
     if not isinstance(settings, dict) or not all(isinstance(values.get(k, True), bool) for k in FLAGS):
         raise SliceError(f"{path}: expected a table resin, and true or false for {' and '.join(FLAGS)}")
-    named: dict[str, Any] = {"name": path.stem, "title": path.stem, "settings": tuple(settings.items())}
+    named: dict[str, Any] = {"name": path.stem, "title": path.stem}
     named |= {key: tuple(value) if isinstance(value, list) else value for key, value in values.items()}
-    try:
-        return Printer(**named)
-    except SliceError as error:
-        raise SliceError(f"{path}: {error}") from None
+    own = tuple(settings.items())
+    return from_table(Printer, str(path), named, SliceError, " or a table resin", settings=own)
 
 
 FLAGS = "mirror", "portrait"

@@ -9,7 +9,8 @@ import numpy as np
 
 from .._slices import Encoding, encoded
 from ..errors import SliceError
-from ..formulas.parameters import Count, Number, validate
+from ..formulas.parameters import Count, Number
+from ..formulas.records import attribute, validate
 from ..scene.lengths import Shift
 from .layers import Layer, ScreenView
 from .printers import Printer
@@ -46,14 +47,14 @@ class Screen:
 
     stack: Stack
     printer: Printer | None = None
-    compensation: float = 0.0
-    gamma: float = 1.0
+    compensation: float = attribute(Shift, 0.0, "how far outlines move")
+    gamma: float = attribute(Number, 1.0, "of the grey levels", above=0, most=10)
     mirror: bool | None = None
-    levels: int = 255
-    blur: int = 0
+    levels: int = attribute(Count, 255, "grey levels above black", least=1, most=255)
+    blur: int = attribute(Count, 0, "radius of the blur, pixels", least=0, most=16)
 
     def __post_init__(self) -> None:
-        validate(self, _KINDS, SliceError)
+        validate(self, SliceError)
         if not abs(self.compensation) <= 1:
             raise SliceError(f"compensation {self.compensation:g} mm: expected at most 1 mm")
         if self.printer:
@@ -164,14 +165,6 @@ class Screen:
         if self._portrait:
             return image[::-1].T if self._mirrored else image[::-1, ::-1].T
         return image[::-1, ::-1] if self._mirrored else image[::-1]
-
-
-_KINDS = {
-    "compensation": Shift(0.0, "how far outlines move"),
-    "gamma": Number(1.0, "of the grey levels", above=0, most=10),
-    "levels": Count(255, "grey levels above black", least=1, most=255),
-    "blur": Count(0, "radius of the blur, pixels", least=0, most=16),
-}
 
 
 @dataclass(frozen=True)

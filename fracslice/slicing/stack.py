@@ -9,7 +9,8 @@ import numpy as np
 
 from ..errors import SceneError, SliceError
 from ..formulas.box import Box, Triple
-from ..formulas.parameters import REQUIRED, Vector, validate
+from ..formulas.parameters import REQUIRED, Vector
+from ..formulas.records import attribute, validate
 from ..kernel import Field
 from ..printing import printable
 from ..scene import Print
@@ -51,18 +52,21 @@ class SliceJob:
         For layers or pixels as large as the object.
     """
 
-    size: float
-    layer: float = 0.05
-    pixel: tuple[float, float] = (0.05, 0.05)
-    up: Triple = UP
+    size: float = attribute(Length, REQUIRED, "the longest side")
+    layer: float = attribute(Length, 0.05, "the layer height")
+    pixel: tuple[float, float] = attribute(Pair, (0.05, 0.05), "width and height")
+    up: Triple = attribute(Vector, UP, "a direction", nonzero=True)
     printing: Print = field(default_factory=Print)
-    scale: Triple = SAME
-    unit: float | None = None
+    scale: Triple = attribute(Percent, SAME, "compensation of shrinkage")
+    unit: float | None = attribute(Length, None, "a scene unit")
 
     def __post_init__(self) -> None:
-        validate(self, _KINDS, SceneError)
+        validate(self, SceneError)
         if self.layer >= self.size:
-            raise SliceError(f"a layer of {self.layer:g} mm is as high as the object: {self.size:g} mm")
+            raise SliceError(
+                f"a layer of {self.layer:g} mm is as high as the object: {self.size:g} mm; "
+                "expected a lower layer or a larger object"
+            )
         if max(self.pixel) >= self.size:
             raise SliceError(f"a pixel of {max(self.pixel):g} mm is as large as the object: {self.size:g} mm")
 
@@ -70,16 +74,6 @@ class SliceJob:
     def sizing(self) -> Sizing:
         """Size of the object."""
         return Sizing(self.size, self.unit, self.scale)
-
-
-_KINDS = {
-    "size": Length(REQUIRED, "the longest side"),
-    "layer": Length(0.05, "the layer height"),
-    "pixel": Pair((0.05, 0.05), "width and height"),
-    "up": Vector(UP, "a direction", nonzero=True),
-    "scale": Percent(SAME, "compensation of shrinkage"),
-    "unit": Length(None, "a scene unit"),
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,6 +165,10 @@ def plan_stack(root: Field, job: SliceJob, work: Work | None = None) -> Stack:
     """
     upright = oriented(root, job.up, job.sizing.stretch, work)
     planned = plan(upright, job.sizing.longest / min(job.pixel), work)
+    if job.printing.bodies is not None:
+        from ..printing.framing import framed
+
+        planned = framed(planned, job.sizing, job.printing.bodies, work or Work())
     planned, scale = printable(planned, job.sizing, job.printing, work)
     box, outer = planned.box, planned.outer
     mm = tuple(s * scale for s in box.size)

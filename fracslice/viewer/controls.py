@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field
 
-from fracslice.rendering.steering import CameraInput
+from ..rendering.steering import CameraInput
 
 MOVES = {
     "w": ("forward", 1.0),

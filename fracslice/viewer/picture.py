@@ -11,12 +11,13 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fracslice.common.extras import lacking
-from fracslice.errors import RenderError
-from fracslice.export import replacing
-from fracslice.formulas.parameters import Choice, Vector, validated
-from fracslice.mesh.model import Mesh
-from fracslice.viewer import lighting
+from ..common.extras import lacking
+from ..errors import RenderError
+from ..export import replacing
+from ..formulas.parameters import Choice, Vector
+from ..formulas.records import validated
+from ..mesh.model import Mesh
+from . import plotter
 
 SOFTWARE = {"VTK_DEFAULT_OPENGL_WINDOW": "vtkOSOpenGLRenderWindow"}
 SECONDS = 600
@@ -57,7 +58,7 @@ def picture(
         If the file cannot be written.
     """
     size = validated("size", size, SIZE, RenderError)
-    validated("background", background, Choice("light", "", tuple(lighting.BACKGROUNDS)), RenderError)
+    validated("background", background, Choice("light", "", tuple(plotter.BACKGROUNDS)), RenderError)
     if not len(mesh.triangles):
         raise RenderError("the mesh has no triangles to draw")
     need_pyvista()
@@ -84,7 +85,7 @@ def need_pyvista() -> None:
 
 def _draw(arguments: list[str]) -> None:
     """Draw in a child process, first with the default OpenGL window, then with OSMesa."""
-    command = [sys.executable, "-P", lighting.__file__, *arguments]
+    command = [sys.executable, "-P", plotter.__file__, *arguments]
     for extra in ({}, SOFTWARE):
         try:
             run = subprocess.run(

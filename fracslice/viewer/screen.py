@@ -6,8 +6,8 @@ import ctypes
 import ctypes.util
 import sys
 
-from fracslice.common.extras import lacking
-from fracslice.errors import RenderError
+from ..common.extras import lacking
+from ..errors import RenderError
 
 
 def need_screen() -> None:

@@ -8,15 +8,15 @@ from dataclasses import replace
 from itertools import count
 from pathlib import Path
 
-from fracslice.errors import ExportError
-from fracslice.export import replacing
-from fracslice.rendering.live import Live
-from fracslice.scene.view import Camera
-from fracslice.scene.writer import to_xml
-from fracslice.viewer.canvas import Canvas
-from fracslice.viewer.controls import Controls
-from fracslice.viewer.screen import need_screen
-from fracslice.work import Work
+from ..errors import ExportError
+from ..export import replacing
+from ..rendering.live import Live
+from ..scene.view import Camera
+from ..scene.writer import to_xml
+from ..work import Work
+from .canvas import Canvas
+from .controls import Controls
+from .screen import need_screen
 
 FASTER = 1.25
 """Factor of the wheel on the pace."""

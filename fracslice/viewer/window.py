@@ -6,10 +6,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from fracslice.mesh.model import Mesh
-from fracslice.mesh.reading import read_mesh
-from fracslice.viewer.lighting import body, set_lighting
-from fracslice.viewer.screen import need_screen
+from ..mesh.model import Mesh
+from ..mesh.reading import read_mesh
+from .plotter import body, set_lighting
+from .screen import need_screen
 
 INK = "#303438"
 HELP = "drag: turn   wheel: zoom   W, S: wires, surface   C: cut open   V: first view   Q: close"

@@ -15,7 +15,7 @@ from ..formulas.box import Box, Triple
 from ..formulas.field import Bounds
 from ..formulas.registry import Node
 from ..kernel import Field, Kernel
-from ..kernel.depth import depth_notes, resolve_depths, visible
+from ..kernel.depth import advised, depth_notes, resolve_depths, visible
 from ..meshjob import RESOLUTION
 from ..store import Arrays, stored
 from ..work import Work
@@ -150,7 +150,8 @@ def plan(root: Field, resolution: float, work: Work | None = None) -> Plan:
     """
     tree = root.tree
     known = with_depths(tree, work) if tree else None
-    extents = extent(known or root, resolution, work)
+    with advised(known or root.tree, max(root.bounds.box.size) / resolution):
+        extents = extent(known or root, resolution, work)
     voxel = max(extents.box.size) / resolution
     planned = Plan(known or root, extents.box, extents.outer, extents.tips, voxel)
     if tree is None or known is None:
@@ -266,7 +267,8 @@ def _sampled(
 
     def made() -> Arrays:
         kernel, bounds, conservative = _fields(planned, work)
-        bricks = take(kernel, bounds, lattice, work, conservative, _proofs(planned))
+        with advised(planned.root.tree, planned.voxel):
+            bricks = take(kernel, bounds, lattice, work, conservative, _proofs(planned))
         fresh.append(bricks)
         arrays = {name: getattr(bricks, name) for name in ("ijk", held, "index")}
         return {**arrays, "proved": np.array([np.nan if bricks.proved is None else bricks.proved])}

@@ -6,6 +6,7 @@ from itertools import product
 
 import numpy as np
 
+from .._native import surface_error as measured
 from ..formulas.algebra import length
 from ..formulas.box import Box
 from ..kernel import Field
@@ -14,14 +15,13 @@ from ..work import Work, chunks
 REACH = 1e-4
 """Step of the finite differences, in voxels."""
 
-FLAT = 1e-5
-"""Estimated distance in voxels above which backward differences, and then those along diagonals, are taken
-too.
-"""
+AT_ONCE = 1 << 17
+"""Points measured between two checks for cancellation."""
 
-DIAGONALS = np.array([way for way in product((-1.0, 0.0, 1.0), repeat=3) if np.count_nonzero(way) > 1])
-"""Diagonal directions of a cube, [20, 3]."""
-
+_AXES = np.eye(3)
+_DIAGONALS = [way for way in product((-1.0, 0.0, 1.0), repeat=3) if np.count_nonzero(way) > 1]
+DIRECTIONS = np.array([way / length(way) for way in np.array([*_AXES, *-_AXES, *_DIAGONALS])])
+"""Directions of the differences: along the axes, against them, and along diagonals, [26, 3]."""
 
 STARTS, STEPS = 1024, 24
 """Random starting points of the search for the surface, and Newton steps per point."""
@@ -78,7 +78,14 @@ def surface_points(root: Field, box: Box, voxel: float, count: int, work: Work |
     return result
 
 
-def surface_error(root: Field, points: np.ndarray, voxel: float, work: Work | None = None) -> np.ndarray:
+def surface_error(
+    root: Field,
+    points: np.ndarray,
+    voxel: float,
+    work: Work | None = None,
+    scale: float = 1.0,
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> np.ndarray:
     """Estimate distances from the zero set to first order, ``|f| / |grad f|``.
 
     The float64 kernel is used. Along each axis the steeper of the two one-sided differences counts, because
@@ -91,11 +98,13 @@ def surface_error(root: Field, points: np.ndarray, voxel: float, work: Work | No
     root
         Field.
     points
-        Points, float [n, 3], scene units.
+        Placed points, float [n, 3].
     voxel
         Voxel size, scene units.
     work
         Execution settings.
+    scale, offset
+        Placement of the points: scale * p + offset for a point p in scene units.
 
     Returns
     -------
@@ -108,29 +117,11 @@ def surface_error(root: Field, points: np.ndarray, voxel: float, work: Work | No
     Cancelled
         If the job was cancelled.
     """
-    work = work or Work()
-    kernel, h = root.kernel(work.device, "float64"), REACH * voxel
-    error = np.empty(len(points))
-
-    def task(part: slice) -> None:
-        p = np.ascontiguousarray(points[part].T, np.float64)
-        f = kernel.points(*p)
-
-        def slopes(which: np.ndarray | slice, way: np.ndarray) -> np.ndarray:
-            there = kernel.points(*(p[:, which] + (h / length(way) * way)[:, None]))
-            result: np.ndarray = np.abs(there - f[which]) / h
-            return result
-
-        ups = np.stack([slopes(slice(None), axis) for axis in np.eye(3)])
-        steep = np.linalg.norm(ups, axis=0)
-        flat = np.flatnonzero(np.abs(f) > FLAT * voxel * steep)
-        if len(flat):
-            downs = np.stack([slopes(flat, -axis) for axis in np.eye(3)])
-            steep[flat] = np.linalg.norm(np.maximum(ups[:, flat], downs), axis=0)
-            flat = flat[np.abs(f[flat]) > FLAT * voxel * steep[flat]]
-        for way in DIAGONALS if len(flat) else ():
-            steep[flat] = np.maximum(steep[flat], slopes(flat, way))
-        error[part] = np.minimum(np.abs(f) / np.maximum(steep, 1e-30), voxel)
-
-    work.map(task, chunks(len(points), kernel.batch >> 3))
+    work, step = work or Work(), REACH * voxel
+    points, error = np.asarray(points, np.float64), np.empty(len(points))
+    rest = scale, offset, step * DIRECTIONS, step, voxel, work.threads
+    entry = root.kernel("cpu", "float64").entry
+    for part in chunks(len(points), AT_ONCE):
+        work.check()
+        error[part] = measured(entry, points[part], *rest)
     return error

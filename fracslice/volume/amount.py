@@ -13,7 +13,7 @@ from ..formulas.field import Bounds
 from ..kernel import Field, Kernel
 from ..kernel.cells import possible_cells
 from ..work import Work, chunks
-from .values import values_at
+from .evaluation import values_at
 
 POINTS = 1 << 18
 """Random points in all boxes."""

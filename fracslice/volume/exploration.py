@@ -20,7 +20,7 @@ from functools import partial
 
 import numpy as np
 
-from ..errors import VolumeError
+from ..errors import EmptyError, VolumeError
 from ..kernel import Kernel
 from ..work import chunks
 from .bricks import SignBricks
@@ -36,13 +36,16 @@ Evaluate = Callable[[np.ndarray], np.ndarray]
 MANY = 1 << 17
 """Bricks that are worth another evaluation than by the threads at hand."""
 
+TASKS, SHARES = 4, 8
+"""Tasks for each thread, if none is smaller than this fraction of what the kernel evaluates together."""
+
 AUDITS = 8
 """Largest number of audits."""
 
 ROWS = 1 << 15
 """Bricks per task."""
 
-LEAVES = "the solid reaches the border of what is sampled; give it finite <bounds>"
+LEAVES = "the solid reaches the border of the sampled region; give it finite <bounds>"
 
 FAR_AUDITS = 1 << 15
 """Random bricks tested by an audit, besides those next to the samples; in a smaller lattice, all bricks."""
@@ -181,7 +184,9 @@ class Exploration:
                 out = values[part] if self.keep else np.empty((part.stop - part.start, BRICK**3), np.float32)
                 signs[part] = brick_signs(self.kernel, corners[part], self.lattice, out)
 
-        self.work.map(task, chunks(len(bricks), self.kernel.batch // BRICK**3))
+        most = self.kernel.batch // BRICK**3
+        size = min(max(len(bricks) // (TASKS * self.work.threads), -(-most // SHARES)), most)
+        self.work.map(task, chunks(len(bricks), size))
         self.pruning.evaluations += len(bricks) * BRICK**3
         if whole:
             signs = whole(corners)
@@ -199,9 +204,7 @@ class Exploration:
                 near = bricks[part] + states.step(axis, step)
                 there = states.flat[near]
                 if (inside & (there == BORDER)).any():
-                    raise VolumeError(
-                        "the solid reaches the border of what is sampled; give it finite <bounds>"
-                    )
+                    raise VolumeError(LEAVES)
                 lost = (there == EMPTY) & inside | (there == FULL) & outside
                 result.append(near[lost | (there == CANDIDATE) & outside])
                 many += int(np.count_nonzero(lost))
@@ -235,9 +238,9 @@ class Exploration:
         signs = np.concatenate([np.empty((0, 8, 8), np.uint8), *self.bits])
         order, index = crossed(states, numbers, signs, self.work)
         if not len(order):
-            raise VolumeError(
+            raise EmptyError(
                 "there is no surface: the scene is empty, or all of it is thinner than a voxel of "
-                f"{self.lattice.voxel:.3g}; more voxels, or fewer levels or iterations, may show it"
+                f"{self.lattice.voxel:.3g}; expected more voxels"
             )
         corners, kept = np.empty((len(order), 3), np.int32), np.empty((len(order), 8, 8), np.uint8)
 

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._native import Sides
-from ..errors import VolumeError
+from ..errors import EmptyError, VolumeError
+from ..formulas import Node
 from ..formulas.box import Box
 from ..kernel import Field
 from ..work import Work
 from .climbing import SLANTS, climb
-from .values import values_at
+from .evaluation import values_at
 
 TURNS = 8
 """Attempts to enlarge the searched box because the object leaves it, or to shrink it."""
@@ -96,6 +97,8 @@ def extent(root: Field, resolution: float, work: Work | None = None) -> Extent:
 
     Raises
     ------
+    SceneError
+        For an element without an end.
     VolumeError
         If nothing is inside or the object is unbounded.
     Cancelled
@@ -108,7 +111,8 @@ def extent(root: Field, resolution: float, work: Work | None = None) -> Extent:
         *axes, last = (a for a, s in zip("xyz", box.size, strict=True) if not np.isfinite(s))
         along = f"{', '.join(axes)} and {last}" if axes else last
         state = "".join(f", or state the box of {n} with @{n}.bounds" for n in root.bounds.boxless[:1])
-        raise VolumeError(f"the scene has no end along {along}; put <bounds> around it{state}")
+        message = f"has no end along {along}; put <bounds> around it{state}"
+        raise _endless(root.tree).fail(message) if root.tree else VolumeError(f"the field {message}")
     search = _Search(root, work or Work())
     for _ in range(TURNS):
         result = search.extent(box, resolution)
@@ -151,6 +155,12 @@ def reached(root: Field, points: np.ndarray, voxel: float, work: Work | None = N
     search.climb(sides, voxel / 2, EXACT * max(within.size))
     known = np.where(np.isfinite(sides.known), sides.known, sides.above)
     return within | _box((SIGNS * known).reshape(2, 3))
+
+
+def _endless(node: Node) -> Node:
+    """Innermost element without an end."""
+    inner = next((child for child in node.fields if not child.bounds.box.finite), None)
+    return _endless(inner) if inner else node
 
 
 class _Search:
@@ -198,7 +208,7 @@ class _Search:
             self.climb(sides, step, exact)
             sides.prove(aim, most)
             if not np.isfinite(sides.known).all():
-                raise VolumeError("there is no surface: nothing in the scene is inside")
+                raise EmptyError("there is no surface: no point is inside; expected thicker parts")
             _learn(sides, sides.best[:, :, 0])
             if aim <= exact or (sides.spent >= LITTLE).all():
                 break

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from ..common.digits import significant
 from ..common.memory import available_bytes
 from ..errors import TooLargeError, VolumeError
 from ..formulas.box import Box, Triple
@@ -77,14 +78,16 @@ class Lattice:
             raise VolumeError(f"voxel size {voxel!r}: expected a length > 0")
         counts = [math.ceil((s / voxel + 2 * PADDING + 1) / BRICK) for s in box.size]
         if math.prod(counts) > MOST_BRICKS:
-            fits = voxel * (math.prod(counts) / MOST_BRICKS) ** (1 / 3)
+            voxels = max(box.size) / voxel
+            most = voxels * (MOST_BRICKS / math.prod(counts)) ** (1 / 3) - 2 * BRICK
             raise VolumeError(
-                f"a voxel of {voxel:.4g} makes a grid of {_shape(counts)} bricks; "
-                f"the finest that fits is {fits:.4g}"
+                f"{voxels:.0f} voxels along the longest side make a grid of {_shape(counts)} bricks: "
+                f"expected at most {most:.0f} voxels, or a voxel {significant(voxels / most)} times as large"
             )
         if (needed := math.prod(counts) * BYTES_A_BRICK) > LARGE and needed > (free := available_bytes()):
             raise TooLargeError(
-                f"a voxel of {voxel:.4g} makes a grid of {_shape(counts)} bricks, which needs "
+                f"{max(box.size) / voxel:.0f} voxels along the longest side make a grid of {_shape(counts)} "
+                f"bricks, which needs "
                 f"{needed / 1e9:.1f} GB of memory, and {free / 1e9:.1f} GB are free"
             )
         start = [

@@ -54,8 +54,8 @@ def sample(
     """
     values: list[np.ndarray] = []
 
-    def keep(wave: np.ndarray) -> None:
-        values.append(wave)
+    def keep(batch: np.ndarray) -> None:
+        values.append(batch)
 
     run = Exploration(Pruning(kernel, conservative or kernel, bounds, lattice, work or Work(), proofs), keep)
     signs, order = run.signs()
@@ -117,17 +117,17 @@ def sample_signs(
     return signs
 
 
-def _gathered(waves: list[np.ndarray], order: np.ndarray, work: Work) -> np.ndarray:
+def _gathered(batches: list[np.ndarray], order: np.ndarray, work: Work) -> np.ndarray:
     """Samples of the bricks in `order`. Each batch is released as soon as it is copied."""
     out, start = np.empty((len(order), BRICK**3), np.float32), 0
-    while waves:
-        wave = waves.pop(0)
-        mine = np.flatnonzero((order >= start) & (order < start + len(wave)))
+    while batches:
+        batch = batches.pop(0)
+        mine = np.flatnonzero((order >= start) & (order < start + len(batch)))
         rows = order[mine] - start
-        work.map(partial(_copy, out, wave, mine, rows), chunks(len(mine), 1 << 6))
-        start += len(wave)
+        work.map(partial(_copy, out, batch, mine, rows), chunks(len(mine), 1 << 6))
+        start += len(batch)
     return out
 
 
-def _copy(out: np.ndarray, wave: np.ndarray, to: np.ndarray, rows: np.ndarray, part: slice) -> None:
-    out[to[part]] = wave[rows[part]]
+def _copy(out: np.ndarray, batch: np.ndarray, to: np.ndarray, rows: np.ndarray, part: slice) -> None:
+    out[to[part]] = batch[rows[part]]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fracslice.animation.curves import CURVES, eased
+from fracslice.animation.motion_curves import CURVES, eased
 
 TIMES = np.array([0.0, 1.0, 1.5, 4.0])
 FINE = np.linspace(0, 4, 2001)

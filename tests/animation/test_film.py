@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -50,10 +51,12 @@ def test_a_film_that_stopped_goes_on_and_is_the_same(path: Path, tmp_path: Path)
     assert animate(path, "-o", whole) == 0
     assert animate(path, "-o", parts, "--frames", "2..5") == 0
     kept = (parts / "frame00003.png").stat().st_mtime_ns
+    (parts / ".frame00006.png.k1ll3d.part").write_bytes(b"killed here")
     assert animate(path, "-o", parts, "--resume", "--threads", 1) == 0
     assert (parts / "frame00003.png").stat().st_mtime_ns == kept
     names = [f"frame{k:05}.png" for k in range(8)]
-    assert sorted(file.name for file in whole.iterdir()) == ["film.json", *names]
+    for folder in (whole, parts):
+        assert sorted(file.name for file in folder.iterdir()) == ["film.json", *names]
     for name in names:
         assert (whole / name).read_bytes() == (parts / name).read_bytes()
     assert (whole / names[0]).read_bytes() != (whole / names[7]).read_bytes()
@@ -70,11 +73,25 @@ def test_a_stopped_film_says_what_is_there(
         return encoded(job, number, work)
 
     monkeypatch.setattr(FilmJob, "file", interrupted)
-    assert animate(path, "-o", tmp_path / "film.gif") == 130
+    assert animate(path, "-o", tmp_path / "film.gif", "--threads", 1) == 130
     assert "film.frames are whole" in capsys.readouterr().err
     frames = sorted(file.name for file in (tmp_path / "film.frames").iterdir())
     assert frames == ["film.json", "frame00000.png", "frame00001.png", "frame00002.png"]
     assert not (tmp_path / "film.gif").exists()
+
+
+def test_frames_are_made_at_once(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert animate(path, "-o", tmp_path / "one", "--threads", 1) == 0
+    encoded, both = FilmJob.file, threading.Barrier(2, timeout=60)
+
+    def waiting(job: FilmJob, number: int, work: Work) -> bytes:
+        both.wait()
+        return encoded(job, number, work)
+
+    monkeypatch.setattr(FilmJob, "file", waiting)
+    assert animate(path, "-o", tmp_path / "two", "--threads", 2) == 0
+    for frame in (tmp_path / "one").glob("*.png"):
+        assert frame.read_bytes() == (tmp_path / "two" / frame.name).read_bytes()
 
 
 def test_shards_make_the_frames_of_one_film(path: Path, tmp_path: Path) -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import inspect
+import pickle
 import threading
 from dataclasses import FrozenInstanceError, fields
 from pathlib import Path
@@ -95,6 +97,7 @@ def test_what_is_no_shape_is_named(source: object, message: str) -> None:
         ({"thickness": "thick"}, SceneError, "thickness='thick': expected 0, or a length"),
         ({"threads": 0}, SceneError, "threads=0: expected"),
         ({"progress": True}, TypeError, "progress=True: expected a callable"),
+        ({"cancel": 3}, TypeError, "cancel=3: expected a threading.Event"),
     ],
 )
 def test_keywords_that_cannot_be_are_named(options: dict, error: type, message: str) -> None:
@@ -184,3 +187,19 @@ def test_a_mesh_leaves_the_callers_arrays_alone() -> None:
 
 def test_a_mesh_says_what_it_is(made: Result) -> None:
     assert repr(made).startswith("<Result of ") and repr(made).endswith(", 20 x 20 x 10>")
+
+
+def test_a_report_is_shown_in_one_line() -> None:
+    made = make_mesh(sphere(), size=20, resolution=16)
+    assert repr(made.report) == "<Report of scene: 20 mm, voxel 1.25 mm, watertight, manifold>"
+
+
+def test_a_result_is_pickled_and_copied() -> None:
+    made = make_mesh(sphere(), resolution=16, colour="steps")
+    for again in (pickle.loads(pickle.dumps(made)), copy.deepcopy(made)):
+        assert repr(again) == repr(made) and again.report == made.report
+        np.testing.assert_array_equal(again.vertices, made.vertices)
+        np.testing.assert_array_equal(again.scalars["steps"], made.scalars["steps"])
+        assert not again.vertices.flags.writeable
+        with pytest.raises(TypeError):
+            again.scalars["steps"] = made.scalars["steps"]

@@ -60,6 +60,8 @@ def test_progress_is_reported_and_work_is_cancelled() -> None:
     [
         ({"sample": 1}, TypeError, r"render\(\) has no argument 'sample'; did you mean samples\?"),
         ({"size": (0, 10)}, RenderError, r"size=\(0, 10\): expected 2 whole numbers"),
+        ({"camera": (3, 3, 2)}, TypeError, r"camera=\(3, 3, 2\): expected a Camera"),
+        ({"lights": Light()}, TypeError, "expected a sequence of Light"),
         ({"samples": 0}, RenderError, "samples=0: expected a whole number"),
         ({"camera": Camera(eye=(0.1, 0, 0.4))}, SceneError, "eye: expected a place outside"),
     ],

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
@@ -39,6 +42,15 @@ def test_layers_are_indexed_as_sequences_are(slices: Slices) -> None:
     assert list(slices[5:5]) == []
     with pytest.raises(IndexError):
         slices[20]
+
+
+def test_layers_are_pickled_and_copied(slices: Slices) -> None:
+    for again in (pickle.loads(pickle.dumps(slices[4:6])), copy.deepcopy(slices[4:6])):
+        assert isinstance(again, Slices) and np.array_equal(again, slices[4:6])
+    assert repr(slices.contours[3]).startswith("<Contours: 2 polygons, 25.1")
+    assert [p.area for p in pickle.loads(pickle.dumps(slices.polygons[4:6]))] == pytest.approx(
+        [RING] * 2, 1e-3
+    )
 
 
 def test_nothing_is_computed_before_it_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,8 +11,8 @@ import pytest
 from fracslice.cli.main import run
 
 from fracslice.bench.measure import errors, spread
+from fracslice.bench.measurements import BenchmarkTask, measure
 from fracslice.bench.peers import Peer
-from fracslice.bench.runs import BenchmarkTask, measure
 from fracslice.bench.workloads import WORKLOADS
 from fracslice.cluster import ResultFolder, Shard
 from fracslice.errors import BenchError, Cancelled, SharedError

@@ -20,6 +20,8 @@ def scene_of(inside: str, size: str = "20mm") -> str:
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "ball.xml").write_text(BALL)
+    (tmp_path / "empty.xml").write_text(scene_of("<difference><sphere/><box size='9 9 9'/></difference>"))
+    (tmp_path / "ball.toml").write_bytes(b"\xff")
     (tmp_path / "out").mkdir()
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -51,7 +53,10 @@ def refused(capfd: pytest.CaptureFixture[str], folder: Path, *arguments: str) ->
         (scene_of("<sphere radius='inf'/>"), 'bad.xml:3: <sphere> radius="inf": expected a number > 0'),
         (scene_of("<sphere radius='-1'/>"), 'bad.xml:3: <sphere> radius="-1": expected a number > 0'),
         (scene_of("<sphere/>", "0mm"), 'bad.xml:2: <solid> size="0mm": expected a length above zero'),
-        (scene_of("<plane/>"), "no end along"),
+        (
+            scene_of("<union>\n<sphere/>\n<gyroid/></union>"),
+            "bad.xml:5: <gyroid> has no end along x, y and z; put <bounds> around it",
+        ),
         (
             scene_of("<intersection><sphere/><transform translate='9 0 0'><box/></transform></intersection>"),
             "empty",
@@ -104,12 +109,31 @@ def test_scenes(text, message, folder, capfd):
             "voxel and resolution: expected one of them",
         ),
         ("mesh ball.xml -o out/x.stl --simplify 0", "length '0': expected a length above zero"),
-        ("mesh ball.xml -o out/x.stl --resolution 0", "resolution=0: expected a number >= 8 and <= 16384"),
+        (
+            "mesh ball.xml -o out/x.stl --simplify 1m",
+            "simplify 1000mm: expected at most 5mm for an object of",
+        ),
+        ("mesh ball.xml -o out/x.stl --drain 2mm", "--drain: expected --hollow, or a hollow in the scene's"),
+        ("mesh ball.xml -o out/x.stl --resolution 16384", "bricks: expected at most 8"),
+        ("animate ball.xml -o out/x.gif", "ball: expected an <animation> in the scene; animate --fly"),
+        ("slice ball.xml -o - --layer 1mm", "-: expected the name of a file; standard input and output"),
+        ("slice ball.xml -o /dev/null --layer 1mm", "/dev/null: expected a folder for png files"),
+        ("slice ball.xml -o out/x.sl1 --printer ball.toml", "ball.toml: expected text in UTF-8"),
+        ("mesh empty.xml -o out/x.stl", "empty.xml: there is no surface"),
+        ("slice ball.xml -o out/x --layer 2cm", "as high as the object: 20 mm; expected a lower layer or"),
+        ("mesh ball.xml -o out/x.stl --resolution 0", "0 is not in the range 8<=x<=16384"),
+        ("mesh ball.xml -o out/x.stl --cluster foo", "'foo': expected local, local:N or the address of"),
+        ("mesh ball.xml -o out/x.stl --set sphere.radius=1..2:1e-9", "expected at most 10000 values"),
+        (f"mesh ball.xml -o out/{'x' * 300}.stl", "File name too long"),
+        ("render ball.xml -o out/x.jpg --bits 16", "expected a .png file as --output"),
         ("mesh ball.xml -o out/x.stl --resolution many", "'many' is not a valid whole number"),
         ("mesh ball.xml -o out/x.stl --threads 0", "0 is not in the range"),
         ("mesh ball.xml -o out/x.stl --device gpu", "'gpu' is not one of 'cpu', 'cuda', 'auto'"),
         ("mesh ball.xml -o out/x.stl --dust nan", "nan: expected a finite number"),
-        ("mesh ball.xml -o out/x.stl --keep some", "'some': expected all or largest"),
+        (
+            "mesh ball.xml -o out/x.stl --keep some",
+            '\'some\': expected a whole number from 1 to 1000000, "all" or "largest"',
+        ),
         (
             "mesh ball.xml -o out/x.stl --set sphre.radius=2",
             "the scene has no <sphre>; did you mean <sphere>?",
@@ -144,7 +168,7 @@ def test_a_full_disk(folder, capfd, monkeypatch):
 
     monkeypatch.setattr("os.fsync", full)
     line = refused(capfd, folder, "mesh", "ball.xml", "-o", "out/x.stl", "--resolution", "16")
-    assert line == "out/x.stl: the disk is full; nothing was written"
+    assert line == "out/x.stl: the disk is full; the file was not written"
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")

@@ -35,7 +35,7 @@ def test_everything_that_a_maker_asks() -> None:
         bodies=3,
     )
     assert list(whole.lines()) == [
-        "38.2 ml, 42 g of Siraya Tech Fast Grey (1.1 g/ml), 1200 layers, 3 h 25 min, cost 1.91",
+        "38.2 ml, 42 g of Siraya Tech Fast Grey (1.1 g/ml), 1,200 layers, 3 h 25 min, cost 1.91",
         "drain holes of 3 mm leave the hollow at -30.0 0.0 4.0 and 0.0 0.0 58.0 mm",
         "1.2 ml trapped in 2 sealed cavities: --cavities fill, or --drain 3mm for a hollow",
         "3 loose bodies: --bridge 1mm, or --keep largest",
@@ -76,6 +76,6 @@ def test_layers_end_with_them(tmp_path: Path, capfd: pytest.CaptureFixture[str])
     hollow = "--cavities", "fill", "--hollow", "2mm", "--drain", "4mm"
     coarse = "--layer", "1mm", "--pixel", "0.5mm"
     assert printed(capfd, "slice", shell, "-o", tmp_path / "layers", *coarse, *hollow)[-2:] == [
-        "3.84 ml, 4.23 g of resin (1.1 g/ml), 20 layers",
-        "drain holes of 4 mm leave the hollow at -7.4 -4.0 4.0 and -7.4 7.4 15.9 mm",
+        "3.86 ml, 4.24 g of resin (1.1 g/ml), 20 layers",
+        "drain holes of 4 mm leave the hollow at -0.1 -0.1 4.0 and -0.1 -0.1 16.0 mm",
     ]

@@ -9,7 +9,17 @@ import pytest
 from fracslice.cli.main import run
 from PIL import Image
 
-from fracslice.formulas import julia, mandelbulb, material, menger, sphere, superquadric, transform, union
+from fracslice.formulas import (
+    julia,
+    mandelbulb,
+    material,
+    menger,
+    orbit,
+    sphere,
+    superquadric,
+    transform,
+    union,
+)
 from fracslice.scene import Scene, read
 from fracslice.scene.variation import varied
 
@@ -71,6 +81,23 @@ def test_numbers_stay_within_their_ranges_and_the_look_stays() -> None:
         assert 2 <= painted.children[0].children[0]["exponent"] <= 100
         assert bulb["iterations"] == "auto" and max(map(abs, bulb["c"])) <= 4
         assert 0 <= sponge["level"] <= 20 and new != root
+
+
+def test_steps_of_a_hybrid_are_varied() -> None:
+    """Their bailout and iterations are those of the hybrid; only they repeat."""
+    root = orbit(mandelbulb(8), transform(mandelbulb(3, repeat=2), scale=1.1), iterations=1)
+    for k in range(3):
+        new = varied(Scene(root, 40.0), (0, k), 1.5).root
+        assert new != root and {step["bailout"] for step in (new.children[0], *new.children[1].children)} == {
+            2
+        }
+        assert varied(Scene(mandelbulb(iterations=2), 40.0), (0, k), 4.0).root["repeat"] == 1
+
+
+def test_every_variation_is_another_scene() -> None:
+    """Whole numbers stay in most draws."""
+    root = menger(level=2)
+    assert all(varied(Scene(root, 40.0), (2, k), 0.3).root != root for k in range(5))
 
 
 def test_every_variation_holds_a_solid() -> None:

@@ -118,6 +118,16 @@ def test_a_page_holds_figures_problems_pictures_and_the_cross_section(
 def test_a_model_is_turned_and_scaled_before_it_is_examined() -> None:
     part = box((10, 20, 5))
     model = Mesh(np.asarray(part.vertices, np.float64), np.asarray(part.faces, np.int32))
-    options = {"up": (1.0, 0.0, 0.0), "scale": (1.02, 1.0, 1.1)}
-    assert placed(model, options).size.tolist() == pytest.approx([5.1, 20, 11])
-    assert placed(model, {"up": (0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}) is model
+    assert placed(model, (1.0, 0.0, 0.0), (1.02, 1.0, 1.1)).size.tolist() == pytest.approx([5.1, 20, 11])
+    assert placed(model, (0.0, 0.0, 1.0), (1.0, 1.0, 1.0)) is model
+
+
+def test_a_model_smaller_than_a_layer_is_in_another_unit(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "metres.stl"
+    box((0.03, 0.03, 0.03)).export(path)
+    assert run(["check", str(path)]) == 2
+    assert capfd.readouterr().err == (
+        f"fracslice: {path}: 0.03 mm long, less than a layer: expected a model in mm\n"
+    )

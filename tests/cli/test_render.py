@@ -7,11 +7,13 @@ import re
 import signal
 import time
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from fracslice.cli.main import run
+from fracslice.cli.render import reached
 from PIL import Image
 
 from fracslice.rendering import Pass, Renderer, bands, cpu
@@ -261,3 +263,8 @@ def test_noise_is_removed_from_a_picture_of_light(
     assert run([*common, str(tmp_path / "c.png"), "--denoise", "--set", "shading.mode=depth"]) == 2
     assert 'expected a scene with shading mode="light"' in capsys.readouterr().err
     assert not (tmp_path / "c.png").exists()
+
+
+def test_the_error_of_less_than_a_sample_is_unknown():
+    assert reached(SimpleNamespace(samples=0.25, error=float("inf"))) == "0.2 samples a pixel, error unknown"
+    assert reached(SimpleNamespace(samples=4.0, error=0.0123)) == "4.0 samples a pixel, error 0.012"

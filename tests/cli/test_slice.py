@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from fracslice.cli.main import run
 
+from fracslice.errors import Cancelled
 from fracslice.export.resuming import Journal
 
 
@@ -91,15 +92,15 @@ def test_an_edited_scene_begins_afresh_and_says_so(
 
     def stopped(self: Journal, data: bytes) -> None:
         if self.count == 8:
-            raise KeyboardInterrupt
+            raise Cancelled
         add(self, data)
 
     scene.write_text(text.format(0.3))
     with monkeypatch.context() as patch:
         patch.setattr(Journal, "append", stopped)
         assert run(["slice", str(scene), *map(str, options)]) == 130
+    assert capfd.readouterr().err.endswith("stopped; the same command goes on from the finished layers\n")
     scene.write_text(text.format(0.1))
-    capfd.readouterr()
     assert run(["slice", str(scene), *map(str, options)]) == 0
     reported = capfd.readouterr().err
     assert (

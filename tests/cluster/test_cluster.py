@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -17,12 +18,13 @@ from fracslice.animation import FilmJob, Timeline, write_frames
 from fracslice.cluster import ResultFolder, Workers, connected, workers
 from fracslice.cluster.identity import Identity
 from fracslice.errors import Cancelled, ClusterError
-from fracslice.export.slices import write_slices
+from fracslice.export.layer_files import write_slices
 from fracslice.formulas import mandelbulb, sphere
 from fracslice.jobs import mesh_sampling as meshsampling
 from fracslice.jobs import mesh_tasks as meshtasks
 from fracslice.jobs.mesh import make_mesh
 from fracslice.jobs.slice_recipe import SliceRecipe
+from fracslice.mesh import survey
 from fracslice.meshjob import MeshJob
 from fracslice.rendering import Renderer, parts
 from fracslice.scene import Scene, scene
@@ -104,6 +106,7 @@ def no_workers_of_other_tests(cluster: Cluster) -> Iterator[None]:
 def small_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parts, "PIXELS", 1024)
     monkeypatch.setattr(meshtasks, "LEAST", 1)
+    monkeypatch.setattr(survey, "FAN", 2)
     monkeypatch.setattr(exploration, "MANY", 1)
     monkeypatch.setattr(meshsampling, "BRICKS", 32)
     monkeypatch.setattr(workers, "CONNECT", SECONDS)  # the machine may be busy
@@ -159,7 +162,7 @@ SHARED = {
     "slice": (["--layer", "0.1mm", "--pixel", "0.05mm"], "layers-*", "a.cli"),
     "mesh": (["--resolution", "40", "--dust", "5"], "surface-*", "a.stl"),
     "render": (["--size", "96x72", "--samples", "3"], "../*.npz", "a.png"),
-    "animate": (["--size", "32x24", "--samples", "4", "--fps", "6"], "frame-*", "frames"),
+    "animate": (["--size", "32x24", "--samples", "4", "--fps", "12"], "frame-*", "frames"),
 }
 """Options, pieces and file of a command."""
 PASSES = 4
@@ -215,33 +218,58 @@ def test_the_client_dies_and_the_same_command_goes_on(
 
 
 def contents(path: Path) -> list[bytes]:
-    """Bytes of a file, or of the frames of a folder; a killed process leaves an unfinished, hidden one."""
-    return [of.read_bytes() for of in (sorted(path.glob("f*")) if path.is_dir() else [path])]
+    """Bytes of a file, or of the files of a folder."""
+    return [of.read_bytes() for of in (sorted(path.iterdir()) if path.is_dir() else [path])]
+
+
+OTHER = "fracslice 0.0.9, expected 0.1.0"
+LACKING = "No module named 'fracslice.cluster'; 'fracslice' is not a package"
 
 
 def test_a_worker_of_another_version_is_not_used(
     cluster: Cluster, expected: dict[str, bytes], tmp_path: Path
 ) -> None:
     old = tmp_path / "old.py"
-    old.write_text('from fracslice.cluster import identity\nidentity.__version__ = "0.0.9"\n')
-    cluster.worker("--preload", str(old))
+    lacking = "import sys\nsys.modules['fracslice.jobs.slice_recipe'] = None\n"
+    old.write_text(f'{lacking}from fracslice.cluster import identity\nidentity.__version__ = "0.0.9"\n')
+    bare = tmp_path / "bare.py"
+    bare.write_text("import sys\nsys.modules['fracslice'] = None\n")
+    for preload in (old, bare):
+        cluster.worker("--preload", str(preload))
     good = cluster.worker()
-    with (
-        connected(cluster.address, str(tmp_path / "pieces")) as pool,
-        warnings.catch_warnings(record=True) as lines,
-    ):
+    with warnings.catch_warnings(record=True) as lines:
         warnings.simplefilter("always")
-        pool.client.wait_for_workers(2, timeout=SECONDS)
-        result = sliced(Work(1, cluster=pool), tmp_path)
-    assert result == expected["slice"]
-    (line,) = {str(one.message) for one in lines if "not used" in str(one.message)}
-    assert line.endswith("is not used: fracslice 0.0.9, expected 0.1.0")
-    good.kill()
-    good.wait()
-    with connected(cluster.address, str(tmp_path / "pieces")) as pool:
-        wait_until(lambda: len(pool.client.scheduler_info()["workers"]) == 1)
-        with pytest.raises(ClusterError, match="no worker fits"):
-            sliced(Work(1, cluster=pool), tmp_path)
+        with connected(cluster.address, str(tmp_path / "pieces")) as pool:
+            pool.client.wait_for_workers(3, timeout=SECONDS)
+            assert sliced(Work(1, cluster=pool), tmp_path) == expected["slice"]
+        good.kill()
+        good.wait()
+        with connected(cluster.address, str(tmp_path / "pieces")) as pool:
+            wait_until(lambda: len(pool.client.scheduler_info()["workers"]) == 2)
+            with pytest.raises(ClusterError, match="no worker fits"):
+                sliced(Work(1, cluster=pool), tmp_path)
+    assert {str(one.message).partition(" is not used: ")[2] for one in lines} - {""} == {OTHER, LACKING}
+
+
+ARRAYS = """import resource
+import numpy as np
+from fracslice.common.memory import keep_freed_memory
+
+keep_freed_memory()
+faults = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+for _ in range(100):
+    np.ones(1 << 17)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - faults)"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="of glibc")
+def test_workers_reuse_freed_memory() -> None:
+    """Dask's nanny starts them with a setting that returns each array to the system."""
+    given = {**os.environ, "MALLOC_TRIM_THRESHOLD_": "65536"}
+    done = subprocess.run(
+        [sys.executable, "-c", ARRAYS], env=given, capture_output=True, text=True, check=True
+    )
+    assert int(done.stdout) < 100 * (1 << 20) / 4096 / 10
 
 
 def test_what_differs_is_named() -> None:
@@ -290,7 +318,10 @@ def test_an_object_store_keeps_the_first_of_two_results(tmp_path: Path) -> None:
 def test_local_workers_are_processes(tmp_path: Path) -> None:
     with connected("local:2", str(tmp_path / "pieces"), 2) as pool:
         result = pool.client.scheduler_info(n_workers=-1)["workers"].values()
+        blocked = pool.client.run(signal.pthread_sigmask, signal.SIG_BLOCK, [])
     assert [worker["nthreads"] for worker in result] == [1, 1]
+    assert all(signal.SIGINT in of for of in blocked.values()), "Ctrl-C is for the client"
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
 
 
 def test_a_client_of_dask_is_a_cluster(

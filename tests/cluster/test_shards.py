@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import threading
+import zipfile
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
 from fracslice.cli.main import run as command
 
 from fracslice.cluster import ResultFolder, Shard
+from fracslice.common import files
 from fracslice.errors import ClusterError, SharedError
-from fracslice.export.slices import write_slices
+from fracslice.export import text
+from fracslice.export.layer_files import write_slices
 from fracslice.formulas import box, cone, flake, sphere
 from fracslice.jobs import mesh_sampling as meshsampling
 from fracslice.jobs import mesh_tasks as meshtasks
+from fracslice.jobs import shared_packing, shared_writing
 from fracslice.jobs.mesh import MeshResult, make_mesh
+from fracslice.mesh import survey
 from fracslice.meshjob import MeshJob
 from fracslice.rendering import parts
 from fracslice.scene import scene
@@ -53,25 +60,61 @@ def test_shards_of_layers_make_one_file(
 
 
 def test_a_shard_makes_what_others_leave(tmp_path: Path) -> None:
-    shard = Shard(ResultFolder(str(tmp_path / "pieces")), 1, 3, patience=0)
-    run = RECIPE.run(Work(1, cluster=shard))
+    """It waits for them once."""
+    shard, waits = Shard(ResultFolder(str(tmp_path / "pieces")), 1, 3, patience=0.3), list[float]()
+
+    class Event(threading.Event):
+        def wait(self, timeout: float | None = None) -> bool:
+            waits.append(timeout or 0.0)
+            return super().wait(timeout)
+
+    made = list(shard.made([Nothing(f"nothing-{n}") for n in range(12)], Work(1, cancel=Event())))
+    assert sorted(made) == list(range(12)) and 0 < len(waits) < 4
+    run = RECIPE.run(Work(1, cluster=replace(shard, patience=0)))
     write_slices(run, tmp_path / "b.cli")
     assert (tmp_path / "b.cli").read_bytes() == sliced(Work(2), tmp_path)
 
 
+@dataclass(frozen=True)
+class Nothing:
+    """Task without work."""
+
+    name: str
+    job: str = "nothing"
+
+    def make(self, _: Work) -> bytes:
+        """Nothing."""
+        return b""
+
+
 def test_shards_of_a_mesh_make_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Tips and dust included; the other shard ends when its pieces are made."""
+    """Tips and dust included; the other shard ends when its pieces are made. Borders are joined by tasks.
+
+    Tasks write the triangles to their places: the file is the one that they wrote, under another name.
+    """
     monkeypatch.setattr(meshtasks, "LEAST", 1)
+    monkeypatch.setattr(shared_writing, "FIRST", 7)
+    monkeypatch.setattr(shared_writing, "ROWS", 1000)
+    monkeypatch.setattr(files, "appended", None)
+    places, make = list[str](), shared_writing.PlaceTask.make
+    monkeypatch.setattr(
+        shared_writing.PlaceTask, "make", lambda of, work: (places.append(of.name), make(of, work))[1]
+    )
+    monkeypatch.setattr(survey, "FAN", 2)
+    joins, join = list[str](), meshtasks.JoinTask.make
+    monkeypatch.setattr(
+        meshtasks.JoinTask, "make", lambda of, work: (joins.append(of.name), join(of, work))[1]
+    )
     shape = cone(radius=0.5, height=2.0) | sphere(radius=0.05).translate((0.8, 0.0, 0.0))
     turned = scene(shape.rotate(70.0, (0.0, 1.0, 0.2)), size="20mm")
     job = MeshJob(resolution=32, dust_mm3=2.0)
     shards = [Shard(ResultFolder(str(tmp_path / "pieces")), number, 2) for number in (1, 2)]
-    files = {number: tmp_path / f"{number}.stl" for number in (0, 1, 2)}
+    paths = {number: tmp_path / f"{number}.stl" for number in (0, 1, 2)}
 
     def made(shard: Shard | None) -> MeshResult | None:
         number = shard.number if shard else 0
         try:
-            return make_mesh(turned, job, Work(1, cluster=shard), files[number])
+            return make_mesh(turned, job, Work(1, cluster=shard), paths[number])
         except SharedError:
             return None
 
@@ -79,8 +122,13 @@ def test_shards_of_a_mesh_make_one_file(tmp_path: Path, monkeypatch: pytest.Monk
         first, second = pool.map(made, shards)
     whole = made(None)
     assert first and whole and second is None
-    assert not files[2].exists()
-    assert files[1].read_bytes() == files[0].read_bytes()
+    assert not paths[2].exists()
+    assert len(places) == len(set(places)) == -(-(whole.report.mesh.triangles - 7) // 1000) > 3
+    assert paths[1].stat().st_nlink == 2
+    assert sorted(joins) == [
+        f"joined-{level}-0000{n}" for level, n in ((1, 0), (1, 1), (1, 2), (2, 0), (2, 1))
+    ]
+    assert paths[1].read_bytes() == paths[0].read_bytes()
     assert len(whole.whole.vertices) == first.report.mesh.vertices
     for part in ("mesh", "removed"):
         ours, theirs = (dict(vars(getattr(result.report, part))) for result in (first, whole))
@@ -94,12 +142,44 @@ def test_other_formats_are_joined(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(meshtasks, "LEAST", 1)
     hollowed, job = scene(box() - sphere(radius=0.6), size="20mm"), MeshJob(resolution=16)
     shard = Shard(ResultFolder(str(tmp_path / "pieces")), 1, 1)
-    for ending in ("3mf", "ply"):
-        one, two = (tmp_path / f"{name}.{ending}" for name in ("one", "two"))
-        make_mesh(hollowed, job, Work(1), one)
-        shared = make_mesh(hollowed, job, Work(1, cluster=shard), two)
-        assert one.read_bytes() == two.read_bytes()
-        assert shared.mesh.is_watertight
+    one, two = (tmp_path / f"{name}.ply" for name in ("one", "two"))
+    make_mesh(hollowed, job, Work(1), one)
+    shared = make_mesh(hollowed, job, Work(1, cluster=shard), two)
+    assert one.read_bytes() == two.read_bytes()
+    assert shared.mesh.is_watertight
+
+
+def test_a_3mf_file_is_concatenated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By two shards; vertices at seams and at a tip's triangles, which come last, are numbered once."""
+    monkeypatch.setattr(meshtasks, "LEAST", 1)
+    monkeypatch.setattr(text, "ROWS", 256)
+    monkeypatch.setattr(shared_packing, "BLOCKS", 2)
+    monkeypatch.setattr(shared_writing, "joined_pieces", None)
+    turned = scene(cone(radius=0.5, height=2.0).rotate(70.0, (0.0, 1.0, 0.2)), size="20mm")
+    shards = [Shard(ResultFolder(str(tmp_path / "pieces")), number, 2, patience=600) for number in (1, 2)]
+    files, made = {number: tmp_path / f"{number}.3mf" for number in (0, 1, 2)}, list[str]()
+    make = shared_packing.EncodeTask.make
+    monkeypatch.setattr(
+        shared_packing.EncodeTask, "make", lambda of, work: (made.append(of.name), make(of, work))[1]
+    )
+
+    def shared(shard: Shard) -> str:
+        try:
+            make_mesh(turned, MeshJob(resolution=32), Work(1, cluster=shard), files[shard.number])
+        except SharedError as error:
+            return str(error)
+        return ""
+
+    with ThreadPoolExecutor(2) as pool:
+        first, second = pool.map(shared, shards)
+    make_mesh(turned, MeshJob(resolution=32), Work(1), files[0])
+    assert first == "" and second.startswith("this shard made ") and "pieces; shard 1 writes" in second
+    assert files[1].read_bytes() == files[0].read_bytes()
+    assert not files[2].exists()
+    assert len(made) == len(set(made)) > 8
+    with zipfile.ZipFile(files[1]) as archive:
+        assert archive.testzip() is None
+        assert archive.read("3D/3dmodel.model").count(b"<vertex ") > 4 * 256
 
 
 def test_what_needs_the_whole_mesh_is_sampled_by_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -145,10 +225,13 @@ def test_options_that_exclude_each_other(line: list[str], capsys: pytest.Capture
     assert "expected local, local:N" in capsys.readouterr().err
 
 
-def test_a_shared_mesh_has_the_note_on_near_bodies(tmp_path: Path) -> None:
+def test_a_shared_mesh_has_the_note_on_near_bodies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a file of pieces, whose bodies meet in pieces and over seams."""
+    monkeypatch.setattr(meshtasks, "LEAST", 1)
     flakes = scene(flake(solid="tetrahedron", level=1), size="40mm", name="flakes")
     shard = Shard(ResultFolder(str(tmp_path / "pieces")), 1, 1, patience=0)
     shared, alone = (
-        make_mesh(flakes, MeshJob(resolution=32), work) for work in (Work(1, cluster=shard), Work(1))
+        make_mesh(flakes, MeshJob(resolution=32), work, tmp_path / "a.stl")
+        for work in (Work(1, cluster=shard), Work(1))
     )
     assert shared.report.notes == alone.report.notes and "two voxels" in shared.report.notes[0]

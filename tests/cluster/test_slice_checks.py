@@ -10,14 +10,14 @@ from fracslice.cli.main import run as command
 
 from fracslice.cluster import ResultFolder, Shard
 from fracslice.errors import SharedError
+from fracslice.export.ranges import range_size
 from fracslice.formulas import box, cylinder, sphere
-from fracslice.jobs import slice_checks as slicechecks
 from fracslice.jobs.slice_checks import CheckTask, check_run
 from fracslice.jobs.slice_recipe import SliceRecipe
 from fracslice.scene import scene
 from fracslice.scene.writer import to_xml
 from fracslice.slicing import SliceJob
-from fracslice.slicing.checks import check_layers, findings_of
+from fracslice.slicing.layer_checks import check_layers, findings_of
 from fracslice.work import Work
 
 pytest.importorskip("fsspec")
@@ -33,7 +33,7 @@ RECIPE = SliceRecipe(to_xml(THING), "thing", SliceJob(20.0, 0.25, (0.2, 0.2)), N
 def test_components_are_joined_over_the_borders_of_ranges(tmp_path: Path) -> None:
     shard = Shard(ResultFolder(str(tmp_path / "pieces")), 1, 1)
     run = RECIPE.run(Work(1, cluster=shard))
-    assert slicechecks.range_size(run) == 8 < run.layers // 3
+    assert range_size(run) == 8 < run.layers // 3
     shared, alone = check_run(run), check_layers(run.stack, work=Work(1))
     assert shared.as_dict() == alone.as_dict()
     hollow = [*alone.cups, *alone.traps, *alone.cavities, *alone.bodies]
@@ -63,3 +63,26 @@ def test_a_page_of_a_shared_slice_is_that_of_one_machine(tmp_path: Path) -> None
         assert command([*given, "--layer", "0.4mm", "--pixel", "0.2mm"]) == 0
     pages = [(tmp_path / name / "a.html").read_text().replace(f"/{name}/", "/") for name in ("one", "two")]
     assert pages[0] == pages[1]
+
+
+def test_layers_are_checked_by_shards(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "thing.xml").write_text(to_xml(THING))
+    given = [
+        "check",
+        str(tmp_path / "thing.xml"),
+        "--layer",
+        "0.4mm",
+        "--pixel",
+        "0.2mm",
+        "--json",
+        "--quiet",
+    ]
+    status = command(given)
+    alone = capsys.readouterr().out
+    assert command([*given, "--shard", "2/2"]) == 0
+    assert "shard 1 writes the report" in capsys.readouterr().err
+    assert any((tmp_path / ".fracslice-pieces").glob("*/checked-*"))
+    assert command([*given, "--shard", "1/2"]) == status
+    assert capsys.readouterr().out == alone
+    assert command([*given[:2], "--shard", "1/2"]) == 2
+    assert "only with --layer" in capsys.readouterr().err

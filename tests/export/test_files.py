@@ -59,6 +59,30 @@ def test_a_file_is_flushed_while_it_is_written(tmp_path: Path, monkeypatch: pyte
         assert flushed.wait(10)
 
 
+@pytest.mark.skipif(os.name != "posix", reason="an open file cannot be replaced")
+def test_another_thread_releases_a_large_file_that_was_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, released, close = tmp_path / "large", list[threading.Thread](), os.close
+    path.write_bytes(b"old")
+
+    def noted(handle: int) -> None:
+        if os.path.samestat(os.fstat(handle), old):
+            released.append(threading.current_thread())
+        close(handle)
+
+    old = path.stat()
+    monkeypatch.setattr("os.close", noted)
+    monkeypatch.setattr("fracslice.common.files.LARGE", 3)
+    with replacing(path) as file:
+        file.write(b"new")
+    for thread in threading.enumerate():
+        if thread.name.endswith("(noted)"):
+            thread.join(10)
+    assert path.read_bytes() == b"new"
+    assert len(released) == 1 and released[0] is not threading.main_thread()
+
+
 def test_an_error_of_flushing_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     failed = threading.Event()
 

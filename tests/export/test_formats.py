@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import io
 import json
 import struct
 import subprocess
 import sys
 import zipfile
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from fracslice.errors import ExportError, MeshError
-from fracslice.export import FORMATS, application, write
+from fracslice.export import FORMATS, application, packages, write
 from fracslice.mesh import Mesh
 from fracslice.mesh.check import check_mesh
 from fracslice.mesh.quantisation import quantised
@@ -83,6 +85,18 @@ def test_3mf_passes_lib3mf_in_strict_mode(tmp_path: Path, mesh: Mesh) -> None:
     assert result["Title"] == METADATA["Title"]
     assert result["scene_hash"] == "ab12"
     assert result["Application"] == application()
+
+
+@pytest.mark.parametrize("is_large", [False, True])
+def test_blocks_of_a_3mf_model_are_joined(is_large: bool) -> None:
+    """Deflated by themselves, as tasks of a cluster do; also with the header of one of more than 2 GiB."""
+    texts = [b"<model>", b"", bytes(range(256)) * 999, b"</model>"]
+    file = io.BytesIO()
+    packages.join(file, (partial(packages.append, packages.deflated(text)) for text in texts), is_large)
+    with zipfile.ZipFile(file) as archive:
+        assert archive.testzip() is None
+        assert archive.read("3D/3dmodel.model") == b"".join(texts)
+        assert archive.namelist() == ["[Content_Types].xml", "_rels/.rels", "3D/3dmodel.model"]
 
 
 def test_3mf_members_carry_no_time(tmp_path: Path) -> None:

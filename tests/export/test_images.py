@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from fracslice._slices import filtered
 from fracslice.errors import ExportError
 from fracslice.export.images import BANDED, write_bands, write_image
 from fracslice.work import Work
@@ -105,3 +106,27 @@ def test_a_file_written_in_bands_is_that_of_the_whole_picture(tmp_path: Path, en
 def test_unknown_endings_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ExportError, match=r"known are \.png"):
         write_image(tmp_path / "a.bmp", SHOWN, SHOWN)
+
+
+def by_the_standard(rows: np.ndarray, pixel: int) -> list[np.ndarray]:
+    """Rows after the first one by each of the five filters of ISO/IEC 15948, as signed numbers."""
+    value = rows.astype(np.int16)
+    row, above = value[1:], value[:-1]
+    left, corner = (np.pad(x, ((0, 0), (pixel, 0)))[:, : x.shape[1]] for x in (row, above))
+    guess = left + above - corner
+    a, b, c = abs(guess - left), abs(guess - above), abs(guess - corner)
+    paeth = np.where((a <= b) & (a <= c), left, np.where(b <= c, above, corner))
+    return [(row - p).astype(np.int8) for p in (0 * row, left, above, (left + above) // 2, paeth)]
+
+
+@pytest.mark.parametrize("pixel", [1, 3, 8])
+def test_each_row_has_the_filter_of_the_smallest_sum(pixel: int) -> None:
+    rng = np.random.default_rng(pixel)
+    noise = rng.integers(0, 256, (30, 9 * pixel))
+    smooth = [np.cumsum(noise % 5, axis) for axis in (0, 1)]
+    rows = np.vstack([noise, *smooth, smooth[0] + smooth[1]]).astype(np.uint8)
+    tried = by_the_standard(rows, pixel)
+    best = np.argmin([abs(t.astype(int)).sum(1) for t in tried], 0)
+    expected = b"".join(bytes([k]) + tried[k][y].tobytes() for y, k in enumerate(best))
+    assert len(set(best)) == 5
+    assert filtered(rows, pixel) == expected

@@ -16,8 +16,8 @@ import pytest
 
 from fracslice.errors import ExportError
 from fracslice.export.jobs import SliceRun
+from fracslice.export.layer_files import ENDINGS, PRINTS, printers_file, slice_format, write_slices
 from fracslice.export.resins import Resin
-from fracslice.export.slices import ENDINGS, PRINTS, printers_file, slice_format, write_slices
 from fracslice.formulas import difference, menger, sphere
 from fracslice.jobs.stack_model import StackModel
 from fracslice.scene import scene
@@ -140,9 +140,9 @@ def test_the_largest_screen_of_every_format(form: str, tmp_path: Path) -> None:
 
 def test_pictures_that_are_compensated(tmp_path: Path) -> None:
     job = run(compensation=0.1)
+    expected = list(Slicer(job.stack).map(job.screen.picture))
     for name, read, level in (CASES["goo"], CASES["cbddlp"]):
         result = read(write_slices(job, tmp_path / name).read_bytes())
-        expected = list(Slicer(job.stack).map(job.screen.picture))
         assert all((a == level(b)).all() for a, b in zip(result.pictures, expected, strict=True))
 
 

@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 from fracslice.errors import ExportError, SliceError
+from fracslice.export.layer_files import ENDINGS, printers_file
 from fracslice.export.resins import Resin, default_resin, resin
-from fracslice.export.slices import ENDINGS, printers_file
+from fracslice.slicing import printers
 from fracslice.slicing.printers import PRINTERS, printer
 
 OWN = """
@@ -35,6 +36,14 @@ def test_the_table_of_printers() -> None:
         assert f"| {machine.name} | {machine.title} | .{machine.file} |" in page
     written = {machine.file for machine in PRINTERS.values() if f".{machine.file}" in ENDINGS}
     assert {"sl1", "goo", "prz", "ctb", "nanodlp", "pwmx", "pwma"} <= written
+
+
+def test_only_the_printer_of_a_job_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All of the table take a thirtieth of a small job."""
+    made = list[str]()
+    monkeypatch.setattr(printers, "validate", lambda record, _: made.append(record.name))
+    assert printer("mars-5").name == "mars-5"
+    assert made == ["mars-5"]
 
 
 @pytest.mark.parametrize(
@@ -95,6 +104,7 @@ def test_a_printer_of_ones_own(tmp_path: Path) -> None:
     [
         ("height", "hight", "'hight': unknown; expected name, title, pixels"),
         ("height = 150", "", "height is missing"),
+        ("height", "settings = []\nheight", "'settings': unknown"),
         ("1440", "-1440", "pixels=.*: expected 2 whole numbers"),
         ("150", '"tall"', "height=.*: expected a number"),
         ("[1440", "1440", r"line \d+"),
@@ -124,6 +134,16 @@ def test_a_resin_of_ones_own(tmp_path: Path) -> None:
         assert str(failure.value).startswith(str(path))
     with pytest.raises(ExportError, match="No such file"):
         resin(str(tmp_path / "none.toml"), None, 0.05)
+
+
+@pytest.mark.parametrize("name", ["mine.toml", "mine.ini"])
+def test_a_file_that_may_not_be_read(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def read_text(*_: object, **__: object) -> str:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "read_text", read_text)
+    with pytest.raises(ExportError, match=rf"^{name}: Permission denied$"):
+        resin(name, None, 0.05)
 
 
 def test_a_resin_profile_of_prusaslicer(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ import pytest
 from PIL import Image
 
 from fracslice.export.jobs import SliceRun
-from fracslice.export.slices import write_slices
+from fracslice.export.layer_files import write_slices
 from fracslice.formulas import difference, menger, sphere
 from fracslice.jobs.stack_model import StackModel
 from fracslice.scene import scene

@@ -8,6 +8,7 @@ import json
 import shutil
 import struct
 import tempfile
+import threading
 import xml.etree.ElementTree as ET
 import zipfile
 from contextlib import nullcontext
@@ -21,11 +22,11 @@ import pytest
 from PIL import Image
 
 from fracslice.errors import Cancelled, ExportError, FracsliceWarning
-from fracslice.export import png
+from fracslice.export import layerformats, png, resuming
 from fracslice.export.jobs import SliceRun
+from fracslice.export.layer_files import FORMATS, slice_format, write_slices
 from fracslice.export.resins import Resin
 from fracslice.export.resuming import Journal, journal
-from fracslice.export.slices import FORMATS, slice_format, write_slices
 from fracslice.formulas import Node, difference, menger, sphere
 from fracslice.jobs.stack_model import StackModel
 from fracslice.scene import scene
@@ -269,6 +270,45 @@ def test_an_interrupted_job_goes_on(form: str, tmp_path: Path, monkeypatch: pyte
     assert 0 < len(made) < 24
     assert contents(target) == contents(write_slices(run(), _beside(tmp_path, "part.sl1"), form))
     assert sorted(p.name for p in tmp_path.iterdir()) == ["again", "part.sl1"]
+
+
+def test_layers_of_a_folder_are_written_by_their_threads(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In any order, so that an interrupted job may lack one before the last; the bytes are the same."""
+    put, threads = layerformats.put, set()
+
+    def watched(path: str, data: bytes) -> None:
+        threads.add(threading.current_thread())
+        put(path, data)
+
+    monkeypatch.setattr(layerformats, "put", watched)
+    with pytest.raises(Cancelled):
+        write_slices(run(cancelled_after(16)), tmp_path / "part")
+    (tmp_path / "part" / "00003.png").unlink()
+    threads.clear()
+    write_slices(run(Work(threads=2)), tmp_path / "part")
+    assert threads
+    assert threading.main_thread() not in threads
+    assert contents(tmp_path / "part") == contents(fresh("png"))
+
+
+def test_a_print_is_written_while_another_thread_reads_the_layers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real, threads = Journal.next, set()
+
+    def watched(self: Journal) -> bytes | None:
+        threads.add(threading.current_thread())
+        return real(self)
+
+    monkeypatch.setattr(Journal, "next", watched)
+    monkeypatch.setattr(resuming, "GROUP", 1 << 10)
+    whole = [
+        write_slices(run(Work(threads=n)), _beside(tmp_path, "part"), "goo").read_bytes() for n in (1, 2)
+    ]
+    assert len(threads) > 1
+    assert whole[0] == whole[1] == fresh("goo").read_bytes()
 
 
 def _beside(folder: Path, name: str) -> Path:

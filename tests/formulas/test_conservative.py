@@ -19,6 +19,8 @@ DIFFERENT: dict[str, Node] = {
     "seam": SEAM,
     "seam with a torn one": union(TORN, sphere(radius=1.02), smooth=0.1),
     "example of the documentation": EXAMPLES["example of the documentation"],
+    "hybrid": EXAMPLES["hybrid"],
+    "hybrid transformed": EXAMPLES["hybrid transformed"],
 }
 SAME = sorted(set(EXAMPLES) - {"mandelbulb 7.5", *DIFFERENT})
 

@@ -8,6 +8,7 @@ from math import pi, sqrt
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from fracslice import make_mesh
 from fracslice.errors import SceneError
@@ -18,33 +19,18 @@ from fracslice.formulas import (
     cells,
     cosine_bulb,
     flake,
-    frd,
-    gear,
     get,
     gyroid,
     hilbert,
-    honeycomb,
-    iwp,
-    jerusalem,
-    koch,
     mandelbox,
-    menger,
     names,
-    neovius,
     noise,
-    prism,
-    quaternion_mandelbrot,
-    quaternion_power,
     sphere,
-    struts,
-    superquadric,
-    tetrabrot,
-    thread,
-    tree,
     voronoi,
 )
 from fracslice.formulas.inversions import MIDDLE, mirrors
 from fracslice.kernel import compile_scene
+from tests.benchmarks.formulas import pictures
 from tests.examples import EXAMPLES
 
 RNG = np.random.default_rng(7)
@@ -115,98 +101,23 @@ def test_the_box_holds_the_inside(name: str) -> None:
     assert not (field(root)(*p[beyond].T) < 0).any()
 
 
+def test_every_example_has_a_picture() -> None:
+    """`formulas.families --picture yes` renders the sheet of elements.md."""
+    with Image.open(pictures.SHEET) as sheet:
+        assert pictures.shown(sheet) == pictures.SHOWN
+        shown = sheet.convert("RGB")
+    contrast = {
+        name: np.ptp(np.asarray(shown.crop(pictures.tile(k)), float)[28:-20, 20:-20].mean(axis=2))
+        for k, name in enumerate(pictures.SHOWN)
+    }
+    assert min(contrast.values()) > 60, min(contrast, key=lambda name: contrast[name])
+
+
 @each_family
 def test_its_mesh_is_closed(name: str) -> None:
     mesh = make_mesh(FAMILIES[name], resolution=48)
     assert mesh.is_watertight and mesh.volume > 0
     assert mesh.report.mesh.printable
-
-
-SYMMETRIES = {
-    "turn": lambda x, y, z: (y, z, x),
-    "swap": lambda x, y, z: (y, x, z),
-    "flip": lambda x, y, z: (-x, y, z),
-    "flip y": lambda x, y, z: (x, -y, z),
-    "flip z": lambda x, y, z: (x, y, -z),
-    "inverse": lambda x, y, z: (-x, -y, -z),
-    "half turn": lambda x, y, z: (-x, -y, z),
-}
-SYMMETRIC: list[tuple[Node, str]] = [
-    *[(flake(solid="tetrahedron"), s) for s in ("turn", "swap", "half turn")],
-    *[(flake(solid="octahedron"), s) for s in ("turn", "swap", "flip")],
-    *[(flake(solid=s, level=2), t) for s in ("dodecahedron", "icosahedron") for t in ("turn", "flip")],
-    *[(cells(keep=(1, 3)), s) for s in ("turn", "swap", "flip")],
-    *[(mandelbox(iterations=6), s) for s in ("turn", "swap", "flip")],
-    (quaternion_mandelbrot(iterations=8), "flip z"),
-    (prism(sides=4), "swap"),
-    *[(superquadric(), s) for s in ("turn", "swap", "flip")],
-    *[(f(), s) for f in (neovius, iwp, frd) for s in ("turn", "swap", "flip")],
-    *[
-        (get(n)(), "turn")
-        for n in ("gyroid", "lidinoid", "schwarz_d", "schwarz_p", "fischer_koch_s", "split_p")
-    ],
-    *[
-        (struts(kind=k), s)
-        for k in ("cubic", "bcc", "fcc", "octet", "kelvin")
-        for s in ("turn", "swap", "flip")
-    ],
-    *[(jerusalem(level=2), s) for s in ("turn", "swap", "flip")],
-    *[(honeycomb(kind=k), s) for k in ("534", "353") for s in ("flip", "inverse")],
-    *[(honeycomb(kind="435"), s) for s in ("turn", "swap", "flip")],
-    *[(gear(teeth=12), s) for s in ("swap", "flip", "flip z")],
-    *[(tree(branches=4), s) for s in ("swap", "flip")],
-    (koch(), "flip y"),
-    (tetrabrot(iterations=8), "flip z"),
-    *[(quaternion_power(power=n, iterations=6), "flip z") for n in (3, 4)],
-    (quaternion_power(power=3, iterations=6), "flip"),
-    *[(cosine_bulb(iterations=3), s) for s in ("half turn", "flip z")],
-    *[(get(n)(iterations=5), "swap") for n in ("kifs_tetrahedron", "kifs_octahedron")],
-    *[(get(n)(iterations=4), s) for n in ("kifs_dodecahedron", "kifs_icosahedron") for s in ("turn", "flip")],
-]
-
-
-@pytest.mark.parametrize(("root", "symmetry"), SYMMETRIC)
-def test_symmetries(root: Node, symmetry: str) -> None:
-    p = RNG.uniform(-1, 1, (3, 4000))
-    values = field(root)
-    np.testing.assert_allclose(values(*SYMMETRIES[symmetry](*p)), values(*p), atol=1e-9)
-
-
-GOLDEN, CUBE = (1 + sqrt(5)) / 2, (sqrt(2) - 1) ** 3
-CORE = 0.5 - 5 / 16 * sqrt(3) * 0.3
-FLANK = (0.25 + 0.5 * CORE + CORE**2) / 3
-"""Radius of the thread's roots, and mean square of the radius along a flank."""
-VOLUMES: list[tuple[Node, float]] = [
-    (flake(solid="tetrahedron", level=2), 8 / (9 * sqrt(3)) / 4),
-    (flake(solid="octahedron", level=2), 4 / 3 * (3 / 4) ** 2),
-    (flake(solid="dodecahedron", level=1), 2.785163863 * 20 / (2 + GOLDEN) ** 3),
-    (flake(solid="icosahedron", level=2), 2.536150710 * (12 / (1 + GOLDEN) ** 3) ** 2),
-    *[
-        (cells(keep=k, level=2), 8 * (n / 27) ** 2)
-        for k, n in (((0,), 8), ((2, 3), 7), ((1, 2), 18), ((0, 2), 14))
-    ],
-    (prism(sides=5, radius=1, height=0.5), 2.5 * np.sin(2 * pi / 5) * 0.5),
-    (superquadric(size=(1, 2, 0.5), exponent=2), pi / 6),
-    (koch(level=3, height=0.5), 0.5 * 3 * sqrt(3) / 4 * (1 + 0.6 * (1 - (4 / 9) ** 3))),
-    (jerusalem(level=1), 8 * (8 * CUBE + 12 * CUBE**2)),
-    (jerusalem(level=2), 8 * (8 * CUBE * (8 * CUBE + 12 * CUBE**2) + 12 * CUBE**2)),
-    (thread(radius=0.5, pitch=0.3, height=0.9), 0.9 * pi * (0.125 * 0.25 + 0.25 * CORE**2 + 0.625 * FLANK)),
-]
-
-
-@pytest.mark.parametrize(("root", "volume"), VOLUMES)
-def test_volumes(root: Node, volume: float) -> None:
-    """By 400,000 random points, within four standard deviations."""
-    box, count = root.bounds.box, 400_000
-    p = RNG.uniform(box.lo, box.hi, (count, 3)).T
-    whole, share = float(np.prod(box.size)), float((field(root)(*p) < 0).mean())
-    assert share * whole == pytest.approx(volume, abs=4 * whole * sqrt(share * (1 - share) / count))
-
-
-def test_cells_at_corners_and_edges_are_the_menger_sponge() -> None:
-    p = RNG.uniform(-1.1, 1.1, (3, 20000))
-    sponge, kept = (field(root)(*p) for root in (menger(level=3), cells(keep=(0, 1), level=3)))
-    assert ((sponge < 0) == (kept < 0)).all()
 
 
 def test_levels_too_fine_for_a_voxel_are_left_out() -> None:
@@ -242,27 +153,6 @@ def test_mirrors_of_a_honeycomb_meet_at_its_angles(symbol: tuple[int, int, int])
     assert np.diag(products, 2) == pytest.approx(0, abs=1e-12) and products[0, 3] == pytest.approx(
         0, abs=1e-12
     )
-
-
-def test_the_tetrabrot_is_two_mandelbrot_sets() -> None:
-    x, y, z = RNG.uniform(-2, 2, (3, 4000))
-    inside = np.ones(4000, bool)
-    for c in (x + 1j * (y - z), x + 1j * (y + z)):
-        w = c
-        for _ in range(9):
-            w = np.where(abs(w) < 1e6, w * w + c, w)
-        inside &= abs(w) <= 2
-    assert inside.sum() > 20
-    assert ((field(tetrabrot(iterations=9))(x, y, z) < 0) == inside).all()
-
-
-def test_the_square_of_a_quaternion_is_its_second_power() -> None:
-    p = RNG.uniform(-1.5, 1.5, (3, 4000))
-    a, b = (
-        field(root)(*p)
-        for root in (quaternion_power(power=2, iterations=8), quaternion_mandelbrot(iterations=8))
-    )
-    np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-12)
 
 
 def test_a_hilbert_curve_is_one_tube_through_all_cells() -> None:

@@ -9,6 +9,7 @@ from fracslice.errors import SceneError
 from fracslice.formulas import (
     Node,
     bristorbrot,
+    burning_ship,
     julia,
     mandelbox,
     mandelbulb,
@@ -20,6 +21,7 @@ from fracslice.formulas import (
 from fracslice.formulas.orbits import grown
 from fracslice.kernel import compile_scene, link, reference
 from fracslice.scene import reads, scene, to_xml
+from tests.stability.bounds import verdict
 from tests.stability.random_hybrids import lost, random_hybrid
 
 RNG = np.random.default_rng(3)
@@ -125,6 +127,13 @@ def test_only_a_step_is_repeated() -> None:
 def test_a_random_hybrid_loses_no_inside_sample(seed: int) -> None:
     """`make nightly` tries hundreds."""
     assert lost(random_hybrid(seed), 64) == 0
+
+
+def test_the_bound_of_a_hybrid_holds() -> None:
+    """Folds leave critical points outside, where the potential is up to eight times the distance."""
+    root = orbit(mandelbox(scale=1.0, inner=1.0), burning_ship(power=12, repeat=2), iterations=4)
+    result = verdict(root, 20_000)
+    assert result.points > 5000 and result.violations == 0
 
 
 @pytest.mark.parametrize("seed", [5, 12])

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fracslice import formulas
 from fracslice.errors import KernelError, SceneError
 from fracslice.formulas import Number, Vector, bristorbrot, julia, mandelbox, quaternion_mandelbrot, verbs
+from fracslice.formulas.catalogue import FORMULAS
 from fracslice.formulas.orbits import grown, orbit
-from fracslice.formulas.registry import _REGISTRY
 from fracslice.formulas.rounds import steps
 from fracslice.formulas.verbs import ball, fold, positive, power, turn
-from fracslice.kernel import compile_scene, link, reference
+from fracslice.kernel import compile_scene, link, orbits, reference
 from fracslice.kernel.depth import resolve_depths
 from fracslice.kernel.orbit_samples import image
 from fracslice.kernel.steps import traced
@@ -25,10 +26,10 @@ RNG = np.random.default_rng(0)
 @pytest.fixture(autouse=True)
 def forgotten():  # type: ignore[no-untyped-def]
     """Formulas of a test are forgotten after it."""
-    known = dict(_REGISTRY)
+    known = dict(FORMULAS)
     yield
-    _REGISTRY.clear()
-    _REGISTRY.update(known)
+    FORMULAS.clear()
+    FORMULAS.update(known)
 
 
 def box_step(w, c, scale):  # type: ignore[no-untyped-def]
@@ -133,7 +134,13 @@ def test_zeros_and_constants_leave_no_code() -> None:
 
 @pytest.mark.parametrize(
     ("name", "most"),
-    [("Mandelbox 2", 1.1), ("KIFS tetrahedron", 1.0), ("Julia, differentiated", 1.7), ("Bristorbrot", 2.6)],
+    [
+        ("Mandelbox 2", 1.1),
+        ("KIFS tetrahedron", 1.0),
+        ("Mandelbulb 8", 0.9),
+        ("Julia, differentiated", 1.71),
+        ("Bristorbrot", 2.1),
+    ],
 )
 def test_a_step_needs_few_more_instructions_than_a_field_by_hand(name: str, most: float) -> None:
     """`formulas.steps` measures the time: at most 1.15 times with verbs, 1.5 without."""
@@ -260,3 +267,23 @@ def test_a_mistake_is_one_line_with_its_place() -> None:
 def test_an_automatic_depth_grows_with_the_detail(scale: float) -> None:
     depths = [resolve_depths(mandelbox(scale=scale), detail)["iterations"] for detail in (0.4, 0.1, 0.025)]
     assert depths[0] < depths[1] < depths[2] < 30
+
+
+def test_a_torn_hybrid_is_not_skipped_by_its_bound() -> None:
+    """Its slope has no limit at the tears of an even power; that of the formula alone is measured."""
+    points = np.random.default_rng(3).uniform(-3, 3, (3, 500))
+    cosines = formulas.cosine_bulb(power=6, iterations=2)
+    torn = formulas.orbit(formulas.kifs_dodecahedron(), formulas.cosine_bulb(power=6), iterations=2)
+    for root, skips in ((torn, False), (cosines, True)):
+        assert reference(root)(*points).max() > 0
+        assert (reference(root.conservative())(*points).max() > 0) == skips
+
+
+def test_the_code_of_a_step_is_cached(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Following the text of the Mandelbulb's takes a twentieth of a small picture."""
+    bulbs = [steps(formulas.mandelbulb(power=power), alone=False)[0][0] for power in (5, 6)]
+    texts = [code.traced(0) for code in bulbs]
+    assert texts[0] != texts[1]
+    orbits._traced.cache_clear()
+    monkeypatch.setattr(orbits, "traced", None)
+    assert [code.traced(0) for code in bulbs] == texts

@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 from fracslice.cli.main import run
 
+from fracslice.errors import FracsliceWarning
 from fracslice.formulas import plugins
-from fracslice.formulas.registry import _REGISTRY
+from fracslice.formulas.catalogue import FORMULAS
 
 OWN = '''
 from fracslice.formulas import Number, orbit, shape
@@ -30,10 +31,10 @@ SCENE = '<scene version="1"><solid size="40mm"><own_box iterations="4"/></solid>
 
 @pytest.fixture(autouse=True)
 def forgotten():  # type: ignore[no-untyped-def]
-    known, files = dict(_REGISTRY), dict(plugins._FILES)
+    known, files = dict(FORMULAS), dict(plugins._FILES)
     yield
-    _REGISTRY.clear()
-    _REGISTRY.update(known)
+    FORMULAS.clear()
+    FORMULAS.update(known)
     plugins._FILES.clear()
     plugins._FILES.update(files)
 
@@ -78,7 +79,8 @@ def test_a_check_examines_the_formulas_of_a_file(
     steep = Path(files[0]).with_name("steep.py")
     steep.write_text(OWN.replace("own_box", "steep_box").replace("egg", "steep").replace("** 0.5 -", "-"))
     assert run(["formulas", "--check", str(steep)]) == 1
-    assert capsys.readouterr().out.count("FAULT bound L = 1: broken") == 1
+    out = capsys.readouterr().out
+    assert out.count("FAULT bound L = 1: broken") == 1 and "; slopes up to " in out
 
 
 def test_a_check_finds_a_derivative_that_is_too_small(
@@ -90,6 +92,10 @@ def test_a_check_finds_a_derivative_that_is_too_small(
     assert "FAULT derivative of the step: too small at" in capsys.readouterr().out
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert run(["formulas", "--picture", str(picture)]) == 2
+    for refused in ("own.jpg", "none/own.png"):
+        before = sorted(tmp_path.iterdir())
+        assert run(["formulas", "--check", files[0], "--picture", str(tmp_path / refused)]) == 2
+        assert capsys.readouterr().out == "" and sorted(tmp_path.iterdir()) == before
 
 
 @pytest.mark.parametrize(
@@ -112,19 +118,25 @@ def test_a_file_that_cannot_be_run_is_one_line(
 
 
 class _Entry:
+    value = "own.shapes"
+
     def __init__(self, path: str) -> None:
         self.load = lambda: plugins.run_file(path)
 
 
 def test_installed_packages_are_loaded(files: tuple[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that cannot be loaded is left out with a warning."""
     from fracslice.scene import read
 
-    entries = [_Entry(files[0])]
+    entries = [_Entry("none.py"), _Entry(files[0])]
     monkeypatch.setattr(
         "importlib.metadata.entry_points", lambda group: entries if group == plugins.GROUP else []
     )
     plugins.load_installed.cache_clear()
     try:
-        assert read(files[1]).root.formula.name == "own_box"
+        with pytest.warns(
+            FracsliceWarning, match=r"formulas of own\.shapes are left out: SceneError: none\.py"
+        ):
+            assert read(files[1]).root.formula.name == "own_box"
     finally:
         plugins.load_installed.cache_clear()

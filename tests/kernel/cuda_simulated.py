@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
+from fracslice._native import Cells
+from fracslice.formulas.catalogue import FORMULAS
 from fracslice.kernel import cuda, reference
-from fracslice.mesh.roots import LOOPS, Roots
+from fracslice.mesh.crossings import Refiner
+from fracslice.mesh.roots import LOOPS, MOST, Roots
+from fracslice.volume import plan, sample_scene
+from fracslice.work import Work
 from tests.examples import DEFINED, EXAMPLES
+from tests.kernel.idioms import HEAD, SAME, P, imported
 
 TOLERANCE = {"float32": 2e-5, "float64": 1e-13}
 
@@ -19,8 +27,10 @@ def main() -> None:
         for name, root in (EXAMPLES | DEFINED).items():
             for precision in ("float32", "float64"):
                 points(name, cuda.compile_scene(root, precision), reference(root))
+        idioms()
         bricks()
         roots()
+        crossings()
 
 
 def points(name: str, kernel: cuda.CudaKernel, expected: Callable[..., np.ndarray]) -> None:
@@ -30,6 +40,18 @@ def points(name: str, kernel: cuda.CudaKernel, expected: Callable[..., np.ndarra
     assert got.dtype == kernel.dtype
     np.testing.assert_allclose(got, expected(*p), rtol=tolerance, atol=tolerance, err_msg=name)
     assert np.isnan(kernel.points(*np.array([(np.nan, 0, 0), (0, np.nan, 0), (0, 0, np.nan)]).T)).all(), name
+
+
+def idioms() -> None:
+    """What formulas may say means the same in the CUDA text."""
+    known = dict(FORMULAS)
+    with tempfile.TemporaryDirectory() as folder:
+        for number, (body, expected) in enumerate(SAME.items()):
+            root = imported(f"{HEAD}    {body}", Path(folder), f"idiom{number}").mine(radius=0.7)
+            got = cuda.compile_scene(root, "float64").points(*P[:, :4])
+            np.testing.assert_allclose(got, expected[:4], rtol=1e-12, atol=1e-12, err_msg=body)
+            FORMULAS.clear()
+            FORMULAS.update(known)
 
 
 def bricks() -> None:
@@ -44,6 +66,13 @@ def bricks() -> None:
     kernel.bricks(corners[:0], (0, 0, 0), 1.0, out[:0])
 
 
+def ran(finder: Roots, name: str, rows: np.ndarray, count: int, *numbers: int) -> np.ndarray:
+    """Rows that a loop writes."""
+    out = np.empty((count, rows.shape[1]), finder.dtype)
+    finder.runs[name](finder.frame, rows, out, *numbers)
+    return out
+
+
 def roots() -> None:
     """Loops over lanes, with a thread per lane, find the roots and normals of the lanes."""
     root = EXAMPLES["mandelbulb"]
@@ -54,7 +83,7 @@ def roots() -> None:
     for precision, tolerance in (("float32", 1e-4), ("float64", 1e-9)):
         rows = segments.astype(precision)
         lanes, threads = (Roots(root, precision, 0.02, device) for device in ("cpu", "cuda"))
-        expected, computed = lanes.find(rows), threads.find(rows)
+        expected, computed = (ran(finder, "find", rows, 1, MOST)[0] for finder in (lanes, threads))
         assert ((expected > 0) & (expected < 1)).all()
         np.testing.assert_allclose(computed, expected, atol=tolerance)
     polished = [np.tile(expected, (5, 1)) for _ in range(2)]
@@ -63,8 +92,24 @@ def roots() -> None:
     np.testing.assert_allclose(*polished, atol=1e-5)
     regions = np.full((15, width), np.nan)
     regions[:3], regions[3:9] = directions, 0.1
-    guesses = [Roots(root, "float32", 0.02, d).lead(regions.astype(np.float32)) for d in ("cpu", "cuda")]
+    finders = (Roots(root, "float32", 0.02, device) for device in ("cpu", "cuda"))
+    guesses = [ran(finder, "lead", regions.astype(np.float32), 3) for finder in finders]
     np.testing.assert_allclose(*guesses, atol=1e-3)
+
+
+def crossings() -> None:
+    """A thread per grid edge finds the crossings and normals of the lanes."""
+    planned = plan(EXAMPLES["torus"], 16)
+    bricks = sample_scene(planned)
+    cells = Cells(bricks.signs.ijk, bricks.signs.signs, bricks.signs.index)
+    count = cells.crossings_before(len(bricks.index))
+    lanes, threads = (
+        Refiner(planned.root, cells, bricks.origin, bricks.voxel, Work(1, device=device)).between(0, count)
+        for device in ("cpu", "cuda")
+    )
+    assert count > 100
+    np.testing.assert_allclose(threads.t, lanes.t, atol=1e-6)
+    np.testing.assert_allclose(threads.normals, lanes.normals, atol=1e-4)
 
 
 if __name__ == "__main__":

@@ -7,12 +7,38 @@ from dataclasses import replace
 import pytest
 
 from fracslice import MeshJob, make_mesh
-from fracslice.formulas import Box, Node, julia, mandelbulb, menger, sphere, transform, union
+from fracslice.errors import EmptyError
+from fracslice.formulas import (
+    Box,
+    Count,
+    Formula,
+    Node,
+    julia,
+    kifs_octahedron,
+    kifs_tetrahedron,
+    mandelbulb,
+    menger,
+    shape,
+    sphere,
+    transform,
+    union,
+)
+from fracslice.formulas.catalogue import FORMULAS
+from fracslice.formulas.parameters import AUTO
+from fracslice.formulas.vocabulary import sqrt
 from fracslice.kernel import depth
-from fracslice.kernel.depth import Known, _step, _surface_points, resolve_depths, visible
+from fracslice.kernel.depth import (
+    Known,
+    _step,
+    _surface_points,
+    depth_notes,
+    resolve_depths,
+    shallower,
+    visible,
+)
 from fracslice.scene import scene
 from fracslice.slicing import SliceJob, plan_stack
-from fracslice.volume import plan, with_depths
+from fracslice.volume import plan, sample_scene_signs, with_depths
 
 DUST = julia(c=(0.6551, 0.6083, -0.5699, 0.6641), iterations=10)
 
@@ -109,3 +135,47 @@ def test_automatic_depths_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     assert resolve_depths(root, 0.01) == known
     with pytest.raises(TypeError):
         resolve_depths(root, 1e-5)
+
+
+@shape(folds=Count(AUTO, "halvings", least=1, most=60, words=(AUTO,)))
+def shrinking(x, y, z, folds):  # type: ignore[no-untyped-def]
+    """A ball whose radius loses half of the last loss with each halving. L = 1."""
+    loss = 1.0
+    for _ in range(folds):
+        loss = 0.5 * loss
+    return sqrt(x * x + y * y + z * z) - 1.0 - loss
+
+
+FORMULAS.pop("shrinking")
+
+
+@shrinking.bounds  # type: ignore[untyped-decorator]
+def shrinking_bounds(node: Node) -> Box:
+    return Box.centred(2.0)
+
+
+def test_an_automatic_depth_may_have_any_name() -> None:
+    root = transform(shrinking(), scale=2.0)
+    known = resolve_depths(root, 0.04)
+    assert known.children[0]["folds"] == 6  # which moves the ball by 1 / 128
+    assert depth_notes(root, known) == ("shrinking 6",)
+    assert shallower(shrinking(folds=30), 0.02) == ("shrinking.folds=3",)
+
+
+@pytest.mark.parametrize(("deep", "whole"), [(kifs_tetrahedron, 3), (kifs_octahedron, 2)])
+def test_notes_advise_the_iterations_that_the_voxels_show(deep: Formula, whole: int) -> None:
+    """At 64 voxels, 12 iterations leave nothing."""
+    job, advice = MeshJob(resolution=64), f"{deep.name}.iterations={whole}"
+    with pytest.raises(EmptyError, match=f"expected more voxels or {advice}"):
+        sample_scene_signs(plan(deep(iterations=12), 64))
+    assert shallower(deep(iterations=whole), plan(deep(iterations=whole), 64).voxel) == ()
+    made = make_mesh(scene(deep(iterations=whole), size="4cm"), job)
+    assert made.report.notes == () and made.report.mesh.components == 1
+
+
+def test_dust_that_no_search_meets_is_refused_with_advice() -> None:
+    with pytest.raises(
+        EmptyError, match=r"no point is inside; expected .* or kifs_tetrahedron\.iterations=3"
+    ):
+        plan(kifs_tetrahedron(iterations=30), 64)
+    assert max(kifs_tetrahedron(iterations=12).bounds.box.hi) > 0.57  # it was 0.004: no sample was inside

@@ -7,7 +7,15 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fracslice.formulas import bristorbrot, kifs_octahedron, lambda_bulb, mandelbox, orbit, transform
+from fracslice.formulas import (
+    bristorbrot,
+    burning_ship,
+    kifs_octahedron,
+    lambda_bulb,
+    mandelbox,
+    orbit,
+    transform,
+)
 from fracslice.formulas.registry import Node
 from fracslice.kernel.enclosing_box import proved_half
 from fracslice.kernel.intervals import Interval
@@ -37,6 +45,12 @@ def test_no_point_outside_of_the_box_is_inside(name: str) -> None:
 
 def test_a_proved_box_of_a_tight_orbit_is_the_stated_one() -> None:
     assert ROOTS["mandelbox"].proved_box == ROOTS["mandelbox"].bounds.box
+
+
+def test_the_proved_box_lies_in_the_ball_that_no_orbit_comes_back_from() -> None:
+    """Fold and constant cancel, by intervals they do not: the box was the ball where orbits stop, 300."""
+    root = orbit(mandelbox(scale=1.0, inner=1.0), burning_ship(power=12, repeat=2), iterations=4)
+    assert max(root.proved_box.hi) < 1.2 * max(root.bounds.box.hi)
 
 
 def test_a_box_that_is_too_small_grows() -> None:

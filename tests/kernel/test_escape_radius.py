@@ -12,25 +12,30 @@ from fracslice.formulas import (
     Node,
     abox,
     benesi,
+    burning_ship,
     cosine_bulb,
     kifs_octahedron,
     kifs_tetrahedron,
     lambda_bulb,
     mandelbox,
+    mandelbulb,
     orbit,
     quaternion_mandelbrot,
     quaternion_power,
+    sphere,
     transform,
+    union,
 )
 from fracslice.formulas.orbits import grown, orbit_select
 from fracslice.formulas.rounds import steps
 from fracslice.formulas.verbs import modulo
 from fracslice.kernel.escape_radius import constant_stretch, least_size
 from fracslice.kernel.growth import _proved, arguments
-from fracslice.kernel.orbit_samples import composed, image
+from fracslice.kernel.orbit_samples import composed, image, norm
 from fracslice.kernel.orbits import Code
 from fracslice.scene.layout import formulas
 from tests.stability.bounds import verdict
+from tests.stability.random_hybrids import random_hybrid
 
 ORBITS = [f for f in formulas() if f.hooks.get("select") is orbit_select and f.name != "orbit"]
 TURNED = transform(abox(angle=20), rotate=(1, 2, 3, 40), scale=0.9, translate=(0.1, 0.2, 0))
@@ -53,7 +58,7 @@ def test_the_radius_of_every_orbit_is_proved(formula: Any) -> None:
 )
 def test_a_radius_that_is_too_small_grows(root: Node, radius: float) -> None:
     """Known radii: |w|^n - |w| = |w|, and factor (|w|^n - |w|) = |w|."""
-    code, values = steps(root)
+    code, values = steps(root, alone=False)
     bound = replace(grown(root), escapes=(0.9 * radius,), proved=False)
     fixed = code[0].is_fixed(0)
     result = _proved(code, bound, values, 0.0 if fixed else bound.escape)
@@ -63,6 +68,45 @@ def test_a_radius_that_is_too_small_grows(root: Node, radius: float) -> None:
 def test_a_radius_that_cannot_be_proved_is_the_sampled_one() -> None:
     """A constant of the size of the solid leads back: 1.2 |w| - |c| < |w|."""
     assert not grown(mandelbox(scale=1.2)).proved
+
+
+@pytest.mark.parametrize(
+    ("root", "radius"),
+    [
+        (orbit(lambda_bulb(power=12, factor=2.0, repeat=2), iterations=1), 1.0),
+        (lambda_bulb(power=13, factor=2.0, iterations=2), (1 + 1 / 2) ** (1 / 12)),
+    ],
+)
+def test_no_orbit_comes_back_between_the_samples(root: Node, radius: float) -> None:
+    """Few directions and radii missed the fixed points of high powers: the radius was 0.0129, and the box."""
+    assert radius < grown(root).escape < 1.5 * radius
+    assert max(root.bounds.box.hi) > 0.95
+
+
+@pytest.mark.parametrize(
+    "root",
+    [
+        orbit(burning_ship(power=15), iterations=2),
+        orbit(benesi(repeat=2), iterations=2, julia=(-0.18, -0.29, 0.25)),
+        orbit(transform(mandelbulb(power=26), rotate=(1, 2, 3, 7), scale=0.9, translate=(-0.1, 0.04, 0.1))),
+    ],
+)
+def test_known_lengths_prove_the_radius_of_hybrids(root: Node) -> None:
+    """|w^n| is |w|^n: by intervals of products alone, none of these is proved."""
+    assert grown(root).proved
+
+
+@pytest.mark.parametrize("seed", [1, 40, 58])
+def test_denser_samples_find_no_orbit_that_comes_back(seed: int) -> None:
+    """From beyond the radius at the end of a round, for constants as long as points of the solid."""
+    root = random_hybrid(seed)
+    bound, rng = grown(root), np.random.default_rng(seed)
+    code, values = steps(root)
+    whole = composed([image(code, k, values) for k in range(len(code))])
+    w, c = rng.normal(size=(2, 3, 1 << 15))
+    w *= bound.escape * rng.uniform(1, 3, 1 << 15) / np.linalg.norm(w, axis=0)
+    c *= max(root.bounds.box.hi) * rng.uniform(0, 1, 1 << 15) / np.linalg.norm(c, axis=0)
+    assert (norm(whole(w, c)) > bound.surface).all()
 
 
 @pytest.mark.parametrize(
@@ -117,3 +161,10 @@ def test_a_constant_stretch_makes_the_bound_a_theorem() -> None:
         return 2.0 * modulo(w, 1.0)
 
     assert constant_stretch((Code(torn, ()),), 0, {}) is None
+
+
+def test_a_report_can_name_the_formulas_whose_bound_is_measured() -> None:
+    proved = orbit(kifs_octahedron(), kifs_tetrahedron(), iterations=2)
+    root = union(proved, transform(mandelbox(iterations=3)), benesi(iterations=3), mandelbox(iterations=2))
+    assert proved.bounds.measured == () and sphere().bounds.measured == ()
+    assert root.bounds.measured == ("mandelbox", "benesi")

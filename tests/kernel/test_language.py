@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
-import math
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -12,66 +10,23 @@ import numpy as np
 import pytest
 
 from fracslice.errors import FracsliceError, SceneError
-from fracslice.formulas.registry import _REGISTRY
+from fracslice.formulas.catalogue import FORMULAS
 from fracslice.kernel import compile_scene, cuda_loops, cuda_source, link, reference
-
-HEAD = """\
-import math
-import numpy as np
-from fracslice.formulas import Box, Number, csg_operator, domain_operator, shape
-TURN = 0.5
-POWER = 3
-CORNERS = ((1.0, 0.5), (-0.5, 2.0))
-SIZES = (0.5, 2.0, 4.0)
-@shape(radius=Number(1.0, "the radius", above=0))
-def mine(x, y, z, radius):
-"""
+from tests.kernel.idioms import HEAD, SAME, P, X, Y, Z, imported
 
 
 @pytest.fixture
 def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):  # type: ignore[no-untyped-def]
     """Runs a text as a file of its own; its formulas are forgotten afterwards."""
-    known = dict(_REGISTRY)
+    known = dict(FORMULAS)
 
     def run(text: str, name: str = "own_formulas") -> ModuleType:
-        path = tmp_path / f"{name}.py"
-        path.write_text(text)
-        spec = importlib.util.spec_from_file_location(name, path)
-        assert spec and spec.loader
-        result = importlib.util.module_from_spec(spec)
-        monkeypatch.setitem(sys.modules, name, result)
-        spec.loader.exec_module(result)
-        return result
+        monkeypatch.setitem(sys.modules, name, None)
+        return imported(text, tmp_path, name)
 
     yield run
-    _REGISTRY.clear()
-    _REGISTRY.update(known)
-
-
-P = np.random.default_rng(0).uniform(-1.5, 1.5, (3, 200))
-X, Y, Z = P
-
-SAME = {
-    "return abs(x) - radius": abs(X) - 0.7,
-    "return min(x, y, z)": np.minimum(np.minimum(X, Y), Z),
-    "return max(x, 0.25) - min(y, z)": np.maximum(X, 0.25) - np.minimum(Y, Z),
-    "return math.sqrt(x ** 2 + pow(y - z, 4)) - radius": np.sqrt(X**2 + (Y - Z) ** 4) - 0.7,
-    "return (x * x) ** 0.5 + np.abs(np.sin(y)) - math.pi": abs(X) + abs(np.sin(Y)) - math.pi,
-    "f = x\n    f += TURN\n    f *= 2.0\n    return f": 2 * (X + 0.5),
-    "return max(radius, 0.5) * x": 0.7 * X,
-    "return x % 1.0 - (y * z) // radius": X % 1.0 - (Y * Z) // 0.7,
-    "return where((x != y) & ~(x > z), y, z)": np.where(X > Z, Z, Y),
-    "return where(-0.5 < x <= y, y, z)": np.where((X > -0.5) & (X <= Y), Y, Z),
-    "f = 0.0\n    for k in range(3):\n        f += k * x\n    return f": 3 * X,
-    "n = 0\n    for _ in range(3):\n        n += 1\n    return n * x": 3 * X,
-    "f = 1.0\n    for s in (0.5, -2.0):\n        f = f * s + x\n    return f": (0.5 + X) * -2.0 + X,
-    "f = x\n    for a, b in CORNERS:\n        f = max(f, a * y + b * z)\n    return f": np.maximum(
-        np.maximum(X, Y + 0.5 * Z), -0.5 * Y + 2 * Z
-    ),
-    "a, b, c = SIZES\n    return a * x + b * y + c * z": 0.5 * X + 2 * Y + 4 * Z,
-    "f = x\n    for k in range(3):\n        f = f + SIZES[k] * y\n    return f - SIZES[1]": X + 6.5 * Y - 2,
-    "return x ** POWER - y ** 2.0": X**3 - Y**2,
-}
+    FORMULAS.clear()
+    FORMULAS.update(known)
 
 
 @pytest.mark.parametrize("body", SAME)

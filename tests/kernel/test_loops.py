@@ -152,7 +152,7 @@ def test_roots_of_a_field_that_is_not_linked_move_as_the_compiled_ones_do() -> N
     result = []
     for finder in finders:
         out = np.full((5, n), 0.25)
-        finder._runs["polish"](finder.frame, segments, out)
+        finder.runs["polish"](finder.frame, segments, out)
         result.append(out)
     np.testing.assert_allclose(result[1], result[0], atol=1e-9)
     assert result[0][4].min() > 0.01

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import re
 import weakref
@@ -9,14 +10,16 @@ from ctypes import ArgumentError
 from pathlib import Path
 from typing import Any
 
+import llvmlite.binding as llvm
 import numpy as np
 import pytest
 
 import fracslice
 from fracslice._native import RootLoops
 from fracslice._slices import Memory, ProbeBounds, Slab
-from fracslice.formulas import box, sphere
-from fracslice.kernel import CpuKernel, link
+from fracslice.formulas import box, mandelbulb, sphere
+from fracslice.kernel import CpuKernel, elf, link
+from fracslice.kernel.elf import Image, UnsupportedError
 from fracslice.kernel.loops import bricks, points
 from fracslice.mesh.roots import Roots
 
@@ -69,4 +72,57 @@ def test_arrays_become_addresses_in_one_place() -> None:
     result = {
         str(path.relative_to(package)) for path in package.rglob("*.py") if address.search(path.read_text())
     }
-    assert result == {"kernel/machine.py", "viewer/screen.py"}  # the latter names X11's result type
+    # The second one's is of its own memory, the third one names X11's result type.
+    assert result == {"kernel/machine.py", "kernel/elf.py", "viewer/screen.py"}
+
+
+def test_a_file_that_the_loader_does_not_know_is_left_to_llvm(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Machine code and values are the same."""
+    points = np.random.default_rng(0).uniform(-1, 1, (3, 1000))
+    linked = link(mandelbulb(power=8, iterations=4))
+    own = CpuKernel(linked)
+    monkeypatch.setattr(elf, "KIND", b"")
+    other = CpuKernel(linked)
+    assert isinstance(own._points._engine, Image)
+    assert not isinstance(other._points._engine, Image)
+    np.testing.assert_array_equal(own.points(*points), other.points(*points))
+
+
+@pytest.mark.parametrize("model", ["small", "large"])
+def test_relocations_of_both_code_models(model: str) -> None:
+    """Constants, a call within the file and, where none is too far away, one of the C library."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    text = """
+    @table = internal constant [4 x double] [double 1.5, double 2.5, double 3.5, double 4.5]
+    declare i8* @memset(i8*, i32, i64)
+    define void @zero(i8* %p, i64 %n) {
+      call i8* @memset(i8* %p, i32 0, i64 %n)
+      ret void
+    }
+    define void @f(i8* %p, i64 %n) noinline {
+      %q = bitcast i8* %p to double*
+      %e = getelementptr [4 x double], [4 x double]* @table, i64 0, i64 %n
+      %v = load double, double* %e
+      store double %v, double* %q
+      %r = getelementptr i8, i8* %p, i64 8
+      call void @zero(i8* %r, i64 16)
+      ret void
+    }"""
+    if model == "small":
+        text = text.replace("call i8* @memset(i8* %p, i32 0, i64 %n)", "store i8 0, i8* %p")
+    module = llvm.parse_assembly(text)
+    triple = llvm.Target.from_triple(llvm.get_process_triple())
+    target = triple.create_target_machine(opt=0, reloc="pic", codemodel=model)
+    image, values = Image(target.emit_object(module)), np.full(4, 1e-310)
+    call = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_ssize_t)(image.get_function_address("f"))
+    call(values.ctypes.data, 2)
+    assert values[0] == 3.5
+    assert values[1] != values[3] == 1e-310
+    assert values[2] == (0 if model == "large" else 1e-310)
+
+
+def test_a_damaged_or_foreign_file_is_refused_before_anything_runs() -> None:
+    for code in (b"", b"MZ" * 64, elf.MAGIC + bytes(100)):
+        with pytest.raises(UnsupportedError):
+            Image(code)

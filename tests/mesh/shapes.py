@@ -105,7 +105,7 @@ BAD: dict[str, tuple[Callable[[], Mesh], str]] = {
     "partly touching walls": (lambda: joined([cube(), cube(at=(10, 5, 5))]), "cut or touch"),
     "tip on a wall": (lambda: joined([cube(), standing_tip()]), "cut or touch"),
     "fin": (lambda: with_fin(sphere()), "more than two"),
-    "repeated triangle": (lambda: with_triangle(cube(), 0, 1, 3), "repeat another"),
+    "repeated triangle": (lambda: with_triangle(cube(), 0, 1, 3), "that repeats another"),
     "needle": (lambda: with_triangle(sphere(), 0, 0, 1), "without area"),
     "split on one side": (lambda: split_on_one_side(sphere()), "open edges"),
     "crack of a micrometre": (lambda: cracked(sphere()), "open edges"),

@@ -13,14 +13,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fracslice._native import side_of_line, side_of_plane
+from fracslice._native import connected_components, side_of_line, side_of_plane
 from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
 from fracslice.mesh.check import check_mesh
 from fracslice.mesh.nesting import nesting
 from fracslice.mesh.reading import joined
 from fracslice.mesh.self_intersections import self_intersecting_triangles
-from fracslice.mesh.topology import component_sizes, connected_components, edge_topology
+from fracslice.mesh.topology import component_sizes, edge_topology
 from fracslice.mesh.tree import build
 
 from .shapes import BAD, GOOD, cube, inverted, sphere, torus, with_moved
@@ -42,6 +42,14 @@ def test_bad_meshes_are_refused_for_the_right_reason(name: str) -> None:
     report = check_mesh(make())
     assert not report.printable
     assert any(reason in problem for problem in report.problems), report.problems
+
+
+def test_one_of_a_kind_is_singular() -> None:
+    """A lone triangle."""
+    report = check_mesh(Mesh(np.eye(3), np.array([[0, 1, 2]])))
+    assert report.problems == ("3 open edges (a hole in the surface)",)
+    report = check_mesh(Mesh(np.eye(3), np.array([[0, 1, 2], [0, 1, 2]])))
+    assert "1 triangle that repeats another" in report.problems
 
 
 def test_numbers_of_a_cube() -> None:

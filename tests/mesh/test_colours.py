@@ -10,7 +10,7 @@ from fracslice.cli.main import run
 
 from fracslice import make_mesh
 from fracslice.errors import SceneError
-from fracslice.formulas import julia, material, sphere, transform, union
+from fracslice.formulas import julia, mandelbox, material, sphere, transform, union
 from fracslice.mesh import Mesh
 from fracslice.rendering.painting import paint
 from fracslice.work import Work
@@ -51,6 +51,16 @@ def test_steps_are_counted_and_coloured() -> None:
         Work(threads=2),
     )
     assert np.array_equal(again.colours, done.colours)
+
+
+@pytest.mark.parametrize("trap", ["point", "axes", "sphere"])
+def test_distances_of_an_orbit_beyond_1_have_colours_of_their_own(trap: str) -> None:
+    points = np.random.default_rng(0).uniform(-2, 2, (500, 3))
+    done = paint(mandelbox(scale=-1.5, iterations=3, julia=(2, 1, -1)), points, trap, Work())
+    distant = done.scalars[trap] > 1
+    assert distant.sum() > 100
+    assert len(np.unique(done.scalars[trap][distant])) > 50 < len(np.unique(done.colours[distant], axis=0))
+    assert set(paint(sphere(), points, trap, Work()).scalars[trap]) == {1.0}
 
 
 def test_other_meshes_of_a_mesh_keep_them(two: Mesh) -> None:

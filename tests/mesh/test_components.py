@@ -8,14 +8,18 @@ import numpy as np
 import pytest
 
 from fracslice.errors import MeshError
+from fracslice.formulas import sphere as ball
 from fracslice.mesh import Mesh
+from fracslice.mesh import survey as surveys
 from fracslice.mesh.check import check_mesh
 from fracslice.mesh.components import Removed, Shells, choose
 from fracslice.mesh.contouring import Piece
+from fracslice.mesh.extract import contour_pieces
 from fracslice.mesh.pieces import Pieces
 from fracslice.mesh.reading import joined
 from fracslice.mesh.survey import survey
 from fracslice.mesh.whole_shells import WholeShells
+from fracslice.volume import SignBricks
 
 from .shapes import cube, inverted, sphere
 
@@ -67,7 +71,7 @@ def test_cavities_belong_to_the_smallest_body_around_them() -> None:
 
 
 def test_the_largest_keeps_its_cavity() -> None:
-    kept, removed = select(hollow_and_dust(), keep="largest")
+    kept, removed = select(hollow_and_dust(), keep=1)
     assert kept.volume == pytest.approx(992)
     assert removed.bodies == 3
     assert removed.bodies_mm3 == pytest.approx(124 + 0.125 + 0.001)
@@ -76,7 +80,7 @@ def test_the_largest_keeps_its_cavity() -> None:
 
 
 def test_filling_drops_the_inner_shells() -> None:
-    kept, removed = select(hollow_and_dust(), keep="largest", cavities="fill")
+    kept, removed = select(hollow_and_dust(), keep=1, cavities="fill")
     assert kept.volume == pytest.approx(1000)
     assert removed.filled_mm3 == pytest.approx(8)
     assert len(kept.vertices) == 8
@@ -109,7 +113,7 @@ def test_thousands_of_parts_take_no_time() -> None:
     )
     shells(hollow_and_dust())  # compiled by now
     begin = time.perf_counter()
-    kept, removed = select(mesh, keep="largest")
+    kept, removed = select(mesh, keep=1)
     assert time.perf_counter() - begin < 3
     assert removed.bodies == 4000
     assert np.isclose(kept.volume, sphere(50, level=6).volume - sphere(40, level=6).volume)
@@ -129,3 +133,28 @@ def test_bodies_thinner_than_a_voxel_are_pieces_unless_they_are_dust() -> None:
     assert reported == "walls thinner than a voxel fell to pieces: 60 of 61 bodies, 6% of the material"
     assert thin_walls(joined([thick, *thin[:40]]), 0.34) == ""
     assert thin_walls(thin[0], 0.34) == "walls thinner than a voxel have holes, 100% of the material"
+
+
+def test_components_are_joined_by_a_tree(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nodes of two children and one node of all: the same shells; a node keeps its outer seams only."""
+    bricks = np.stack(np.meshgrid(range(9), range(2), range(2), indexing="ij"), -1).reshape(-1, 3)
+    solid = np.zeros((72, 16, 16), np.uint8)
+    solid[1:-1, 1:-1, 1:-1] = np.random.default_rng(1).random((70, 14, 14)) < 0.25
+    packed = np.packbits(solid.reshape(9, 8, 2, 8, 2, 8), axis=-1, bitorder="little")
+    noise = np.ascontiguousarray(packed[..., 0].transpose(0, 2, 4, 1, 3).reshape(-1, 8, 8))
+    index = np.arange(len(bricks), dtype=np.int32).reshape(9, 2, 2)
+    signs = SignBricks((0.0, 0.0, 0.0), 1.0, (8 * bricks).astype(np.int32), noise, index)
+    pieces, made = Pieces(), list[surveys.PieceComponents]()
+    for piece in contour_pieces(ball(radius=1.0), signs, most=1):
+        pieces.add(piece)
+    one = survey(pieces, 1.0)
+    join = surveys.joined_components
+    monkeypatch.setattr(surveys, "joined_components", lambda of: (made.append(join(of)), made[-1])[1])
+    monkeypatch.setattr(surveys, "FAN", 2)
+    tree = survey(pieces, 1.0)
+    assert len(pieces) == 9 and len(made) == 5 + 3 + 2 + 1
+    assert 1 < len(one.volumes) < len(one.of_label)
+    for name in ("of_label", "outermost", "first", "piece"):
+        assert np.array_equal(getattr(one, name), getattr(tree, name)), name
+    assert tree.volumes == pytest.approx(one.volumes) and tree.areas == pytest.approx(one.areas)
+    assert not len(made[-1].points) and not len(made[-1].after)

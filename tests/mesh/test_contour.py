@@ -32,8 +32,8 @@ from fracslice.formulas import (
     transform,
     union,
 )
+from fracslice.formulas.catalogue import FORMULAS
 from fracslice.formulas.field import Bounds, Device, Precision
-from fracslice.formulas.registry import _REGISTRY
 from fracslice.kernel import Kernel, reference
 from fracslice.kernel.arrays import ArrayField
 from fracslice.mesh import Mesh
@@ -139,7 +139,7 @@ def gyroid_wall(x, y, z, period, thickness):  # type: ignore[no-untyped-def]
     return abs(g) / (1.7320508075688772 * k) - thickness / 2
 
 
-del _REGISTRY["gyroid_wall"]  # other tests look at the formulas of the package
+del FORMULAS["gyroid_wall"]  # other tests look at the formulas of the package
 
 
 def test_walls_that_meet_a_cutting_box_at_an_acute_angle_have_no_teeth() -> None:

@@ -17,13 +17,20 @@ def cells_of(bricks: Bricks) -> Cells:
     return Cells(signs.ijk, signs.signs, signs.index)
 
 
+def segments_of(cells: Cells, bricks: Bricks) -> np.ndarray:
+    """Starts of the crossed grid edges and vectors to their ends, [6, n]."""
+    edges = cells.edges(0, cells.crossings_before(len(bricks.index)))
+    starts = np.array(bricks.origin) + bricks.voxel * edges[:, :3]
+    return np.hstack([starts, bricks.voxel * np.eye(3)[edges[:, 3]]]).T
+
+
 def test_crossings_lie_on_the_surface_and_normals_point_outward() -> None:
     planned = plan(torus(radius=1, tube=0.3), 64)
     bricks = sample_scene(planned)
     cells, placement = cells_of(bricks), (bricks.origin, bricks.voxel)
     numbers = 0, cells.crossings_before(len(bricks.index))
     exact = Refiner(planned.root, cells, *placement).between(0, numbers[1])
-    edges = cells.segments(*numbers, *placement)
+    edges = segments_of(cells, bricks)
     points = (edges[:3] + exact.t * edges[3:]).T
     assert np.abs(reference(planned.root)(*points.T)).max() < 1e-7 * bricks.voxel
     ring = points * [1, 1, 0]
@@ -57,7 +64,7 @@ def test_planes_almost_in_one_are_distinguished(step: float) -> None:
     cells, placement = cells_of(bricks), (bricks.origin, bricks.voxel)
     numbers = 0, cells.crossings_before(len(bricks.index))
     exact = Refiner(planned.root, cells, *placement).between(0, numbers[1])
-    edges = cells.segments(*numbers, *placement)
+    edges = segments_of(cells, bricks)
     field = reference(planned.root)
     assert np.abs(field(*(edges[:3] + exact.t * edges[3:]))).max() < 1e-9 * bricks.voxel
     outward = np.where(field(*edges[:3]) < 0, 1, -1)

@@ -125,8 +125,8 @@ def test_vertices_lie_on_the_crossed_edges_in_their_order() -> None:
     vertices, _ = marching_cubes(bricks.ijk, bricks.values, bricks.index, (0, 0, 0), 1.0, 1e-4)
     cells = Cells(bricks.ijk, bricks.signs.signs, bricks.index)
     count = cells.crossings_before(len(bricks.index))
-    edges = cells.segments(0, count, (0, 0, 0), 1.0).astype(int)
-    lower, axis = edges[:3].T, edges[3:].argmax(0)
+    edges = cells.edges(0, count)
+    lower, axis = edges[:, :3], edges[:, 3]
     along = vertices - lower
     rows = np.arange(len(axis))
     t = along[rows, axis].copy()
@@ -138,9 +138,9 @@ def test_vertices_lie_on_the_crossed_edges_in_their_order() -> None:
     upper = lower + np.eye(3, dtype=np.int32)[axis]
     assert (inside[tuple(lower.T)] != inside[tuple(upper.T)]).all()
     assert len(np.unique(np.column_stack([lower, axis]), axis=0)) == len(axis)
-    assert (cells.segments(7, 20, (0, 0, 0), 1.0) == edges[:, 7:20]).all()
+    assert (cells.edges(7, 20) == edges[7:20]).all()
     with pytest.raises(ValueError, match="no such"):
-        cells.segments(0, count + 1, (0, 0, 0), 1.0)
+        cells.edges(0, count + 1)
 
 
 def test_threads_do_not_change_a_byte() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from typing import Any
 
 import numpy as np
@@ -9,13 +11,22 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components as components_of_a_graph
 
-from fracslice._native import near, pointed, selected, stl, surroundings, touching
+from fracslice._native import (
+    connected_components,
+    corners_by_vertex,
+    near,
+    pointed,
+    selected,
+    stl,
+    surroundings,
+    touching,
+)
 from fracslice.mesh import Mesh
 from fracslice.mesh.nesting import nesting
 from fracslice.mesh.quantisation import placed, quantise
 from fracslice.mesh.reading import joined
 from fracslice.mesh.self_intersections import self_intersecting_triangles
-from fracslice.mesh.topology import component_sizes, connected_components, corners_by_vertex
+from fracslice.mesh.topology import component_sizes
 
 from .shapes import cube, inverted
 
@@ -26,6 +37,18 @@ N, M = 200_000, 50_000
 LOOSE = Mesh(RNG.normal(size=(N, 3)), RNG.integers(0, N, (M, 3)).astype(np.int32))
 """Triangles of which many hang together and many do not, in no order."""
 SOME = RNG.random(M) < 0.4
+
+
+MORE_THREADS = """
+import numpy, os
+from fracslice._native import bounds
+bounds(numpy.zeros((1 << 20, 3)), 4 * os.cpu_count())
+"""
+
+
+def test_more_threads_than_cores_print_no_warning() -> None:
+    run = subprocess.run([sys.executable, "-c", MORE_THREADS], capture_output=True, text=True, check=True)
+    assert run.stderr == ""
 
 
 @pytest.mark.parametrize("threads", THREADS)

@@ -8,7 +8,7 @@ import pytest
 from fracslice._native import trust_regions
 from fracslice.formulas import Node, box, mandelbulb, sphere, transform, union
 from fracslice.kernel import compile_scene
-from fracslice.mesh.projection import TrustRegions, project
+from fracslice.mesh.projection import project
 from fracslice.volume.accuracy import surface_error
 
 
@@ -22,9 +22,10 @@ def projected(
 ) -> np.ndarray:
     """ends: for each point one inside and one outside."""
 
-    def trust_regions(which: np.ndarray, inside: np.ndarray) -> TrustRegions:
-        other = np.where(inside, ends[1][which].T, ends[0][which].T) if ends else None
-        return TrustRegions(low[which].T, high[which].T, other, None if middle is None else middle[which].T)
+    def trust_regions(which: np.ndarray, inside: np.ndarray) -> np.ndarray:
+        none = np.full((3, len(which)), np.nan)
+        other = np.where(inside, ends[1][which].T, ends[0][which].T) if ends else none
+        return np.stack([low[which].T, high[which].T, other, none if middle is None else middle[which].T])
 
     moved = points.copy()
     project(root, moved, trust_regions, 0.1)

@@ -10,10 +10,11 @@ import pytest
 
 from fracslice.formulas import Node, box, difference, mandelbulb, menger, shell, sphere, transform
 from fracslice.mesh import Mesh
-from fracslice.mesh.check import MeshReport, check_mesh
+from fracslice.mesh.check import check_mesh
 from fracslice.mesh.clean import cleaned
 from fracslice.mesh.extract import contour
 from fracslice.mesh.halo import Finished
+from fracslice.mesh.mesh_report import MeshReport
 from fracslice.mesh.quantisation import grid_planes
 from fracslice.mesh.tally import Tally
 from fracslice.volume import plan, sample_scene

@@ -10,7 +10,7 @@ from fracslice.errors import VolumeError
 from fracslice.formulas import Node, box, sphere, transform, union
 from fracslice.scene import Print
 from fracslice.slicing import SliceJob, plan_stack
-from fracslice.slicing.checks import PrintReport, check_layers
+from fracslice.slicing.layer_checks import PrintReport, check_layers
 
 
 def checked(root: Node, **printing: float | str) -> PrintReport:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from fracslice.formulas import Node, box, difference, julia, shell, sphere, transform, union
-from fracslice.printing.checks import SolidReport, check_object
 from fracslice.printing.limits import Limits
+from fracslice.printing.solid_checks import SolidReport, check_object
 from fracslice.volume import plan
 
 SIZE = 20.0

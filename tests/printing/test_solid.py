@@ -34,10 +34,10 @@ from fracslice.formulas import (
     union,
 )
 from fracslice.printing import printable
-from fracslice.printing.checks import SolidReport, check_object
-from fracslice.printing.components import components_of
 from fracslice.printing.limits import Limits
 from fracslice.printing.samples import Samples
+from fracslice.printing.solid_checks import SolidReport, check_object
+from fracslice.printing.solid_components import components_of
 from fracslice.printing.walls import walls
 from fracslice.printing.widths import Widths
 from fracslice.scene import Print, scene
@@ -153,7 +153,9 @@ def test_cavities_are_filled_and_bodies_dropped() -> None:
 
 
 def test_lengths_that_cannot_be_measured() -> None:
-    with pytest.raises(VolumeError, match=r"0.01 mm in 20 mm: expected at least 0.0625 mm"):
+    with pytest.raises(
+        VolumeError, match=r"0.01 mm is too small for an object of 20 mm: expected at least 0.0625 mm"
+    ):
         printable(plan(box(), 100), Sizing(SIZE), Print(thickness=0.01))
 
 
@@ -364,6 +366,14 @@ def test_each_large_part_of_a_hollow_is_drained() -> None:
         assert not solid(1.8 * x, 0, -1 + 3.5 * mm)
 
 
+def test_a_flat_floor_is_drained_in_its_middle() -> None:
+    solid, mm = holes(box(size=(2, 2, 2)))
+    assert not solid(0, 0, 1 - mm) and not (solid(1 - mm, 0, 3.5 * mm - 1) and solid(mm - 1, 0, 3.5 * mm - 1))
+    rims = np.linspace(-1, 1, 50) * (1 - mm / 4)
+    edges = [(x, y, z) for x in (rims[0], rims[-1]) for y in (rims[0], rims[-1]) for z in rims]
+    assert all(solid(*edge) for edge in edges)
+
+
 def test_layers_are_as_large_as_asked() -> None:
     """Of a solid whose box no formula tells: its contours, across and along, with a base cut off."""
     root = transform(
@@ -393,7 +403,7 @@ def test_a_raft_that_no_voxel_holds_is_refused() -> None:
 
 
 def test_the_sharp_rim_of_a_drain_hole_is_no_thin_wall(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fracslice.printing.checks.resolved", lambda root, bricks, *others: bricks)
+    monkeypatch.setattr("fracslice.printing.solid_checks.resolved", lambda root, bricks, *others: bricks)
     hole = transform(cylinder(radius=1, height=22), translate=(0, 0, 5))
     thing = plan(difference(cone(radius=6, height=22), hole), 100)
     drain = Drain((0, 0, -6), (0, 0, 12), 1.0)

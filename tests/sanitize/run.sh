@@ -9,7 +9,7 @@ library() { realpath "$(g++ -print-file-name="lib$1.so")"; }
 
 tests="slicing/test_bends.py slicing/test_layers.py::test_threads_and_the_choice_of_layers_do_not_matter
     mesh/test_check.py::test_thread_count_does_not_matter mesh/test_contour.py::test_threads_do_not_matter
-    mesh/test_extract.py::test_threads_do_not_change_a_byte
+    mesh/test_extract.py::test_threads_do_not_change_a_byte mesh/test_projection.py
     mesh/test_simplify.py::test_the_result_is_the_same_for_any_number_of_threads"
 if [ "$kind" = thread ]; then
     flags="-std=c++20 -fsanitize=thread -include $PWD/tests/sanitize/threads.h"

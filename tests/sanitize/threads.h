@@ -3,6 +3,7 @@
 // waits for another: a race between two tasks is seen whatever the order they run in.
 #pragma once
 #include <tbb/blocked_range.h>
+#include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 #include <tbb/task_arena.h>
@@ -109,6 +110,13 @@ struct task_arena {
 
 }  // namespace tbb::plain
 
+namespace tbb::info {
+
+inline int plain_concurrency() { return 16; }  // races show on any number of cores
+
+}  // namespace tbb::info
+
+#define default_concurrency plain_concurrency
 #define parallel_for plain::parallel_for
 #define parallel_reduce plain::parallel_reduce
 #define task_arena plain::task_arena

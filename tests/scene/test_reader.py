@@ -32,6 +32,10 @@ def refused(text: str | bytes) -> str:
     ("inside", "message"),
     [
         ("<mandelblub/>", "f.xml:3: <mandelblub> is not a known element; did you mean <mandelbulb>?"),
+        (
+            "<coral/>",
+            'f.xml:3: <coral> is not a known element; "fracslice formulas" lists them, --formulas FILE',
+        ),
         ("<Sphere/>", "f.xml:3: <Sphere> is not a known element; did you mean <sphere>?"),
         (
             "<mandelbulb pwer='3'/>",
@@ -64,7 +68,7 @@ def refused(text: str | bytes) -> str:
         ),
         (
             "<transform scale='0'><box/></transform>",
-            "f.xml:3: <transform> scale or matrix: expected a map that does not",
+            'f.xml:3: <transform> scale="0": expected a map that does not',
         ),
         (
             "<bend degrees='5e-324'><box/></bend>",
@@ -87,7 +91,7 @@ def refused(text: str | bytes) -> str:
         ("", "f.xml:2: <solid> expected at least one element inside it"),
         (
             "<solid size='1mm'><box/></solid>",
-            "f.xml:3: <solid> cannot stand here; expected <abox>, <amazing_surf>",
+            'f.xml:3: <solid> cannot stand here; "fracslice formulas" lists',
         ),
         ("<box>", "f.xml:4: not well-formed XML: mismatched tag"),
         ("<box size='1 1 1' size='1 1 1'/>", "f.xml:3: not well-formed XML: duplicate attribute"),
@@ -130,12 +134,8 @@ def test_wrong_sizes(size):
             "or <track>",
         ),
         (
-            "<scene version='1'><solid><box/></solid></scene>",
-            'f.xml:1: <solid> expected size="...", the longest side, or unit="..."',
-        ),
-        (
             "<scene version='1'><solid size='4cm' unit='1mm'><box/></solid></scene>",
-            'f.xml:1: <solid> expected size="...", the longest side, or unit="..."',
+            "f.xml:1: <solid> size and unit: expected one of them",
         ),
         (
             around(BALL).replace("</scene>", "<solid size='1'><box/></solid></scene>"),
@@ -173,6 +173,11 @@ def test_document_types_are_refused_before_anything_is_expanded(declared, encodi
     assert time.perf_counter() - started < 1
 
 
+def test_a_solid_without_size_has_units_of_a_millimetre():
+    read = reads("<scene version='1'><solid><box/></solid></scene>", "f.xml")
+    assert (read.size_mm, read.unit_mm) == (None, 1.0)
+
+
 def test_a_long_or_odd_value_is_still_one_short_line():
     message = refused(around(f"<sphere radius='&#10;{'9' * 5000}x'/>"))
     assert len(message) < 150
@@ -188,10 +193,12 @@ def test_comments_instructions_encodings_and_character_references_are_fine():
 def test_files_that_cannot_be_read(tmp_path):
     big = tmp_path / "big.xml"
     big.write_bytes(b" " * ((16 << 20) + 1))
+    (layers := tmp_path / "layers.sl1").write_bytes(b"PK" + big.read_bytes())
     for path, message in [
         (tmp_path / "none.xml", "No such file"),
         (tmp_path, "Is a directory"),
         (big, "at most 16 MB"),
+        (layers, "not a scene"),
         (tmp_path / ("x" * 5000), "File name too long"),
     ]:
         with pytest.raises(SceneError, match=message):

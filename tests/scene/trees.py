@@ -31,7 +31,7 @@ def _number(kind: Number | Vector) -> st.SearchStrategy[float]:
 
 def _count(kind: Count) -> st.SearchStrategy[Any]:
     numbers = st.integers(kind.least, kind.most)
-    return numbers | st.just(AUTO) if kind.auto else numbers
+    return numbers | st.just(AUTO) if kind.words else numbers
 
 
 def _vector(kind: Vector) -> st.SearchStrategy[tuple[float, ...]]:

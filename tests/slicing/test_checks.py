@@ -11,8 +11,8 @@ import pytest
 from fracslice.formulas import Node, box, cylinder, difference, menger, sphere, transform, union
 from fracslice.printing.limits import Limits
 from fracslice.slicing import SliceJob, Slicer, plan_stack
-from fracslice.slicing.checks import PrintReport, check_layers
-from fracslice.slicing.graph import Graph
+from fracslice.slicing.feature_graph import Graph
+from fracslice.slicing.layer_checks import PrintReport, check_layers
 from fracslice.slicing.overhangs import unsupported
 from fracslice.slicing.printers import PRINTERS
 from fracslice.slicing.runs import Runs, layer_components, overlaps

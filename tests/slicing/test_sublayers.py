@@ -9,7 +9,7 @@ import pytest
 
 from fracslice.errors import ExportError, SliceError
 from fracslice.export.jobs import SliceRun
-from fracslice.export.slices import write_slices
+from fracslice.export.layer_files import write_slices
 from fracslice.formulas import Node, box, intersection, transform
 from fracslice.slicing import SliceJob, Slicer, Stack, adapted, plan_stack
 from fracslice.slicing.raster import Screen

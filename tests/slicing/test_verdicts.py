@@ -22,7 +22,7 @@ from fracslice.formulas import (
 )
 from fracslice.scene import Print
 from fracslice.slicing import SliceJob, plan_stack
-from fracslice.slicing.checks import PrintReport, check_layers
+from fracslice.slicing.layer_checks import PrintReport, check_layers
 from fracslice.volume import extent
 
 SEEDS = range(5)

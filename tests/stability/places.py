@@ -21,7 +21,7 @@ def _frame(box: Box) -> tuple[np.ndarray, np.ndarray]:
 def borders(root: Node) -> np.ndarray:
     """Coordinates where fields fold: zero, the faces of boxes, Menger's cells, borders between copies."""
     result = [0.0]
-    for node in root.walk():
+    for node in root.solids():
         ends = [v for v in (*node.bounds.box.lo, *node.bounds.box.hi) if np.isfinite(v)]
         result += ends
         if node.formula.name == "menger":

@@ -117,7 +117,7 @@ def _value(name: str, kind: Any, dice: _Dice) -> Any:
     if isinstance(kind, Count):
         least = max(kind.least, 1)
         fixed = int(dice.numbers.integers(least, max(least, min(kind.most, DEEPEST.get(name, 4))) + 1))
-        return AUTO if kind.auto and dice.tree.uniform() < 0.5 else fixed
+        return AUTO if kind.words and dice.tree.uniform() < 0.5 else fixed
     if isinstance(kind, Axis):
         return "xyz"[dice.tree.integers(3)]
     if isinstance(kind, Choice):

@@ -55,7 +55,7 @@ def test_no_file_where_none_can_be_made(tmp_path: Path) -> None:
 def test_a_machine_that_cannot_draw_gets_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     broken = tmp_path / "broken.py"
     broken.write_text("import os; os.abort()")
-    monkeypatch.setattr("fracslice.viewer.lighting.__file__", str(broken))
+    monkeypatch.setattr("fracslice.viewer.plotter.__file__", str(broken))
     with pytest.raises(RenderError, match="libegl1") as failure:
         picture(cube(), tmp_path / "cube.png")
     assert "\n" not in str(failure.value)

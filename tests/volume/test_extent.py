@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fracslice import MeshJob, make_mesh
-from fracslice.errors import Cancelled, VolumeError
+from fracslice.errors import Cancelled, SceneError
 from fracslice.formulas import (
     Node,
     box,
@@ -111,8 +111,8 @@ def test_what_is_much_smaller_than_promised_is_as_exact() -> None:
 
 
 def test_an_object_that_ends_nowhere_says_so() -> None:
-    with pytest.raises(VolumeError, match="no end"):
-        extent(plane(), 64)
+    with pytest.raises(SceneError, match="<plane> has no end along x, y and z; put <bounds> around it"):
+        extent(union(sphere(), plane()), 64)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2, 4])
@@ -139,7 +139,7 @@ def test_the_size_is_that_of_the_field_of_what_stays() -> None:
     ball = transform(sphere(radius=0.2), translate=(2, 0, 0))
     what = scene(union(octahedron(), ball), size="100mm", printing=Print(keep="largest"))
     result = make_mesh(what, MeshJob(resolution=80))
-    assert result.report.removed.bodies == 1
+    assert result.report.mesh.components == 1
     assert result.place.scale == pytest.approx(50, rel=1e-5)
     assert np.abs(np.array(result.place.offset)[:2]).max() < 1e-3
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fracslice.errors import Cancelled, TooLargeError, VolumeError
+from fracslice.errors import Cancelled, SceneError, TooLargeError, VolumeError
 from fracslice.formulas import (
     Node,
     box,
@@ -157,22 +157,22 @@ def test_hollow_shells_keep_their_cavity() -> None:
         (intersection(sphere(), transform(sphere(), translate=(5, 0, 0))), "no point in common"),
         (
             intersection(sphere(), transform(sphere(), translate=(1.99, 1, 0))),
-            "nothing in the scene is inside",
+            "no point is inside",
         ),
     ],
 )
 def test_scenes_without_a_solid(root: Node, message: str) -> None:
-    with pytest.raises(VolumeError, match=message):
+    with pytest.raises((SceneError, VolumeError), match=message):
         plan(root, 64)
 
 
 def test_what_is_too_thin_for_any_sample_says_so() -> None:
-    with pytest.raises(VolumeError, match=r"thinner than a voxel of 0\.0417; more voxels"):
+    with pytest.raises(VolumeError, match=r"thinner than a voxel of 0\.0417; expected more voxels"):
         sample_scene(plan(shell(sphere(), thickness=1e-4), 48))
 
 
 def test_too_fine_a_voxel_is_refused_before_starting() -> None:
-    with pytest.raises(VolumeError, match="finest that fits"):
+    with pytest.raises(VolumeError, match="expected at most 8176 voxels"):
         Lattice.around(sphere().bounds.box, 1e-5)
 
 

@@ -31,25 +31,16 @@ class SurfaceCells {
         : ijk_(ijk), index_(index), threads_(threads),
           grid_(unlocked(threads, [&] { return CellGrid(volume::layout(ijk, index), sign_rows(ijk, signs)); })) {}
 
-    nb::object segments(size_t begin, size_t end, const std::array<double, 3>& origin, double voxel) const {
-        if (begin > end || end > grid_.vertices()) throw nb::value_error("no such crossings");
-        size_t n = end - begin;
-        Array<double> rows(6, n);
-        {
-            nb::gil_scoped_release released;
-            GridEdges edges;
-            grid_.lay(begin, end, origin, voxel, edges);
-            for (size_t k = 0; k < 3; ++k) {
-                double* to = std::copy(edges.starts[k].begin(), edges.starts[k].end(), &rows.data[k * n]) + 2 * n;
-                for (size_t i = 0; i < n; ++i) to[i] = edges.axis(i) == k ? voxel : 0;
-            }
-        }
-        return to_numpy(std::move(rows), {6, n});
+    nb::object edges(size_t begin, size_t end) const {
+        check(begin, end);
+        Array<int16_t> rows(end - begin, 4);
+        unlocked(threads_, [&] { return grid_.edges(begin, end, rows.data.get()), 0; });
+        return to_numpy(std::move(rows), {end - begin, 4});
     }
 
     void find_crossings(size_t begin, size_t end, const std::array<double, 3>& origin, double voxel, const RootLoops& loops,
                         const RootsOut& t, const NormalsOut& normals) const {
-        if (begin > end || end > grid_.vertices()) throw nb::value_error("no such crossings");
+        check(begin, end);
         if (t.shape(0) != end - begin || normals.shape(1) != end - begin) throw nb::value_error("as many rows as crossings");
         unlocked(threads_, [&] {
             mesh::find_crossings(grid_, loops, begin, end, origin, voxel, t.data(), normals.data(),
@@ -64,6 +55,10 @@ class SurfaceCells {
     int threads() const { return threads_; }
 
   private:
+    void check(size_t begin, size_t end) const {
+        if (begin > end || end > grid_.vertices()) throw nb::value_error("no such crossings");
+    }
+
     static std::vector<Signs> sign_rows(const IjkArray& ijk, const SignsArray& signs) {
         if (ijk.shape(0) != signs.shape(0)) throw nb::value_error("ijk and signs differ in length");
         std::vector<Signs> rows(signs.shape(0));
@@ -125,6 +120,13 @@ nb::object bind_trust_regions(const In<double, nb::shape<-1, 3>>& points, const 
     return to_numpy(std::move(out), {4, 3, count});
 }
 
+void bind_project(const nb::ndarray<double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>& points, size_t first, size_t last,
+                  const ProjectionLoops& loops, nb::object regions, double voxel, int threads) {
+    if (first > last || last > points.shape(0)) throw nb::value_error("no such points");
+    const TrustRegions within = trust_regions_by(regions);
+    unlocked(threads, [&] { return project(points.data(), first, last, loops, within, voxel), 0; });
+}
+
 }  // namespace
 
 void bind_contour(nb::module_& module) {
@@ -133,13 +135,16 @@ void bind_contour(nb::module_& module) {
                "minimum_edge_parameter"_a, "threads"_a = 0);
     module.def("trust_regions", &bind_trust_regions, "features"_a, "cases"_a, "to_means"_a, "which"_a, "inside"_a, "origin"_a,
                "voxel"_a, "minimum_edge_parameter"_a);
+    module.def("project", &bind_project, "points"_a, "first"_a, "last"_a, "loops"_a, "trust_regions"_a, "voxel"_a, "threads"_a = 0);
+    nb::class_<ProjectionLoops>(module, "ProjectionLoops")
+        .def(nb::new_(&projection_loops), "lanes"_a, "lead"_a, "guess"_a, "find"_a, "aim"_a, "field"_a, "steps"_a);
     nb::class_<RootLoops>(module, "RootLoops")
         .def(nb::new_(&root_loops), "lanes"_a, "batch"_a, "guess"_a, "find"_a, "polish"_a, "field"_a,
              "steps"_a, "sure"_a);
     nb::class_<SurfaceCells>(module, "Cells")
         .def(nb::init<const IjkArray&, const SignsArray&, const IndexArray&, int>(),
              "ijk"_a, "signs"_a, "index"_a, "threads"_a = 0)
-        .def("segments", &SurfaceCells::segments, "begin"_a, "end"_a, "origin"_a, "voxel"_a)
+        .def("edges", &SurfaceCells::edges, "begin"_a, "end"_a)
         .def("find_crossings", &SurfaceCells::find_crossings, "begin"_a, "end"_a, "origin"_a, "voxel"_a, "loops"_a, "t"_a, "normals"_a)
         .def("crossings_before", &SurfaceCells::crossings_before, "layer"_a);
     nb::class_<Surfacing>(module, "Contouring")

@@ -1,40 +1,25 @@
 // Loops over a field, compiled or in Python, as native code calls them.
 #pragma once
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
 #include <nanobind/stl/pair.h>
 
-#include "../machine.h"
+#include "../volume/bind_field.h"
+#include "projection.h"
 #include "roots.h"
 
 namespace fracslice::mesh {
 
 namespace nb = nanobind;
 
-template <class Real>
-auto compiled_find(const Machine<Real>& code) {
+template <size_t, class T>
+using Repeat = T;
+
+// A compiled loop of some rows of n numbers, those that it writes, and perhaps a number of steps.
+template <class Real, class... Steps, size_t... I, size_t... O>
+auto compiled(const Machine<Real>& code, std::index_sequence<I...>, std::index_sequence<O...>) {
     using R = const Real*;
-    auto run = code.template function<R, R, R, R, R, R, R, R, Real*, ptrdiff_t, ptrdiff_t>();
-    return [code, run, p = code.array(1), frame = code.array(2)](R s, Real* roots, size_t steps, size_t n) {
-        run(p, frame, s, s + n, s + 2 * n, s + 3 * n, s + 4 * n, s + 5 * n, roots, ptrdiff_t(steps), ptrdiff_t(n));
-    };
-}
-
-inline auto compiled_polish(const Machine<double>& code) {
-    using R = const double*;
-    using W = double*;
-    auto run = code.function<R, R, R, R, R, R, R, R, W, W, W, W, W, ptrdiff_t>();
-    return [code, run, p = code.array(1), frame = code.array(2)](R s, W out, size_t n) {
-        run(p, frame, s, s + n, s + 2 * n, s + 3 * n, s + 4 * n, s + 5 * n, out, out + n, out + 2 * n, out + 3 * n, out + 4 * n,
-            ptrdiff_t(n));
-    };
-}
-
-inline auto compiled_field(const Machine<double>& code) {
-    using R = const double*;
-    auto run = code.function<R, R, R, R, double*, ptrdiff_t>();
-    return [code, run, p = code.array(1)](R points, double* values, size_t n) {
-        run(p, points, points + n, points + 2 * n, values, ptrdiff_t(n));
+    auto run = code.template function<R, R, Repeat<I, R>..., Repeat<O, Real*>..., Repeat<sizeof(Steps), ptrdiff_t>..., ptrdiff_t>();
+    return [code, run, p = code.array(1), frame = code.array(2)](R in, Real* out, Steps... steps, size_t n) {
+        run(p, frame, in + I * n..., out + O * n..., ptrdiff_t(steps)..., ptrdiff_t(n));
     };
 }
 
@@ -49,27 +34,43 @@ void call(const nb::object& function, const Real* in, size_t in_rows, Real* out,
     function(view(in, in_rows), view(out, out_rows), steps...);
 }
 
-// Of a loop that is either.
-template <class Real>
-std::function<void(const Real*, Real*, size_t, size_t)> find_loop(nb::object loop) {
-    if (nb::isinstance<nb::tuple>(loop)) return compiled_find(Machine<Real>(loop));
-    return [=](const Real* s, Real* roots, size_t steps, size_t n) { call(loop, s, 6, roots, 1, n, steps); };
+// A loop that is either.
+template <class Real, size_t In, size_t Out, class... Steps>
+std::function<void(const Real*, Real*, Steps..., size_t)> loop_of(nb::object loop) {
+    if (nb::isinstance<nb::tuple>(loop)) {
+        return compiled<Real, Steps...>(Machine<Real>(loop), std::make_index_sequence<In>(), std::make_index_sequence<Out>());
+    }
+    return [=](const Real* in, Real* out, Steps... steps, size_t n) { call(loop, in, In, out, Out, n, steps...); };
 }
 
-inline std::function<void(const double*, double*, size_t)> polish_loop(nb::object loop) {
-    if (nb::isinstance<nb::tuple>(loop)) return compiled_polish(Machine<double>(loop));
-    return [=](const double* s, double* out, size_t n) { call(loop, s, 6, out, 5, n); };
-}
-
-inline std::function<void(const double*, double*, size_t)> field_loop(nb::object loop) {
-    if (nb::isinstance<nb::tuple>(loop)) return compiled_field(Machine<double>(loop));
-    return [=](const double* points, double* values, size_t n) { call(loop, points, 3, values, 1, n); };
-}
+using StepsPair = std::pair<size_t, size_t>;
 
 inline RootLoops root_loops(size_t lanes, size_t batch, nb::object guess, nb::object find, nb::object polish, nb::object field,
-                            std::pair<size_t, size_t> steps, double sure) {
-    return {lanes, batch, find_loop<float>(guess), find_loop<double>(find), polish_loop(polish), field_loop(field),
-            steps.first, steps.second, sure};
+                            StepsPair steps, double sure) {
+    return {lanes, batch, loop_of<float, 6, 1, size_t>(guess), loop_of<double, 6, 1, size_t>(find), loop_of<double, 6, 5>(polish),
+            volume::field_values(field), {steps.first, steps.second}, sure};
+}
+
+inline ProjectionLoops projection_loops(size_t lanes, nb::object lead, nb::object guess, nb::object find, nb::object aim,
+                                        nb::object field, StepsPair steps) {
+    return {lanes, loop_of<float, 15, 3>(lead), loop_of<float, 6, 1, size_t>(guess), loop_of<double, 6, 1, size_t>(find),
+            loop_of<double, 6, 2>(aim), volume::field_values(field), {steps.first, steps.second}};
+}
+
+// A Python function of numbers of points and marks of those inside; it returns the rows of TrustRegions.
+inline TrustRegions trust_regions_by(nb::object function) {
+    return [=](std::span<const int64_t> which, const bool* inside, double* out) {
+        nb::gil_scoped_acquire locked;
+        const size_t n = which.size();
+        Array<int64_t> numbers(n, 1);
+        Array<bool> marks(n, 1);
+        std::copy(which.begin(), which.end(), numbers.data.get());
+        std::copy_n(inside, n, marks.data.get());
+        auto rows = nb::cast<nb::ndarray<const double, nb::shape<4, 3, -1>, nb::c_contig, nb::device::cpu>>(
+            function(to_numpy(std::move(numbers), {n}), to_numpy(std::move(marks), {n})));
+        if (rows.shape(2) != n) throw nb::value_error("expected as many trust regions as points");
+        std::copy_n(rows.data(), rows.size(), out);
+    };
 }
 
 }  // namespace fracslice::mesh

@@ -116,6 +116,18 @@ void CellGrid::lay(size_t begin, size_t end, const std::array<double, 3>& origin
     edges.bricks.push_back({uint32_t(end - begin), uint32_t(edges.leaders.size())});
 }
 
+void CellGrid::edges(size_t begin, size_t end, int16_t* rows) const {
+    if (begin == end) return;
+    tbb::parallel_for(brick_of(begin), brick_of(end - 1) + 1, [&](size_t row) {
+        for_each_own_edge(row, [&](const CellEdge& edge) {
+            if (edge.vertex < begin || edge.vertex >= end) return;
+            int16_t* to = std::transform(edge.lower.begin(), edge.lower.end(), rows + 4 * (edge.vertex - begin),
+                                         [](int32_t k) { return int16_t(k); });
+            *to = edge.axis;
+        });
+    });
+}
+
 void CellGrid::collect(const Octant& near, Numbers& numbers) const {
     for_each_near(near, [&](size_t place, uint32_t vertex) { numbers[place] = vertex; });
 }

@@ -213,6 +213,9 @@ class CellGrid {
     // The grid edges of the crossings `begin` to `end` - 1.
     void lay(size_t begin, size_t end, const std::array<double, 3>& origin, double voxel, GridEdges& edges) const;
 
+    // The lower grid point and the axis of each of these edges, four numbers.
+    void edges(size_t begin, size_t end, int16_t* rows) const;
+
     // The number after the last crossing of the brick that has this one.
     size_t end_of_brick(size_t crossing) const;
 

@@ -102,7 +102,8 @@ void Nearest::points(std::span<const double> points, double* distances) const {
     });
 }
 
-// What is nearest to a point of a ball is at most the ball's diameter farther from its centre than what is nearest to that.
+// The triangle nearest to a point of a ball is at most the ball's diameter farther from the centre than the one nearest to the
+// centre.
 void Nearest::run(std::span<const double> points, size_t& guess, double* distances) const {
     const size_t count = points.size() / 3;
     double centre[3], radius = 0;

@@ -13,7 +13,7 @@ class Nearest {
     Nearest(const MeshView& mesh, const TreeView& tree, bool closed);
 
     TriangleDistance distance(size_t t) const { return {mesh_, t}; }
-    // What is nearest to a point; the search begins with a guess.
+    // The triangle nearest to a point; the search begins with a guess.
     Neighbour operator()(const double* p, size_t guess) const;
     // The same, or something whose distance has a square within a limit.
     Neighbour within(double limit, const double* p, size_t guess) const;

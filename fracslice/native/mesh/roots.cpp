@@ -13,70 +13,19 @@
 namespace fracslice::mesh {
 namespace {
 
-constexpr size_t kRows = 6;  // of a segment
-
-// Some segments and their results; one per thread.
+// Some grid edges as segments.
 template <class Real>
-struct Segments {
-    std::vector<Real> rows, out;
-    size_t count = 0, whole = 0;  // without and with those that fill the last lanes
-
-    void resize(size_t n, size_t lanes) {
-        count = n, whole = (n + lanes - 1) / lanes * lanes;
-        rows.resize(kRows * whole);
-        out.resize(5 * whole);
+void take(Segments<Real>& segments, const GridEdges& edges, const std::vector<uint32_t>& which, Real length, size_t lanes) {
+    segments.resize(which.size(), lanes);
+    const size_t whole = segments.whole;
+    for (size_t k = 0; k < 3; ++k) {
+        Real* to = &segments.rows[k * whole];
+        for (uint32_t edge : which) *to++ = edges.starts[k][edge];
     }
-
-    void pad() {
-        for (size_t k = 0; k < kRows; ++k) {
-            std::fill(&rows[k * whole] + count, &rows[k * whole] + whole, rows[k * whole + count - 1]);
-        }
-    }
-
-    // Takes some grid edges.
-    void take(const GridEdges& edges, const std::vector<uint32_t>& which, Real length, size_t lanes) {
-        resize(which.size(), lanes);
-        for (size_t k = 0; k < 3; ++k) {
-            Real* to = &rows[k * whole];
-            for (uint32_t edge : which) *to++ = edges.starts[k][edge];
-        }
-        Real* directions = std::fill_n(&rows[3 * whole], 3 * whole, Real(0)) - 3 * whole;
-        for (size_t i = 0; i < count; ++i) directions[edges.axis(which[i]) * whole + i] = length;
-        pad();
-    }
-
-    // How far polishing moved its root.
-    Real moved(size_t i) const { return out[4 * whole + i]; }
-
-    template <class From>
-    void convert(const Segments<From>& from, size_t lanes) {
-        resize(from.count, lanes);
-        std::copy(from.rows.begin(), from.rows.end(), rows.begin());
-    }
-
-    // Takes some of others.
-    void take(const Segments& from, const std::vector<uint32_t>& which, size_t lanes) {
-        resize(which.size(), lanes);
-        for (size_t k = 0; k < kRows; ++k) {
-            for (size_t i = 0; i < count; ++i) rows[k * whole + i] = from.rows[k * from.whole + which[i]];
-        }
-        pad();
-    }
-
-    // Finds the roots; `left` is for those that take many steps.
-    template <class Find>
-    void find(const Find& function, const RootLoops& loops, Segments& left, std::vector<uint32_t>& which) {
-        function(rows.data(), out.data(), loops.quick, whole);
-        which.clear();
-        for (size_t i = 0; i < count; ++i) {
-            if (out[i] > 1) which.push_back(uint32_t(i));
-        }
-        if (which.empty()) return;
-        left.take(*this, which, loops.lanes);
-        function(left.rows.data(), left.out.data(), loops.most, left.whole);
-        for (size_t i = 0; i < which.size(); ++i) out[which[i]] = left.out[i] > 1 ? left.out[i] - 2 : left.out[i];
-    }
-};
+    Real* directions = std::fill_n(&segments.rows[3 * whole], 3 * whole, Real(0)) - 3 * whole;
+    for (size_t i = 0; i < segments.count; ++i) directions[edges.axis(which[i]) * whole + i] = length;
+    segments.pad();
+}
 
 // Roots of crossings, and rows of normals.
 struct RootRows {
@@ -187,7 +136,7 @@ class Search {
     // The same in bricks that are flat.
     void compare(const RootRows& result) {
         evaluate();
-        const double* value = values_.data();
+        const double* value = points_.f.data();
         for (const FlatBrick& brick : flat_) {
             for (uint32_t edge = brick.edge; edge < brick.edge_end; ++edge, ++value) {
                 Lead& lead = leads_[edges_.led[edge]];
@@ -204,49 +153,45 @@ class Search {
 
     // The field at their edges' shifted places.
     void evaluate() {
-        size_t n = 0;
-        for (const FlatBrick& brick : flat_) n += brick.edge_end - brick.edge;
-        size_t whole = (n + loops_.lanes - 1) / loops_.lanes * loops_.lanes;
-        points_.resize(3 * whole);
-        values_.resize(whole);
-        for (size_t k = 0; k < 3; ++k) {
-            double* to = &points_[k * whole];
-            for (const FlatBrick& brick : flat_) {
-                for (uint32_t i = brick.edge; i < brick.edge_end; ++i) {
-                    *to++ = edges_.starts[k][i] + leads_[edges_.led[i]].shift[k];
-                }
+        points_.clear();
+        for (const FlatBrick& brick : flat_) {
+            for (uint32_t i = brick.edge; i < brick.edge_end; ++i) {
+                const Vec3& shift = leads_[edges_.led[i]].shift;
+                points_.push({edges_.starts[0][i] + shift[0], edges_.starts[1][i] + shift[1], edges_.starts[2][i] + shift[2]});
             }
-            std::fill(to, &points_[k * whole] + whole, to[-1]);
         }
-        loops_.field(points_.data(), values_.data(), whole);
+        points_.evaluate(loops_.field);
     }
 
     // Looks for each of `which_` by itself.
     void each(const RootRows& result) {
-        exact_.take(edges_, which_, voxel_, loops_.lanes);
+        take(exact_, edges_, which_, voxel_, loops_.lanes);
         fast_.convert(exact_, loops_.lanes);
-        fast_.find(loops_.guess, loops_, fast_left_, slow_ones_);
+        fast_.find(loops_.guess, loops_.steps, loops_.lanes, fast_left_, slow_ones_);
         std::copy(fast_.out.begin(), fast_.out.begin() + ptrdiff_t(fast_.whole), exact_.out.begin());
         loops_.polish(exact_.rows.data(), exact_.out.data(), exact_.whole);
         unsure_.clear();
         for (size_t i = 0; i < exact_.count; ++i) {
             result.put(which_[i], exact_.out[i], normal(exact_, i));
-            if (!(exact_.moved(i) <= loops_.sure)) unsure_.push_back(uint32_t(i));
+            if (!(moved(exact_, i) <= loops_.sure)) unsure_.push_back(uint32_t(i));
         }
         if (!unsure_.empty()) again(result);
     }
 
     void again(const RootRows& result) {
         slow_.take(exact_, unsure_, loops_.lanes);
-        slow_.find(loops_.find, loops_, left_, slow_ones_);
+        slow_.find(loops_.find, loops_.steps, loops_.lanes, left_, slow_ones_);
         roots_.assign(slow_.out.begin(), slow_.out.begin() + ptrdiff_t(slow_.count));
         std::fill(&slow_.out[0] + slow_.count, &slow_.out[0] + slow_.whole, roots_.back());
         loops_.polish(slow_.rows.data(), slow_.out.data(), slow_.whole);
         for (size_t i = 0; i < slow_.count; ++i) {
-            double root = slow_.moved(i) <= loops_.sure ? slow_.out[i] : roots_[i];
+            double root = moved(slow_, i) <= loops_.sure ? slow_.out[i] : roots_[i];
             result.put(which_[unsure_[i]], root, normal(slow_, i));
         }
     }
+
+    // How far polishing moved a root.
+    static double moved(const Segments<double>& of, size_t i) { return of.out[4 * of.whole + i]; }
 
     static Normal normal(const Segments<double>& of, size_t i) {
         return {float(of.out[of.whole + i]), float(of.out[2 * of.whole + i]), float(of.out[3 * of.whole + i])};
@@ -262,7 +207,8 @@ class Search {
     std::vector<uint32_t> which_, slow_ones_, unsure_;
     std::vector<Lead> leads_;
     std::vector<FlatBrick> flat_;
-    std::vector<double> roots_, points_, values_;
+    std::vector<double> roots_;
+    volume::Points points_;
 };
 
 }  // namespace

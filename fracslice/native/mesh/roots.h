@@ -1,21 +1,21 @@
 // Where exactly the surface crosses the grid's edges, and its normals there.
 #pragma once
-#include <functional>
-
+#include "../volume/field_values.h"
 #include "cells.h"
+#include "segments.h"
 
 namespace fracslice::mesh {
 
 // The loops of fracslice.mesh.root_loops over one field, on arrays of n segments, a multiple of `lanes`, that follow each
-// other in one array; the field itself on three rows of n coordinates; and how many segments are worth a call.
+// other in one array; the field itself; and how many segments are worth a call.
 struct RootLoops {
     size_t lanes, batch;
-    std::function<void(const float* segments, float* roots, size_t steps, size_t n)> guess;
-    std::function<void(const double* segments, double* roots, size_t steps, size_t n)> find;
+    Find<float> guess;
+    Find<double> find;
     std::function<void(const double* segments, double* out, size_t n)> polish;  // out: roots, normals, how far they moved
-    std::function<void(const double* points, double* values, size_t n)> field;
-    size_t quick, most;  // steps that all segments are given, and those that then are left
-    double sure;         // a root is exact where it moved less
+    volume::FieldValues field;
+    Steps steps;
+    double sure;  // a root is exact where it moved less
 };
 
 // The crossings `begin` to `end` - 1, of whole bricks: where on their edges they are, and the surface's unit normals there, in

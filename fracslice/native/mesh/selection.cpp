@@ -90,7 +90,7 @@ std::vector<int64_t> touching(const Triangles& triangles, std::span<const bool> 
     assert(vertices.size() == triangles.vertices);
     return chosen(triangles.count, [&](size_t t) {
         const int32_t* corners = triangles[t];
-        return vertices[size_t(corners[0])] | vertices[size_t(corners[1])] | vertices[size_t(corners[2])];
+        return vertices[size_t(corners[0])] + vertices[size_t(corners[1])] + vertices[size_t(corners[2])] > 0;  // no branch
     });
 }
 

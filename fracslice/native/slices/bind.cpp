@@ -9,6 +9,7 @@
 #include <memory>
 
 #include "../machine.h"
+#include "filter.h"
 #include "picture.h"
 
 namespace nb = nanobind;
@@ -120,6 +121,17 @@ nb::bytes bind_encoded(const nb::ndarray<const uint8_t, nb::ndim<2>, nb::device:
     return bytes(*data);
 }
 
+nb::bytes bind_filtered(const nb::ndarray<const uint8_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>& rows, size_t pixel) {
+    if (rows.shape(0) < 1 || pixel < 1) throw nb::value_error("a row above and a pixel of at least a byte were expected");
+    const size_t count = rows.shape(0) - 1, width = rows.shape(1);
+    Rows<uint8_t> result(count * (width + 1));
+    {
+        nb::gil_scoped_release released;
+        filter_rows(rows.data(), count, width, pixel, result.data());
+    }
+    return bytes(result);
+}
+
 nb::tuple bind_crossings(const Slab& slab, int layer) {
     held(slab, layer);
     Crossings result;
@@ -149,6 +161,7 @@ nb::tuple bind_signs(const Slab& slab) {
 NB_MODULE(_slices, module) {
     using namespace nanobind::literals;
     using namespace fracslice::slices;
+    nb::set_leak_warnings(false);  // the command exits without a search for garbage
     nb::exception<std::domain_error>(module, "BorderError", PyExc_ValueError);
     nb::class_<ProbeBounds>(module, "ProbeBounds")
         .def(nb::init<double, double, double, bool>(), "proven"_a, "outside"_a, "inside"_a, "escape_time_only"_a);
@@ -159,6 +172,7 @@ NB_MODULE(_slices, module) {
         .value("RLE4", Encoding::rle4)
         .value("RLE1", Encoding::rle1);
     module.def("encoded", &bind_encoded, "image"_a, "encoding"_a);
+    module.def("filtered", &bind_filtered, "rows"_a, "pixel"_a);
     nb::class_<Memory>(module, "Memory").def(nb::init<>());
     nb::class_<Slab>(module, "Slab")
         .def("__init__",

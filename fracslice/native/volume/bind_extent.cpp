@@ -1,9 +1,9 @@
 // The sides of an object, and climbs to its tips, for fracslice._native.
-#include "../machine.h"
-#include "../numpy.h"
 #include "../unlocked.h"
+#include "bind_field.h"
 #include "climb.h"
 #include "side.h"
+#include "surface_error.h"
 
 #include <tbb/parallel_for.h>
 
@@ -12,31 +12,6 @@ namespace {
 
 using Rows3 = nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 using Row = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-
-template <class Real>
-FieldValues compiled(const Machine<Real>& code) {
-    using R = const Real*;
-    auto run = code.template function<R, R, R, R, Real*, ptrdiff_t>();
-    return in_batches<Real>([code, run, p = code.array(1)](R x, R y, R z, Real* f, size_t n) { run(p, x, y, z, f, ptrdiff_t(n)); });
-}
-
-// Of `Kernel.entry`: machine code in either precision, or a function of points [3, n] that writes their values to [1, n].
-FieldValues field_values(nb::object entry) {
-    if (nb::isinstance<nb::tuple>(entry)) {
-        const bool single = nb::cast<nb::ndarray<nb::ro>>(entry[1]).dtype() == nb::dtype<float>();
-        return single ? compiled(Machine<float>(entry)) : compiled(Machine<double>(entry));
-    }
-    return [entry](const Rows& rows, size_t n) {
-        nb::gil_scoped_acquire locked;
-        Array<double> points(3, n), values(1, n);
-        size_t k = 0;
-        for (const double* row : {rows.x, rows.y, rows.z}) std::copy_n(row, n, &points.data[n * k++]);
-        double* f = values.data.get();  // the array below owns it
-        nb::object out = to_numpy(std::move(values), {1, n});
-        entry(to_numpy(std::move(points), {3, n}), out);
-        std::copy_n(f, n, rows.f);
-    };
-}
 
 // The six sides of an object, lower ones first, in the order of the axes.
 class Sides {
@@ -124,6 +99,20 @@ nb::object climbed(nb::object entry, const Rows3& starts, const Rows3& steps, co
     return to_numpy(std::move(points), {3, n, each});
 }
 
+nb::object measured(nb::object entry, const nb::ndarray<const double, nb::shape<-1, 3>, nb::device::cpu>& points, double scale,
+                    const Point& offset, const nb::ndarray<const double, nb::shape<26, 3>, nb::c_contig, nb::device::cpu>& steps,
+                    double step, double voxel, int threads) {
+    const size_t n = points.shape(0);
+    FieldValues field = field_values(entry);
+    Array<double> errors(n, 1);
+    const PlacedPoints placed{points.data(), points.stride(0), points.stride(1), scale, offset};
+    unlocked(threads, [&] {
+        surface_error(field, placed, {steps.data(), step}, voxel, {errors.data.get(), n});
+        return 0;
+    });
+    return to_numpy(std::move(errors), {n});
+}
+
 }  // namespace
 
 void bind_extent(nb::module_& module) {
@@ -138,6 +127,8 @@ void bind_extent(nb::module_& module) {
         .def_prop_ro("known", &Sides::known)
         .def_prop_ro("above", &Sides::above)
         .def_prop_ro("spent", &Sides::spent);
+    module.def("surface_error", &measured, "field"_a, "points"_a, "scale"_a, "offset"_a, "steps"_a, "step"_a, "voxel"_a,
+               "threads"_a = 0);
     module.def("climb", &climbed, "field"_a, "starts"_a, "steps"_a, "gain"_a, "first"_a, "exact"_a, "threads"_a = 0);
 }
 

@@ -5,7 +5,6 @@
 #include <nanobind/stl/map.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
-#include <nanobind/stl/vector.h>
 
 namespace fracslice::volume {
 namespace {
@@ -35,23 +34,6 @@ nb::tuple to_bricks(const Grid& grid) {
                           to_numpy(std::move(out.values), {n, kSamples}), to_numpy(std::move(out.index), {x, y, z}));
 }
 
-nb::tuple mesh(const Grid& grid, double adaptivity) {
-    GridMesh result;
-    {
-        nb::gil_scoped_release released;
-        result = mesh_of(*grid.vdb, adaptivity);
-    }
-    return nb::make_tuple(to_numpy<float>(result.points), to_numpy<uint32_t>(result.triangles),
-                          to_numpy<uint32_t>(result.quads));
-}
-
-std::vector<Grid> parts(const Grid& grid) {
-    nb::gil_scoped_release released;
-    std::vector<Grid> result;
-    for (auto& part : surfaces(*grid.vdb)) result.push_back({part});
-    return result;
-}
-
 }  // namespace
 }  // namespace fracslice::volume
 
@@ -59,6 +41,7 @@ NB_MODULE(_vdb, module) {
     namespace nb = nanobind;
     using namespace fracslice::volume;
     using namespace nanobind::literals;
+    nb::set_leak_warnings(false);  // the command exits without a search for garbage
     using released = nb::call_guard<nb::gil_scoped_release>;
     openvdb::initialize();
     nb::class_<Grid>(module, "Grid")
@@ -68,15 +51,8 @@ NB_MODULE(_vdb, module) {
         .def("write", [](const Grid& g, const std::string& path, const Metadata& metadata) { write_grid(g.vdb, path, metadata); },
              "path"_a, "metadata"_a, released())
         .def("to_bricks", &to_bricks)
-        .def("mesh", &mesh, "adaptivity"_a = 0.0)
         .def("redistance", [](const Grid& g) { return Grid{redistance(*g.vdb)}; }, released())
         .def("offset", [](const Grid& g, double distance) { return Grid{offset(*g.vdb, distance)}; }, "distance"_a, released())
-        .def("surfaces", &parts)
         .def_prop_rw("name", [](const Grid& g) { return g.vdb->getName(); },
-                     [](Grid& g, const std::string& name) { g.vdb->setName(name); })
-        .def_prop_ro("metadata", [](const Grid& g) { return strings_of(*g.vdb); })
-        .def_prop_ro("background", [](const Grid& g) { return g.vdb->background(); })
-        .def_prop_ro("active_voxels", [](const Grid& g) { return g.vdb->activeVoxelCount(); })
-        .def_prop_ro("leaves", [](const Grid& g) { return g.vdb->tree().leafCount(); })
-        .def_prop_ro("memory", [](const Grid& g) { return g.vdb->memUsage(); });
+                     [](Grid& g, const std::string& name) { g.vdb->setName(name); });
 }

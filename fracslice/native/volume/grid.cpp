@@ -158,12 +158,4 @@ FloatGrid::Ptr read_grid(const std::string& path, const std::string& name) {
     throw std::runtime_error(path + ": no float grid" + (name.empty() ? "" : " named " + name));
 }
 
-Metadata strings_of(const FloatGrid& grid) {
-    Metadata strings;
-    for (auto item = grid.beginMeta(); item != grid.endMeta(); ++item) {
-        if (item->second) strings[item->first] = item->second->str();
-    }
-    return strings;
-}
-
 }  // namespace fracslice::volume

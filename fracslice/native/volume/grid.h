@@ -10,7 +10,6 @@
 #include <map>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "../array.h"
 #include "bricks.h"
@@ -28,12 +27,6 @@ struct BrickArrays {
     std::array<int32_t, 3> shift;  // grid index of point (0, 0, 0) of the arrays
 };
 
-struct GridMesh {
-    std::vector<openvdb::Vec3s> points;     // scene units
-    std::vector<openvdb::Vec3I> triangles;  // counter-clockwise seen from outside, as are the quads
-    std::vector<openvdb::Vec4I> quads;
-};
-
 // A level set: active where sampled; the background is the largest sample; unsampled inside bricks are inactive tiles.
 FloatGrid::Ptr grid_from_bricks(const Bricks& bricks, const std::array<double, 3>& origin, double voxel);
 BrickArrays bricks_from_grid(const FloatGrid& grid);
@@ -45,14 +38,9 @@ std::pair<std::array<double, 3>, double> placement_of(const FloatGrid& grid);
 void write_grid(const FloatGrid::Ptr& grid, const std::string& path, const Metadata& metadata);
 FloatGrid::Ptr read_grid(const std::string& path, const std::string& name);
 
-Metadata strings_of(const FloatGrid& grid);
-
-GridMesh mesh_of(const FloatGrid& grid, double adaptivity);
 // A field that is not a distance, made one in scene units around the same surface (fast sweeping, Zhao 2004).
 FloatGrid::Ptr redistance(const FloatGrid& grid);
 // The surface moved outwards by `distance` scene units; negative: inwards. The grid must hold distances.
 FloatGrid::Ptr offset(const FloatGrid& grid, double distance);
-// One grid for each connected piece of the surface (a cavity's wall is one by itself), the largest first.
-std::vector<FloatGrid::Ptr> surfaces(const FloatGrid& grid);
 
 }  // namespace fracslice::volume

@@ -4,10 +4,8 @@
 #include <openvdb/tools/ChangeBackground.h>
 #include <openvdb/tools/Count.h>
 #include <openvdb/tools/FastSweeping.h>
-#include <openvdb/tools/LevelSetUtil.h>
 #include <openvdb/tools/Prune.h>
 #include <openvdb/tools/ValueTransformer.h>
-#include <openvdb/tools/VolumeToMesh.h>
 #pragma GCC visibility pop
 
 #include <algorithm>
@@ -25,14 +23,6 @@ void fit_background(FloatGrid& grid) {
 }
 
 }  // namespace
-
-GridMesh mesh_of(const FloatGrid& grid, double adaptivity) {
-    GridMesh mesh;
-    openvdb::tools::volumeToMesh(grid, mesh.points, mesh.triangles, mesh.quads, 0.0, adaptivity);
-    for (auto& t : mesh.triangles) std::swap(t[1], t[2]);
-    for (auto& q : mesh.quads) std::swap(q[1], q[3]);
-    return mesh;
-}
 
 FloatGrid::Ptr redistance(const FloatGrid& grid) {
     auto distances = openvdb::tools::sdfToSdf(grid);
@@ -55,14 +45,6 @@ FloatGrid::Ptr offset(const FloatGrid& grid, double distance) {
     fit_background(*moved);
     openvdb::tools::pruneLevelSet(moved->tree());
     return moved;
-}
-
-std::vector<FloatGrid::Ptr> surfaces(const FloatGrid& grid) {
-    std::vector<FloatGrid::Ptr> parts;
-    openvdb::tools::segmentSDF(grid, parts);
-    std::stable_sort(parts.begin(), parts.end(),
-                     [](auto& a, auto& b) { return a->activeVoxelCount() > b->activeVoxelCount(); });
-    return parts;
 }
 
 }  // namespace fracslice::volume

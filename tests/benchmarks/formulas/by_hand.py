@@ -13,7 +13,7 @@ from typing import Any
 from fracslice.formulas import Formula, Node
 from fracslice.formulas.escape import CORE, potential_distance
 from fracslice.formulas.orbits import orbit_arguments
-from fracslice.formulas.vocabulary import any_of, maximum, minimum, ratio, sqrt, where
+from fracslice.formulas.vocabulary import absolute, any_of, maximum, minimum, ratio, sqrt, where
 
 BRISTOR, LEAST = 2.985, 2 * CORE**0.5
 """Most that the Bristorbrot's step stretches, per |w|; least derivative of a disconnected Julia set."""
@@ -94,6 +94,42 @@ def bristorbrot(x, y, z, iterations, levels, stop):  # type: ignore[no-untyped-d
         end_r2 = where(alive, r2, end_r2)
         slope = where(alive, maximum(dr, slope), slope)
         level = where(alive, level + level, level)
+        alive = alive & (r2 < stop)
+    return potential_distance(end_r2, slope * slope, level, first_level, last_level, least)
+
+
+def mandelbulb(x, y, z, v0_calm, iterations, levels, stop):  # type: ignore[no-untyped-def]
+    """Power 8, by complex multiplication."""
+    a, b, c = x, y, z
+    first_level, last_level, least = levels
+    fade, fading = v0_calm
+    level = 0.0 * x + first_level
+    rho2 = x * x + y * y
+    r2 = rho2 + z * z
+    dr = 0.0 * x + 1.0
+    end_r2, slope = r2, dr
+    alive = r2 < stop
+    for _ in range(iterations):
+        if not any_of(alive):
+            break
+        rho2 = maximum(rho2, 1e-30)
+        rho, r4 = sqrt(rho2), r2 * r2
+        re, im = 2.0 * z * z - r2, 2.0 * z
+        re, im = 2.0 * re * re - r4, 2.0 * re * im
+        re, im = 2.0 * re * re - r4 * r4, 2.0 * re * im
+        over = ratio(y, rho2)
+        u, v = 1.0 - 2.0 * y * over, 2.0 * x * over
+        u, v = 1.0 - 2.0 * v * v, 2.0 * v * u
+        u, v = 1.0 - 2.0 * v * v, 2.0 * v * u
+        latitude = absolute(im) * minimum(1.0, fade - r2 * fading)
+        dr = maximum(r4 * r2 * sqrt(r2), latitude) * (8.0 * dr) + 1.0
+        s = im * rho
+        x, y, z = s * u + a, s * v + b, re + c
+        rho2 = x * x + y * y
+        r2 = rho2 + z * z
+        end_r2 = where(alive, r2, end_r2)
+        slope = where(alive, maximum(dr, slope), slope)
+        level = where(alive, 8.0 * level, level)
         alive = alive & (r2 < stop)
     return potential_distance(end_r2, slope * slope, level, first_level, last_level, least)
 

@@ -18,7 +18,6 @@ from fracslice.formulas import (
     kifs_tetrahedron,
     mandelbox,
     mandelbulb,
-    orbit,
     quaternion_mandelbrot,
 )
 from fracslice.formulas.definitions import Definition, formula
@@ -33,6 +32,7 @@ from .by_hand import made
 
 C, ANGLE = (-0.2, 0.8, 0.0), radians(20)
 BOX, THIN_BOX = mandelbox(iterations=10), mandelbox(scale=-1.5, iterations=10)
+BULB = mandelbulb(iterations=8)
 KIFS, BRISTOR = kifs_tetrahedron(angle=20, iterations=6), bristorbrot(iterations=8)
 JULIA = quaternion_mandelbrot(julia=C, iterations=12)
 SQUARE = """\
@@ -52,7 +52,7 @@ SCENES: dict[str, tuple[str, Node, Node]] = {
         KIFS,
         made(by_hand.kifs, KIFS, scale=2.0, cosine=cos(ANGLE), sine=sin(ANGLE)),
     ),
-    "Mandelbulb 8": ("verbs", orbit(mandelbulb(), iterations=8), mandelbulb(iterations=8)),
+    "Mandelbulb 8": ("verbs", BULB, made(by_hand.mandelbulb, BULB)),
     "Julia": ("its stretch returned", JULIA, made(by_hand.julia, JULIA, constant=C)),
     "Julia, differentiated": ("its text", BARE, made(by_hand.julia, BARE, constant=C)),
     "Bristorbrot": ("its text", BRISTOR, made(by_hand.bristorbrot, BRISTOR)),

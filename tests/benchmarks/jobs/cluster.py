@@ -1,12 +1,12 @@
 """What a cluster costs: jobs by workers against threads, and the simulated growth to 1000 workers.
 
-Each job is made by two local workers and by as many threads, in turn; the ratio is of CPU time, of
-workers and this process together. What the workers compute outside of their tasks is counted, too, and the
-first job of new workers, which import, compile and plan. Empty tasks give the cost of one in all processes,
-and its wall time, which is serial. A run of each job in one process, and of a smaller one, gives the CPU time
-of its tasks and the growth of the rest, which is serial. The simulation makes a larger job of more tasks of
-these times: every task passes the serial part, then a free worker, and its result the serial part again; all
-tasks of a stage end before the next one begins.
+Each job is made by two local workers and by as many threads, in turn; the ratio is of CPU time, of workers
+and this process together. What the workers compute outside of their tasks is counted, too, and the first
+job of new workers, which import, compile and plan. Empty tasks give the cost of one in all processes, and
+its wall time, which is serial; idle workers that of their heartbeats. A run of each job in one process, and
+of a smaller one, gives the CPU time of its tasks and the growth of the rest, which is serial. The
+simulation makes a larger job of more tasks of these times: every task passes the serial part, then a free
+worker, and its result the serial part again; all tasks of a stage end before the next one begins.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from typing import Any
 
 from fracslice.animation import FilmJob, Timeline, write_frames
 from fracslice.cluster import Contents, Pool, ResultFolder, Task, Workers, connected
-from fracslice.cluster.pieces import run as make_piece
-from fracslice.export.slices import write_slices
+from fracslice.cluster.pool import run as make_piece
+from fracslice.export.layer_files import write_slices
 from fracslice.formulas import mandelbulb
 from fracslice.jobs import mesh_tasks as meshtasks
 from fracslice.jobs.mesh import make_mesh
@@ -35,6 +35,7 @@ from fracslice.scene.animation import Animation
 from fracslice.scene.view import Camera, View
 from fracslice.scene.writer import to_xml
 from fracslice.slicing import SliceJob
+from fracslice.volume import exploration
 from fracslice.work import Work
 
 from ..runner import Figures, Row, Run, Spread
@@ -48,6 +49,7 @@ SMALLEST = {
     "frames": 1,
     "bricks": 1 << 12,
     "empty": 4,
+    "idle": 0.1,
     "tasks": 8,
     "workers": (1,),
 }
@@ -230,11 +232,12 @@ def rows(
     frames: int = 4,
     bricks: int = 1 << 14,
     empty: int = 200,
+    idle: float = 10.0,
     tasks: int = 10_000,
     workers: tuple[int, ...] = (1, 10, 100, 300, 1000),
     plot: str = "",
 ) -> Iterator[Row]:
-    meshtasks.LEAST = bricks
+    meshtasks.LEAST, exploration.MANY = bricks, bricks  # samples are tasks, as in the larger job
     threads, sizes = run.threads[0], (pixels, layers, voxels, width, frames)
     kinds, smaller = jobs(*sizes), jobs(pixels, 8, voxels // 2, width // 2, 1)
     nothing = [Nothing("nothing", number) for number in range(empty)]
@@ -249,6 +252,7 @@ def rows(
                 acts[f"{kind} by threads"] = partial(cpu_of, partial(job, alone, folder), None)
                 first[kind] = acts[f"{kind} by workers"]()["cpu_s"]
             acts["empty"] = partial(cpu_of, partial(by_pool, pool, nothing), pool)
+            acts["idle"] = partial(cpu_of, partial(time.sleep, idle), pool)
             measured = run.interleaved(acts)
         measures = {kind: Stages.of(job, smaller[kind], folder) for kind, job in kinds.items()}
     wall, cpu = (
@@ -256,6 +260,9 @@ def rows(
     )
     yield {"": "an empty task, CPU ms in all processes", "slice": 1e3 * cpu.median}
     yield {"": "its wall time in the scheduler and the client, ms", "slice": 1e3 * wall.median}
+    ticks = measured.ratio("idle", "idle", "cpu_s", "wall_s").median / threads
+    yield {"": "a worker without a task, CPU ms a second", "slice": 1e3 * ticks}
+    yield {"": "CPU time beside tasks of 2 s, %", "slice": 100 * (ticks + cpu.median / 2)}
     by = {kind: measured[f"{kind} by workers"] for kind in kinds}
     ratios = {kind: measured.ratio(f"{kind} by workers", f"{kind} by threads", "cpu_s") for kind in kinds}
     yield {"": f"CPU time, {threads} workers / {threads} threads", **ratios}

@@ -14,7 +14,7 @@ import numpy as np
 
 from fracslice.common.memory import peak_rss_mb
 from fracslice.export.jobs import SliceRun
-from fracslice.export.slices import write_slices
+from fracslice.export.layer_files import write_slices
 from fracslice.formulas import mandelbulb
 from fracslice.slicing import SliceJob, Slicer, Stack, plan_stack
 from fracslice.slicing.printers import printer

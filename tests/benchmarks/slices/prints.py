@@ -12,8 +12,8 @@ from functools import partial
 from pathlib import Path
 
 from fracslice.export.jobs import SliceRun
+from fracslice.export.layer_files import write_slices
 from fracslice.export.resins import Resin
-from fracslice.export.slices import write_slices
 from fracslice.formulas import mandelbulb
 from fracslice.jobs.stack_model import StackModel
 from fracslice.scene import scene

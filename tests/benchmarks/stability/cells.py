@@ -13,7 +13,21 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from fracslice.formulas import Node, bounds, box, gyroid, julia, mandelbox, mandelbulb, menger, orbit
+from fracslice.formulas import (
+    Node,
+    bounds,
+    box,
+    burning_ship,
+    gyroid,
+    julia,
+    kifs_icosahedron,
+    mandelbox,
+    mandelbulb,
+    menger,
+    orbit,
+    quaternion_mandelbrot,
+    transform,
+)
 from fracslice.formulas.field import Cells
 from fracslice.kernel import compile_scene
 from fracslice.kernel.cpu import compile_loops
@@ -34,7 +48,14 @@ SCENES: dict[str, Node] = {
     "Mandelbox -1.5": mandelbox(scale=-1.5, iterations=8),
     "Mandelbulb 10": mandelbulb(iterations=10),
     "Julia 12": julia(iterations=12),
+    "Julia 12, by its step": quaternion_mandelbrot(julia=(-0.2, 0.8, 0), iterations=12),
+    "kaleidoscope, 5 rounds": kifs_icosahedron(iterations=5),
     "bulb and box, 2 rounds": orbit(mandelbulb(), mandelbox(scale=-1.5), iterations=2),
+    "kaleidoscope and ship, 2 rounds": orbit(
+        kifs_icosahedron(),
+        transform(burning_ship(power=4), rotate=(-0.2, -1, -1.5, 292), scale=1.3),
+        iterations=2,
+    ),
     "CSG of 240": EXAMPLES["many"] - box((0.3, 9, 9)),
 }
 SMALLEST = {"cells": 16, "voxels": 32, "names": ("gyroid",)}

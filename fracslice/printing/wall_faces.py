@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..kernel import Field
-from ..volume.values import values_at
+from ..volume.evaluation import values_at
 from ..work import Work
-from .crossings import slopes
+from .edge_crossings import slopes
 from .walls import OPPOSITE, Walls
 
 STEP = 0.05

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..common.srgb import to_linear
 from ..errors import SceneError
 
 _SIZE = re.compile(rb"-Y (\d{1,6}) \+X (\d{1,6})")
@@ -112,7 +113,7 @@ def _displayed(path: str) -> np.ndarray:
 
     with Image.open(path) as image:
         shown = np.asarray(image.convert("RGB"), np.float32) / np.float32(255)
-    return np.where(shown <= 0.04045, shown / 12.92, ((shown + 0.055) / 1.055) ** 2.4)
+    return to_linear(shown)
 
 
 def _openexr(path: str) -> np.ndarray:

@@ -8,18 +8,19 @@ from typing import Any
 
 import numpy as np
 
+from ..common.digits import counted, significant
 from ..formulas import Box
 from ..formulas.box import Triple
 from ..kernel import Field
 from ..volume import Bricks, Drain
 from ..work import Work
-from .components import components_of
-from .connectivity import resolved, shown
-from .faces import projected
+from .connectivity import resolved, sampled_object
 from .limits import Limits
-from .problems import Problem, counted
+from .problems import Problem
 from .samples import Samples
+from .solid_components import components_of
 from .thin_features import thin_features
+from .wall_faces import projected
 from .walls import Measure, Walls, walls_of
 from .widths import BINS, Widths, widths_of
 
@@ -132,7 +133,7 @@ def check_object(
     longest = max(outer.size)
     wanted = ACROSS * longest * scale / max(min(limits.wall, limits.floor), 1e-6)
     samples = min(max(wanted, COARSE), FINE)
-    bricks = shown(root, outer, longest, samples, work)
+    bricks = sampled_object(root, outer, longest, samples, work)
     return check_solid(root, bricks, scale, limits, work, finest, origin, drains)
 
 
@@ -207,11 +208,11 @@ def check_solid(
     if len(bodies) > 1:
         problems.append(loose(len(bodies)))
     if cavities:
-        sealed = counted(cavities, "sealed cavity", "sealed cavities")
-        problems.append(Problem("cavities", f"{sealed} of {sum(cavities):.3g} mm3", mend=FILL))
+        sealed = counted(len(cavities), "sealed cavity", "sealed cavities")
+        problems.append(Problem("cavities", f"{sealed} of {significant(sum(cavities))} mm3", mend=FILL))
     for kind, under, limit in (("walls", narrow, limits.wall), ("floors", bare, limits.floor)):
         if (area := float(under.area.sum()) * scale**2) >= limits.thin:
-            text = f"{area:.3g} mm2 of {kind} are thinner than {limit:g} mm"
+            text = f"{significant(area)} mm2 of {kind} are thinner than {limit:g} mm"
             x, y, z = (scale * (under.middle[under.width.argmin()] - middle)).tolist()
             thickness = max(limit, THICKEN * scale * max(Samples(bricks).bounds.box.size))
             mend = (("thickness", f"{thickness:.2g}mm"),)
@@ -248,7 +249,7 @@ def _unseen(walls: Walls, finest: float, least: float, scale: float) -> str:
     first = int(lost.width.argmin())
     x, y, z = lost.middle[first].tolist()
     return (
-        f"{area:.3g} mm2 of walls are thinner than {finest:.3g} mm and may be lost; "
+        f"{significant(area)} mm2 of walls are thinner than {finest:.3g} mm and may be lost; "
         f"the thinnest, {lost.width[first] * scale:.2g} mm, at {x:.3g} {y:.3g} {z:.3g} in the scene"
     )
 

@@ -14,7 +14,7 @@ from ..common.extras import lacking
 from ..errors import BenchError
 from ..export import replacing
 from ..version import __version__
-from .runs import Measurement
+from .measurements import Measurement
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

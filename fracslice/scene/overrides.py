@@ -6,15 +6,17 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..common.suggestions import hint
 from ..errors import SceneError
 from ..formulas import Node
 from .element import Part
 from .layout import PICTURE, PRINT, SECTIONS, SOLID, Element
-from .model import Scene
 from .view import View
+
+if TYPE_CHECKING:
+    from .model import Scene
 
 FORM = "ELEMENT.ATTRIBUTE=VALUE, such as mandelbulb.power=6 or box[2].round=0.1"
 _FORM = re.compile(r"\s*(\w+)\s*(?:\[\s*(\d+)\s*\])?\s*\.\s*(\w+)\s*=(.*)", re.DOTALL)

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..common.compiled import compiled
 from ..kernel import Kernel
-from ..volume.values import values_at
+from ..volume.evaluation import values_at
 from ..work import Work
 from .interpolation import SIDE, gather
 from .samples import Samples
@@ -18,7 +18,7 @@ ALONG = 0.999
 """Fraction of a normal's largest component above which another component ties with it."""
 
 
-def crossed(solid: Samples, rows: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def edge_crossings(solid: Samples, rows: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Crossings of the surface with grid edges that begin in some bricks.
 
     A smooth surface has one crossing for each grid line along the axis nearest to its normal.

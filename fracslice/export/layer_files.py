@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fracslice.common.files import check_target
-from fracslice.errors import ExportError
-from fracslice.export import anycubic, archives, chitu, goo, outlines, png, slices3mf
-from fracslice.export.jobs import SliceRun
-from fracslice.export.layerformats import FolderFormat, LayerFormat
-from fracslice.slicing.printers import Printer
+from ..common.files import check_target
+from ..errors import ExportError
+from ..slicing.printers import Printer
+from . import anycubic, archives, chitu, goo, outlines, png, slices3mf
+from .jobs import SliceRun
+from .layerformats import FolderFormat, LayerFormat
 
 PRINTS = {form.name: form for form in (*archives.FORMATS, goo.FORMAT, *chitu.FORMATS, anycubic.FORMAT)}
 """Formats of printers; they need a printer and a resin."""
@@ -77,6 +77,8 @@ def slice_format(path: str | Path, name: str | None = None) -> str:
             )
     elif name not in FORMATS:
         raise ExportError(f"format {name!r}: known are {', '.join(FORMATS)}")
+    if name in FOLDERS and Path(path).exists() and not Path(path).is_dir():
+        raise ExportError(f"{path}: expected a folder for {name} files")
     check_target(Path(path) / "layer" if name in FOLDERS and Path(path).is_dir() else path)
     return name
 

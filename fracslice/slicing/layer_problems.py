@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from ..printing.checks import BRIDGE, FILL, loose
-from ..printing.problems import Problem, counted
-from .graph import Feature
+from ..common.digits import counted, significant
+from ..printing.problems import Problem
+from ..printing.solid_checks import BRIDGE, FILL, loose
+from .feature_graph import Feature
 from .printers import PRINTERS, Printer
 from .stack import Stack
 
 if TYPE_CHECKING:
     from ..printing.limits import Limits
-    from .checks import PrintReport
+    from .layer_checks import PrintReport
     from .necks import Neck
 
 SUPPORTS = "supports in the slicer"
@@ -41,7 +42,7 @@ def misfit(stack: Stack, printer: Printer | None) -> Problem | None:
     nearest = max(share, key=lambda p: share[p])
     if share[nearest] >= 1 - 1e-6:
         return None
-    mine, most = (" x ".join(f"{s:.4g}" for s in size) for size in (stack.size, nearest.build_volume))
+    mine, most = (" x ".join(significant(s, 4) for s in size) for size in (stack.size, nearest.build_volume))
     which = f"the {nearest.title}" if printer else f"any known printer, not even the {nearest.title}"
     size = math.floor(10 * share[nearest] * max(stack.size)) / 10
     text = f"does not fit {which}: {mine} mm, and it has {most} mm"
@@ -76,26 +77,27 @@ def problems_of(report: PrintReport, stack: Stack, limits: Limits) -> list[Probl
     if report.islands:
         largest = max(report.islands, key=lambda i: i.area)
         first = min(i.layers[0] for i in report.islands)
-        text = f"{counted(report.islands, 'island')} in the air, the first from layer {first} on"
-        text += f", the largest of {largest.area:.3g} mm2"
+        text = f"{counted(len(report.islands), 'island')} in the air, the first from layer {first} on"
+        text += f", the largest of {significant(largest.area)} mm2"
         problems.append(Problem("islands", text, mend=BRIDGE, advice=SUPPORTS, **where(largest)))
     if report.overhang:
         far = report.overhang
-        text = f"a flat overhang reaches {far.reach:.3g} mm, {far.area:.3g} mm2 of it too far"
+        text = f"a flat overhang reaches {far.reach:.3g} mm, {significant(far.area)} mm2 of it too far"
         at = (*far.at, _bottom(stack, far.layer))
         problems.append(Problem("overhangs", text, far.layer, at, advice=f"--up, or {SUPPORTS}"))
     if report.neck and report.neck.ratio > limits.neck:
         problems.append(_narrow_neck(report.neck, stack, limits))
     if report.cavities:
-        sealed = counted(report.cavities, "sealed cavity", "sealed cavities")
-        text = f"{sealed} with {sum(c.volume for c in report.cavities):.3g} mm3 of resin"
+        sealed = counted(len(report.cavities), "sealed cavity", "sealed cavities")
+        text = f"{sealed} with {significant(sum(c.volume for c in report.cavities))} mm3 of resin"
         problems.append(Problem("cavities", text, mend=FILL, **where(report.cavities[0])))
     for kind, noun, hollows in (("cups", "suction cup", report.cups), ("traps", "resin trap", report.traps)):
         remaining = [hollow for hollow in hollows if hollow not in report.cavities]
         if remaining:
             largest = max(remaining, key=lambda h: h.area)
-            text = f"{counted(remaining, noun)} with {sum(h.volume for h in remaining):.3g} mm3 of resin"
-            text += f", the largest {largest.area:.3g} mm2"
+            volume = significant(sum(h.volume for h in remaining))
+            text = f"{counted(len(remaining), noun)} with {volume} mm3 of resin"
+            text += f", the largest {significant(largest.area)} mm2"
             problems.append(Problem(kind, text, advice="--up, or a drain hole", **where(largest)))
     return [*problems, *report.solid.thin]
 
@@ -104,10 +106,10 @@ def _narrow_neck(neck: Neck, stack: Stack, limits: Limits) -> Problem:
     """Problem of a cross-section that is too small for what it carries."""
     at = (*neck.at, _bottom(stack, neck.layer))
     if neck.layer == 0:
-        text = f"it stands on {neck.area:.2g} mm2 and is {neck.carried:.3g} mm2 wide"
+        text = f"it stands on {significant(neck.area, 2)} mm2 and is {significant(neck.carried)} mm2 wide"
         base = max(stack.size[2] / 50, 0.5)
         return Problem("necks", text, 0, at, mend=(("base", f"{base:.2g}mm"),), advice="--raft 1mm")
-    text = f"{neck.carried:.3g} mm2 hang on {neck.area:.2g} mm2"
+    text = f"{significant(neck.carried)} mm2 hang on {significant(neck.area, 2)} mm2"
     width = 1.2 * math.sqrt(4 / math.pi * neck.carried / limits.neck)
     return Problem("necks", text, neck.layer, at, mend=(("thickness", f"{width:.2g}mm"),), advice=SUPPORTS)
 

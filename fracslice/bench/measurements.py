@@ -17,9 +17,11 @@ from statistics import median
 from typing import Any
 
 from ..cluster import Shard
+from ..common.digits import counted
 from ..common.keys import key, program
 from ..errors import BenchError, FracsliceError, SharedError
-from ..formulas.parameters import Count, Number, validate, validated
+from ..formulas.parameters import Count, Number
+from ..formulas.records import attribute, validate, validated
 from ..work import Work
 from .methods import METHODS
 from .peers import Peer
@@ -55,23 +57,19 @@ class BenchmarkTask:
     workloads: tuple[str, ...] = tuple(WORKLOADS)
     resolutions: tuple[int, ...] = (64, 128, 256)
     peers: tuple[Peer, ...] = ()
-    repeats: int = 3
-    limit_s: float = 60.0
+    repeats: int = attribute(Count, 3, "runs of each", least=1, most=100)
+    limit_s: float = attribute(Number, 60.0, "seconds", above=0)
 
     def __post_init__(self) -> None:
         for name in self.workloads:
             if name not in WORKLOADS:
                 raise BenchError(f"workload {name!r}: expected one of {', '.join(WORKLOADS)}")
-        validate(self, _KINDS, BenchError)
+        validate(self, BenchError)
         for n in self.resolutions:
             validated("resolution", n, RESOLUTION, BenchError)
 
 
 RESOLUTION = Count(256, "voxels along the cube", least=16, most=2048)
-_KINDS = {
-    "repeats": Count(3, "runs of each", least=1, most=100),
-    "limit_s": Number(60.0, "seconds", above=0),
-}
 
 
 @dataclass(frozen=True)
@@ -147,7 +145,8 @@ def _results(cases: Sequence[MeasureTask], work: Work) -> Iterator[bytes]:
             work.progress("measuring", done / len(cases))
             yield case.make(work)
     elif isinstance(pool, Shard) and not pool.first:
-        raise SharedError(f"{pool.share(cases, work)} measurements are made; shard 1 writes the report")
+        made = counted(pool.share(cases, work), "measurement")
+        raise SharedError(f"this shard made {made}; shard 1 writes the report")
     else:
         yield from pool.results(cases, work, "measuring")
         pool.finished(cases[0].job)
@@ -164,7 +163,7 @@ class MeasureTask:
     resolution : int
         Voxels along the cube.
     method : str or Peer
-        What is measured.
+        Workloads, resolutions, peers and repeats.
     repeats : int
         Runs, of which the median is reported.
     """

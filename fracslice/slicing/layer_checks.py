@@ -10,17 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from ..printing.checks import SolidReport, check_object
 from ..printing.limits import Limits
 from ..printing.problems import Problem
+from ..printing.solid_checks import SolidReport, check_object
 from ..printing.widths import Widths, widths_of
 from ..work import Work
-from .graph import Feature, Graph
+from .feature_graph import Feature, Graph
+from .layer_problems import misfit, problems_of
 from .layers import Layer, Slicer
 from .necks import Neck, weakest
 from .overhangs import Overhang, farthest, unsupported
 from .printers import Printer
-from .problems import misfit, problems_of
 from .runs import LayerComponents, layer_components
 from .stack import Stack
 from .thickness import widths

@@ -7,15 +7,16 @@ from functools import cached_property
 
 import numpy as np
 
-from ..common.compiled import compiled
-from ..common.disjoint import grouped, numbered, unite, unite_all
+from ..common.disjoint import grouped, numbered, unite_all
+from ..formulas import Box
 from ..volume import Bricks, SignBricks
 from ..volume.bricks import INSIDE, OUTSIDE
+from .labelling import count_crossings, tally, unite_samples
 from .samples import positions
 
 
 @dataclass(frozen=True, eq=False)
-class Components:
+class SolidComponents:
     """Connected components, numbered from 0. Number 0 is the space that extends beyond the samples.
 
     Attributes
@@ -58,8 +59,52 @@ class Components:
         """Grid edges that cross the surface of each component, int64 [m]; zero for empty components."""
         crossings = np.zeros(len(self.inside), np.int64)
         index = np.pad(self.solid.index, (0, 1), constant_values=OUTSIDE)
-        _count_crossings(self.solid.values, index, self.solid.ijk, self.labels, crossings)
+        count_crossings(self.solid.values, index, self.solid.ijk, self.labels, crossings)
         return crossings
+
+    @property
+    def thin_share(self) -> float:
+        """Share of the material in bodies whose mean thickness is below a voxel.
+
+        Walls of this thickness fall between samples: their crumbs do not tell which bodies there are. The
+        thickness is twice the volume by the area. The volume is a cubic voxel for each sample inside; the
+        area is two thirds of a square voxel for each grid edge that crosses the surface, which is the mean
+        over all directions (Cauchy-Crofton formula).
+        """
+        thin = self.inside & (self.crossings > 3 * self.count)
+        return float(self.count[thin].sum() / self.count[self.inside].sum())
+
+    def box(self, numbers: np.ndarray) -> Box:
+        """Bounding box of the samples of some components.
+
+        Parameters
+        ----------
+        numbers : int64 [k]
+            Numbers of the components.
+
+        Returns
+        -------
+        Box
+            Scene units.
+        """
+        return Box.around(map(tuple, self.outermost(numbers).tolist()))
+
+    def outermost(self, numbers: np.ndarray) -> np.ndarray:
+        """Outermost samples of some components along -x, -y, -z, x, y and z.
+
+        Parameters
+        ----------
+        numbers : int64 [k]
+            Numbers of the components.
+
+        Returns
+        -------
+        float64 [6, 3]
+            Scene units.
+        """
+        place = self.places(numbers)
+        rows = np.concatenate([place.argmin(0), place.argmax(0)])
+        return np.asarray(np.array(self.solid.origin) + self.solid.voxel * place[rows])
 
     def masks(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Masks of some components.
@@ -78,7 +123,7 @@ class Components:
         chosen[numbers] = True
         return np.asarray(chosen[self.labels]), np.asarray(chosen[self.tiles])
 
-    def filled(self, cavities: np.ndarray) -> Components:
+    def filled(self, cavities: np.ndarray) -> SolidComponents:
         """Fill cavities. A body that floats in a cavity joins the body around it.
 
         Parameters
@@ -88,26 +133,26 @@ class Components:
 
         Returns
         -------
-        Components
+        SolidComponents
             The filled solid, its components renumbered.
         """
-        place = self._places(cavities)
+        place = self.places(cavities)
         steps = np.vstack([np.eye(3, dtype=int), -np.eye(3, dtype=int)])
-        beside = np.concatenate([self._at(place + step) for step in steps])
-        number, count = grouped(len(self.inside), np.tile(self._at(place), 6), beside)
+        beside = np.concatenate([self.at(place + step) for step in steps])
+        number, count = grouped(len(self.inside), np.tile(self.at(place), 6), beside)
         inside, sizes = np.zeros(count, bool), np.zeros(count, np.int64)
         inside[number[self.inside]] = True
         np.add.at(sizes, number, self.count)
         tiles = np.where(self.tiles >= 0, number[self.tiles], -1).astype(np.int32)
         solid = self._turned(cavities, -1.0, INSIDE)
-        return Components(solid, number.astype(np.int32)[self.labels], tiles, inside, sizes)
+        return SolidComponents(solid, number.astype(np.int32)[self.labels], tiles, inside, sizes)
 
-    def sealed(self, before: Components) -> np.ndarray:
+    def sealed(self, before: SolidComponents) -> np.ndarray:
         """Cavities that were not cavities before.
 
         Parameters
         ----------
-        before : Components
+        before : SolidComponents
             The solid before, which may be sampled on another grid.
 
         Returns
@@ -116,18 +161,40 @@ class Components:
             Numbers of the new cavities.
         """
         cavities = self.cavities
-        place = self._places(cavities)
+        place = self.places(cavities)
         points = np.array(self.solid.origin) + self.solid.voxel * place
         there = np.round((points - before.solid.origin) / before.solid.voxel).astype(np.int64)
-        known = np.isin(before._at(there), before.cavities)
-        return np.setdiff1d(cavities, self._at(place)[known])
+        known = np.isin(before.at(there), before.cavities)
+        return np.setdiff1d(cavities, self.at(place)[known])
 
-    def _places(self, numbers: np.ndarray) -> np.ndarray:
-        """Grid indices of the samples of some components, int64 [n, 3]."""
+    def places(self, numbers: np.ndarray) -> np.ndarray:
+        """Samples of some components.
+
+        Parameters
+        ----------
+        numbers : int64 [k]
+            Numbers of the components.
+
+        Returns
+        -------
+        int64 [n, 3]
+            Grid indices.
+        """
         return positions(self.solid, *np.nonzero(self.masks(numbers)[0]))
 
-    def _at(self, place: np.ndarray) -> np.ndarray:
-        """Components at grid indices [n, 3], int64 [n]; 0 beyond the bricks."""
+    def at(self, place: np.ndarray) -> np.ndarray:
+        """Components at samples.
+
+        Parameters
+        ----------
+        place : int64 [n, 3]
+            Grid indices.
+
+        Returns
+        -------
+        int64 [n]
+            Numbers of the components; 0 beyond the bricks.
+        """
         brick = place >> 3
         within = np.all((brick >= 0) & (brick < self.solid.index.shape), axis=1)
         at = tuple(np.where(within[:, None], brick, 0).T)
@@ -158,12 +225,7 @@ class Components:
 
 
 def thin_share(signs: SignBricks) -> float:
-    """Share of the material in bodies whose mean thickness is below a voxel.
-
-    Walls of this thickness fall between samples: their crumbs do not tell which bodies there are. The
-    thickness is twice the volume by the area. The volume is a cubic voxel for each sample inside; the area is
-    two thirds of a square voxel for each grid edge that crosses the surface, which is the mean over all
-    directions (Cauchy-Crofton formula).
+    """Share of the material in bodies whose mean thickness is below a voxel; see `Components.thin_share`.
 
     Parameters
     ----------
@@ -177,12 +239,10 @@ def thin_share(signs: SignBricks) -> float:
     """
     inside = np.unpackbits(signs.signs, axis=-1, bitorder="little").view(np.int8)
     values = -inside.reshape(-1, 512)
-    components = components_of(Bricks(signs.origin, signs.voxel, signs.ijk, values, signs.index))
-    thin = components.inside & (components.crossings > 3 * components.count)
-    return float(components.count[thin].sum() / components.count[components.inside].sum())
+    return components_of(Bricks(signs.origin, signs.voxel, signs.ijk, values, signs.index)).thin_share
 
 
-def components_of(bricks: Bricks) -> Components:
+def components_of(bricks: Bricks) -> SolidComponents:
     """Label the connected components of a sampled solid, in time linear in the samples.
 
     Samples are connected along edges of the grid: solids that touch only along a line are not connected. An
@@ -195,7 +255,7 @@ def components_of(bricks: Bricks) -> Components:
 
     Returns
     -------
-    Components
+    SolidComponents
         The components.
     """
     size, empty = bricks.values.size, bricks.index < 0
@@ -208,70 +268,12 @@ def components_of(bricks: Bricks) -> Components:
         side, at = np.moveaxis(index, axis, 0), np.moveaxis(tile, axis, 0)
         same = (side[:-1] == side[1:]) & (side[1:] < 0)
         unite_all(parent, at[:-1][same], at[1:][same])
-    _unite_samples(bricks.values, index, bricks.ijk, tile, parent)
+    unite_samples(bricks.values, index, bricks.ijk, tile, parent)
     count = numbered(parent)
     labels, tiles = parent[1 : 1 + size].reshape(bricks.values.shape), np.full(empty.shape, -1, parent.dtype)
     tiles[empty] = parent[1 + size :]
     sizes, inside = np.zeros(count, np.int64), np.zeros(count, np.bool_)
-    _tally(labels, bricks.values, sizes, inside)
+    tally(labels, bricks.values, sizes, inside)
     sizes += 512 * np.bincount(tiles[empty], minlength=count)
     inside[tiles[empty]] = bricks.index[empty] == INSIDE
-    return Components(bricks, labels, tiles, inside, sizes)
-
-
-@compiled
-def _tally(labels, values, sizes, inside):  # type: ignore[no-untyped-def]
-    """Count the samples of each component, and record its side."""
-    for row in range(len(labels)):
-        for s in range(512):
-            sizes[labels[row, s]] += 1
-            inside[labels[row, s]] = values[row, s] < 0
-
-
-@compiled
-def _count_crossings(values, index, ijk, labels, crossings):  # type: ignore[no-untyped-def]
-    """Count the grid edges between different signs, each for its inside component.
-
-    index: as padded by one outside brick behind all sides.
-    """
-    for row in range(len(values)):
-        x, y, z = ijk[row, 0] >> 3, ijk[row, 1] >> 3, ijk[row, 2] >> 3
-        for axis in range(3):
-            shift = 6 - 3 * axis
-            after = index[x + (axis == 0), y + (axis == 1), z + (axis == 2)]
-            for s in range(512):
-                if (s >> shift) & 7 < 7:
-                    other, t = row, s + (1 << shift)
-                elif after >= 0:
-                    other, t = after, s - (7 << shift)
-                else:
-                    continue
-                if (values[row, s] < 0) != (values[other, t] < 0):
-                    crossings[labels[row, s] if values[row, s] < 0 else labels[other, t]] += 1
-
-
-@compiled
-def _unite_samples(values, index, ijk, tile, parent):  # type: ignore[no-untyped-def]
-    """Unite each sample with those beside it and with unsampled bricks.
-
-    index, tile: as padded by one outside brick on all sides; element of each unsampled brick.
-    """
-    for row in range(len(values)):
-        x, y, z = (ijk[row, 0] >> 3) + 1, (ijk[row, 1] >> 3) + 1, (ijk[row, 2] >> 3) + 1
-        for axis in range(3):
-            shift, a, b, c = 6 - 3 * axis, axis == 0, axis == 1, axis == 2
-            step = 1 << shift
-            before, after = index[x - a, y - b, z - c], index[x + a, y + b, z + c]
-            first, last = tile[x - a, y - b, z - c], tile[x + a, y + b, z + c]
-            for s in range(512):
-                here, element, at = values[row, s] < 0, 1 + 512 * row + s, (s >> shift) & 7
-                if at < 7:
-                    there, other = values[row, s + step] < 0, element + step
-                elif after >= 0:
-                    there, other = values[after, s - 7 * step] < 0, 1 + 512 * after + s - 7 * step
-                else:
-                    there, other = after == INSIDE, last
-                if here == there and parent[element] != parent[other]:
-                    unite(parent, element, other)
-                if at == 0 and before < 0 and here == (before == INSIDE):
-                    unite(parent, element, first)
+    return SolidComponents(bricks, labels, tiles, inside, sizes)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 
-from fracslice.rendering import Pass
-from fracslice.viewer.canvas import Canvas
-from fracslice.viewer.screen import need_screen
+from ..rendering import Pass
+from .canvas import Canvas
+from .screen import need_screen
 
 LARGEST = (1280, 800)
 """Largest width and height of the window, pixels."""

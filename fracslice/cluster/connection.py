@@ -1,0 +1,106 @@
+"""Connection to a scheduler, or to workers that are started here."""
+
+from __future__ import annotations
+
+import logging
+import re
+import signal
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from multiprocessing import resource_tracker
+from typing import Any
+
+from ..common.extras import lacking
+from ..errors import ClusterError
+from . import workers
+from .result_folder import ResultFolder
+
+SELDOM = {
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.system-monitor.interval": "5s",
+    "distributed.worker.profile.enabled": False,
+}
+"""Dask's measures of itself, which take 5 % of a processor for each local worker at their defaults."""
+
+
+@contextmanager
+def connected(where: str, store: str, threads: int = 1) -> Iterator[workers.Workers]:
+    """Connect to a scheduler, or start workers here.
+
+    Parameters
+    ----------
+    where : str
+        Address of a scheduler, such as "tcp://host:8786"; or "local" or "local:4" for processes here.
+    store : str
+        Folder of the results, see `Pieces`.
+    threads : int
+        Threads of all local workers together.
+
+    Yields
+    ------
+    Workers
+
+    Raises
+    ------
+    ClusterError
+        If Dask is not installed, the text is malformed, or no scheduler answers.
+    """
+    if reason := lacking("distributed", "clusters need"):
+        raise ClusterError(reason)
+    from distributed import Client
+
+    kind, _, count = where.partition(":")
+    with ExitStack() as stack:
+        if kind == "local":
+            if count and not 1 <= int(count if count.isdigit() else 0) <= 1024:
+                raise ClusterError(f"{where!r}: expected local, local:N or the address of a scheduler")
+            scheduler = stack.enter_context(_local(int(count or threads), threads))
+        elif not re.fullmatch(r"\w+://.+|[^/]+:\d+", where):
+            raise ClusterError(f"{where!r}: expected local, local:N or the address of a scheduler")
+        else:
+            scheduler = where
+        try:
+            client = Client(scheduler, timeout=workers.CONNECT, set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise ClusterError(f"{where}: no scheduler answers: {error}") from None
+        yield workers.Workers(stack.enter_context(client), ResultFolder(store))
+
+
+@contextmanager
+def _local(count: int, threads: int) -> Iterator[Any]:
+    """Cluster of processes here, which share some threads."""
+    import dask
+    from distributed import LocalCluster
+
+    each = max(1, threads // count)
+    with ExitStack() as stack:
+        stack.enter_context(dask.config.set(SELDOM))
+        with interrupts_later():
+            cluster = stack.enter_context(
+                LocalCluster(
+                    n_workers=count,
+                    threads_per_worker=each,
+                    memory_limit=None,
+                    dashboard_address=None,
+                    scheduler_kwargs={"dashboard_address": ":0"},
+                    silence_logs=logging.ERROR,
+                )
+            )
+        yield cluster
+
+
+@contextmanager
+def interrupts_later() -> Iterator[None]:
+    """Delay Ctrl-C to the end of the block; processes that start in it never receive one.
+
+    A terminal interrupts all of its processes. The one that started the others ends them.
+    """
+    if not hasattr(signal, "pthread_sigmask"):  # as on Windows
+        yield
+        return
+    resource_tracker.ensure_running()  # it would unblock the signal when it starts
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -1,0 +1,62 @@
+"""Files of settings that a user writes."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+
+def read_text(path: Path, fail: type[Exception], errors: str = "strict") -> str:
+    """Read a text file.
+
+    Parameters
+    ----------
+    path : Path
+        The file, in UTF-8.
+    fail : type of Exception
+        Class of the error, whose message is one line.
+    errors : str, optional
+        Treatment of invalid bytes, as of `open`.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    Exception
+        An error of `fail` if the file cannot be read.
+    """
+    try:
+        return path.read_text(encoding="utf-8", errors=errors)
+    except OSError as error:
+        raise fail(f"{path}: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        raise fail(f"{path}: expected text in UTF-8") from None
+
+
+def read_table(path: Path, fail: type[Exception]) -> dict[str, Any]:
+    """Read a TOML file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    fail : type of Exception
+        Class of the error, whose message is one line.
+
+    Returns
+    -------
+    dict
+        Values by key.
+
+    Raises
+    ------
+    Exception
+        An error of `fail` if the file cannot be read or parsed.
+    """
+    try:
+        return tomllib.loads(read_text(path, fail))
+    except tomllib.TOMLDecodeError as error:
+        raise fail(f"{path}: not a TOML file: {error}") from None
