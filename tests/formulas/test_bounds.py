@@ -75,8 +75,9 @@ def test_lipschitz_bound(name: str) -> None:
 
 @pytest.mark.parametrize("name", sorted(ESCAPE_TIME))
 def test_distance_bound_of_escape_time_fractals(name: str) -> None:
-    """No sign change nearer than f / L, f of the conservative field, which alone skips space: in 30 directions
-    from each of 4000 points outside.
+    """No sign change nearer than f / L, f of the conservative field, which alone skips space.
+
+    Looked for in 30 directions from each of 4000 points outside.
     """
     root = EXAMPLES[name]
     f, rng = reference(root), np.random.default_rng(2)
