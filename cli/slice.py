@@ -16,7 +16,7 @@ from fracslice.common.digits import counted
 from .closing import of_layers
 from .cluster import ClusterOptions
 from .families import families
-from .inputs import check_targets, load_scene
+from .inputs import check_targets, load_scene, refuse_options
 from .layers import LAYER, LayerOptions, layer_option, printer_option, read_shift, write_page
 from .options import argument, command, option, output
 from .value_types import AMOUNT, NUMBER, Name, Parsed, Whole
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from fracslice.slicing import SliceJob, Stack
     from fracslice.slicing.printers import Printer
     from fracslice.work import Work
+
+OF_PICTURES = {"compensation", "gamma", "levels", "blur", "mirror", "sections"}
 
 
 class SliceOptions(ClusterOptions, LayerOptions):
@@ -114,8 +116,8 @@ def slice_(given: SliceOptions) -> int:
 
     output = given.output
     kind, resin = slice_format(output, given.form), resin_of(given)
-    if given.sections != "1" and kind not in PICTURES:
-        raise click.UsageError(f"{output}: --sections is for pictures; contours are of one section per layer")
+    if kind not in PICTURES:
+        refuse_options(OF_PICTURES, f"only for pictures, and {kind} files have contours")
     if kind in PRINTS:
         refuse_what_no_print_has(given, kind, resin)
     if given.address is not None:
