@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 SHARED = {"cluster", "shard", "store"}
 OF_LAYERS = {*SHARED, "pixel", "machine", "picture", "html", "fix"}
-OF_MESHES = {"voxel", "resolution", "dust", "chord", "simplify"}
+OF_MESHES = {"voxel", "resolution", "dust", "chord", "simplify", "proved"}
 OF_SCENES = {*OF_MESHES, *SHARED, "settings", "size"}
 
 ACROSS = 256
