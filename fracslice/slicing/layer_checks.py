@@ -215,7 +215,9 @@ class _Collector:
         for k, now in enumerate(findings):
             below = solid.last
             reach = max(float(stack.heights[k]) / min(stack.pixel), 1.0)
-            bare = unsupported(below.runs, now.solid.runs, reach) if below else now.solid.runs.none
+            bare = (
+                unsupported(below.runs, now.solid.runs, reach) if below is not None else now.solid.runs.none
+            )
             overhangs.append(square * float((bare.end - bare.begin).sum()))
             if len(bare.begin):
                 worst = farthest(now.solid.runs, bare, k, stack.pixel, limits.overhang, limits.span)
