@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from fracslice.slicing.printers import Printer
     from fracslice.work import Work
 
+DATE = "SOURCE_DATE_EPOCH"
 OF_PICTURES = {"compensation", "gamma", "levels", "blur", "mirror", "sections"}
 
 
@@ -240,9 +241,13 @@ def refuse_to_send(output: str, kind: str, address: str) -> None:
 
 def created() -> datetime:
     """Date of print files, UTC: now, or of SOURCE_DATE_EPOCH."""
-    seconds = os.environ.get("SOURCE_DATE_EPOCH")
-    now = datetime.now(UTC)
-    return datetime.fromtimestamp(int(seconds), UTC) if seconds else now
+    seconds = os.environ.get(DATE)
+    if not seconds:
+        return datetime.now(UTC)
+    try:
+        return datetime.fromtimestamp(int(seconds), UTC)
+    except (ValueError, OverflowError, OSError):
+        raise click.UsageError(f"{DATE}={seconds}: expected seconds since 1970") from None
 
 
 def job(scene: Scene, given: SliceOptions, work: Work) -> SliceJob:

@@ -78,6 +78,15 @@ def test_a_folder_that_is_not_this_job(ball: Path, tmp_path: Path, capfd: pytest
     assert (tmp_path / "layers" / "job.json").read_text() == '{"mine": 1}'
 
 
+@pytest.mark.parametrize("date", ["today", "1e9", "9" * 20])
+def test_an_impossible_date(
+    date: str, ball: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", date)
+    assert sliced(ball, "-o", tmp_path / "layers", "--layer", "5mm") == 2
+    assert capfd.readouterr().err.startswith(f"fracslice: SOURCE_DATE_EPOCH={date}: expected seconds")
+
+
 def test_an_edited_scene_begins_afresh_and_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
