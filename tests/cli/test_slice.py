@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -76,6 +77,17 @@ def test_a_folder_that_is_not_this_job(ball: Path, tmp_path: Path, capfd: pytest
     assert sliced(ball, "-o", tmp_path / "layers", "--layer", "1mm") == 2
     assert "its files are no interrupted job" in capfd.readouterr().err
     assert (tmp_path / "layers" / "job.json").read_text() == '{"mine": 1}'
+
+
+@pytest.mark.parametrize("ending", ["sl1", "3mf", "png"])
+def test_names_that_are_no_text(ending: str, ball: Path, tmp_path: Path) -> None:
+    """Linux has names of any bytes."""
+    scene, target = (tmp_path / os.fsdecode(b"b\xff." + e) for e in (b"xml", ending.encode()))
+    ball.rename(scene)
+    how = {"sl1": ["slice", "--layer", "5mm", "--printer", "sl1s"], "3mf": ["mesh", "--resolution", "16"]}
+    command = how.get(ending, ["render", "--size", "8x8", "--samples", "1"])
+    assert run([command[0], str(scene), "-o", str(target), *command[1:]]) == 0
+    assert target.stat().st_size
 
 
 @pytest.mark.parametrize("date", ["today", "1e9", "9" * 20])
