@@ -20,6 +20,7 @@ from .inputs import check_targets, load_scene, refuse_options
 from .layers import LAYER, LayerOptions, layer_option, printer_option, read_shift, write_page
 from .options import argument, command, option, output
 from .value_types import AMOUNT, NUMBER, Name, Parsed, Whole
+from .working import keeping
 
 if TYPE_CHECKING:
     from fracslice.export.jobs import SliceRun
@@ -131,16 +132,17 @@ def slice_(given: SliceOptions) -> int:
     with given.working(kept) as work:
         run = recipe(given, scene, kind, resin, work).run(work)
         write_slices(run, output, given.form)
-        if given.preview:
-            write_preview(run.stack, given.preview, work)
-        sent = uploaded(output, given.address, work)
-        if not given.quiet or given.html:
-            notes = layers_amount(run.slicer, work)[1]
-            last = list(of_layers(run, given.price).lines())
-        if given.html:
-            from fracslice.jobs.slice_checks import check_run
+        with keeping(f"{output} is written"):
+            if given.preview:
+                write_preview(run.stack, given.preview, work)
+            sent = uploaded(output, given.address, work)
+            if not given.quiet or given.html:
+                notes = layers_amount(run.slicer, work)[1]
+                last = list(of_layers(run, given.price).lines())
+            if given.html:
+                from fracslice.jobs.slice_checks import check_run
 
-            write_page(run.stack, check_run(run), last, output, given.html, work)
+                write_page(run.stack, check_run(run), last, output, given.html, work)
     if not given.quiet:
         lines = described(run, output, notes)
         click.echo(os.linesep.join([*lines, *last, *([sent] if sent else [])]))

@@ -99,6 +99,19 @@ def test_an_impossible_date(
     assert capfd.readouterr().err.startswith(f"fracslice: SOURCE_DATE_EPOCH={date}: expected seconds")
 
 
+def test_a_file_that_is_written_is_named_when_its_page_is_stopped(
+    ball: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def stopped(*_: object) -> None:
+        raise Cancelled
+
+    monkeypatch.setattr("fracslice.jobs.slice_checks.check_run", stopped)
+    target = tmp_path / "a.json"
+    assert sliced(ball, "-o", target, "--layer", "5mm", "--html", tmp_path / "a.html") == 130
+    assert capfd.readouterr().err == f"fracslice: stopped; {target} is written\n"
+    assert target.exists() and not (tmp_path / "a.html").exists()
+
+
 def test_an_edited_scene_begins_afresh_and_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
