@@ -130,7 +130,7 @@ def slice_(given: SliceOptions) -> int:
     last: list[str] = []
     kept = "the same command goes on from the finished layers"
     with given.working(kept) as work:
-        run = recipe(given, scene, kind, resin, work).run(work)
+        run = recipe(given, scene, kind, resin, work).run(work, scene)
         write_slices(run, output, given.form)
         with keeping(f"{output} is written"):
             if given.preview:

@@ -10,6 +10,7 @@ from ..export.jobs import EPOCH, SliceRun
 from ..export.layer_files import FORMATS
 from ..export.ranges import Encode
 from ..export.resins import Resin
+from ..scene import Scene
 from ..scene.reader import reads
 from ..slicing.printers import Printer
 from ..slicing.raster import Screen
@@ -54,13 +55,15 @@ class SliceRecipe:
     levels: int = 255
     blur: int = 0
 
-    def run(self, work: Work) -> SliceRun:
+    def run(self, work: Work, scene: Scene | None = None) -> SliceRun:
         """Plan the layers.
 
         Parameters
         ----------
         work : Work
             Threads, progress and cancellation.
+        scene : Scene, optional
+            The same scene as it was read: its errors name places in its file.
 
         Returns
         -------
@@ -71,7 +74,7 @@ class SliceRecipe:
         SceneError, SliceError, VolumeError, Cancelled
             For a scene or settings that cannot be sliced.
         """
-        scene = reads(self.scene, self.name)
+        scene = scene or reads(self.scene, self.name)
         stack = slicing.plan_stack(scene.root, self.job, work)
         if self.most is not None:
             stack = slicing.adapted(stack, self.most, work)

@@ -112,6 +112,15 @@ def test_a_file_that_is_written_is_named_when_its_page_is_stopped(
     assert target.exists() and not (tmp_path / "a.html").exists()
 
 
+def test_an_element_without_an_end_is_named_by_its_line(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    scene = tmp_path / "a.xml"
+    scene.write_text('<scene version="1">\n<solid\nsize="4mm">\n<!-- --><gyroid/></solid></scene>')
+    assert sliced(scene, "-o", tmp_path / "a.json", "--layer", "1mm") == 2
+    assert capfd.readouterr().err.startswith(f"fracslice: {scene}:4: <gyroid> has no end")
+
+
 def test_an_edited_scene_begins_afresh_and_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
