@@ -101,7 +101,7 @@ class SliceOptions(ClusterOptions, LayerOptions):
 
 
 @command(SliceOptions, "slice")
-@families("output", "preview")
+@families("output", "preview", "html")
 def slice_(given: SliceOptions) -> int:
     """Cut SCENE into the layers of a print, straight from its field.
 
