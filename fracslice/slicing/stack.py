@@ -104,6 +104,8 @@ class Stack:
         What a pixel or a layer is too large for.
     drains : tuple of Drain
         Drain holes.
+    side : float
+        Size of the job: longest side before compensation and print preparation, mm.
     """
 
     root: Field
@@ -117,6 +119,7 @@ class Stack:
     outer: Box
     notes: tuple[str, ...] = ()
     drains: tuple[Drain, ...] = ()
+    side: float = field(kw_only=True)
 
     @property
     def heights(self) -> np.ndarray:
@@ -183,7 +186,8 @@ def plan_stack(root: Field, job: SliceJob, work: Work | None = None) -> Stack:
     z = box.lo[2] + (tops - np.diff(tops, prepend=0.0) / 2) / scale
     size, at = (mm[0], mm[1], mm[2]), (corner[0], corner[1])
     pixels, notes = (shape[0], shape[1]), (*planned.notes, *_rounded(mm[2], float(tops[-1])))
-    return Stack(planned.root, scale, at, job.pixel, pixels, z, tops, size, outer, notes, planned.drains)
+    where = at, job.pixel, pixels, z, tops
+    return Stack(planned.root, scale, *where, size, outer, notes, planned.drains, side=job.size)
 
 
 def _tops(height: float, layer: float) -> np.ndarray:
