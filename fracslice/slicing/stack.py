@@ -201,8 +201,8 @@ def _check_precision(outer: Box, scale: float, finest: float) -> None:
     far = max(map(abs, (*outer.lo, *outer.hi)))
     if FLOAT_STEPS * float(np.spacing(np.float32(far))) * scale > finest:
         raise SliceError(
-            f"samples {finest:g} mm apart are too fine for float32 coordinates at a distance of {far:.4g} scene "
-            "units from the origin; expected the object nearer to it"
+            f"samples {finest:g} mm apart are too fine for float32 coordinates at a distance of {far:.4g} "
+            "scene units from the origin; expected the object nearer to it"
         )
 
 
