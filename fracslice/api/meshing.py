@@ -54,6 +54,9 @@ class Result(Mesh):
         counts = f"{counted(made.triangles, 'triangle')}, {counted(made.vertices, 'vertex', 'vertices')}"
         return f"<Result of {counts}, only in its file>"
 
+    def _repr_png_(self) -> bytes | None:
+        return None if self.made.whole is None else super()._repr_png_()
+
     @property
     def mesh(self) -> Mesh:
         """The mesh without its report."""

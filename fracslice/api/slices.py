@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Generic, TypeVar, Unpack, overload
@@ -48,6 +49,15 @@ class Layers(Sequence[T_co], Generic[T_co]):
     chosen: range
     make: Callable[[Layer], T_co]
     work: Work
+
+    def _repr_png_(self) -> bytes | None:
+        """Contact sheet in a notebook; None without layers."""
+        from ..slicing.preview import contact_sheet
+
+        file = io.BytesIO()
+        if len(self):
+            contact_sheet(self.stack, file, self.work, self.chosen)
+        return file.getvalue() or None
 
     def __len__(self) -> int:
         return len(self.chosen)
