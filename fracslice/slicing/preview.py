@@ -49,13 +49,15 @@ def _square(stack: Stack, most: float = math.inf) -> tuple[int, int]:
     return max(round(width / side), 1), max(round(height / side), 1)
 
 
-def _spread(stack: Stack, count: int) -> list[int]:
-    """Numbers of `count` layers, evenly spaced over the height, each in the middle of its interval."""
-    total = len(stack.z)
-    return sorted({int((i + 0.5) * total / min(count, total)) for i in range(min(count, total))})
+def _spread(layers: range, count: int) -> list[int]:
+    """At most `count` of the layers, evenly spaced, each in the middle of its interval."""
+    total = len(layers)
+    return sorted(layers[int((i + 0.5) * total / min(count, total))] for i in range(min(count, total)))
 
 
-def contact_sheet(stack: Stack, file: BinaryIO, work: Work | None = None) -> None:
+def contact_sheet(
+    stack: Stack, file: BinaryIO, work: Work | None = None, layers: range | None = None
+) -> None:
     """Write a PNG with 24 layers, evenly spaced, each with its height above the bed.
 
     Parameters
@@ -66,6 +68,8 @@ def contact_sheet(stack: Stack, file: BinaryIO, work: Work | None = None) -> Non
         Where to write.
     work : Work, optional
         Threads, progress and cancellation.
+    layers : range, optional
+        Layers to choose from; all by default.
 
     Raises
     ------
@@ -74,7 +78,7 @@ def contact_sheet(stack: Stack, file: BinaryIO, work: Work | None = None) -> Non
     Cancelled
         When the work is cancelled.
     """
-    chosen = _spread(stack, CELLS)
+    chosen = _spread(range(len(stack.z)) if layers is None else layers, CELLS)
     images = list(Slicer(stack, work or Work()).map(thumbnail, chosen))
     _sheet(stack, chosen, images, math.ceil(math.sqrt(1.5 * max(len(images), 1)))).save(file, "PNG")
 
@@ -113,7 +117,8 @@ def animation(stack: Stack, file: BinaryIO, work: Work | None = None) -> None:
     Cancelled
         When the work is cancelled.
     """
-    frames = list(Slicer(stack, work or Work()).map(thumbnail, _spread(stack, FRAMES)))
+    chosen = _spread(range(len(stack.z)), FRAMES)
+    frames = list(Slicer(stack, work or Work()).map(thumbnail, chosen))
     frames[0].save(file, "WEBP", save_all=True, append_images=frames[1:], duration=50, loop=0, lossless=True)
 
 
