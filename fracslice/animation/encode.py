@@ -85,10 +85,13 @@ def encode(frames: Sequence[Path], path: Path, fps: float, work: Work) -> None:
             file.write(_encoded(pictures, ending, fps))
         elif ending == ".png":
             _contact_sheet(pictures, len(frames)).save(file, "png")
+        elif ending == ".gif":
+            first, *others = map(_of_few_colours, pictures)
+            times = _hundredths(len(frames), fps)
+            first.save(file, "gif", save_all=True, append_images=others, duration=times, loop=0)
         else:
             first, *others = pictures
-            form, times = ("gif", _hundredths(len(frames), fps)) if ending == ".gif" else ("png", 1000 / fps)
-            first.save(file, form, save_all=True, append_images=others, duration=times, loop=0)
+            first.save(file, "png", save_all=True, append_images=others, duration=1000 / fps, loop=0)
 
 
 def sheet_frames(frames: Sequence[int]) -> list[int]:
@@ -126,6 +129,11 @@ def _hundredths(count: int, fps: float) -> list[int]:
     """Milliseconds of each frame of a .gif: whole hundredths of a second, whose sum is the film's."""
     ends = [10 * round(100 * k / fps) for k in range(count + 1)]
     return [after - before for before, after in pairwise(ends)]
+
+
+def _of_few_colours(picture: Any) -> Any:
+    """Picture of 256 colours: means of clusters, since a median cut leaves few to what is small and vivid."""
+    return picture.quantize(kmeans=max(picture.width * picture.height // 100, 1))
 
 
 def _pictures(frames: Sequence[Path], work: Work) -> Iterator[Any]:
