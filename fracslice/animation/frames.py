@@ -175,7 +175,7 @@ def _claim(job: FilmJob, folder: Path, resume: bool) -> None:
     if journal.exists():
         for path in folder.glob(UNFINISHED):
             path.unlink(missing_ok=True)
-        known = json.loads(journal.read_text())["key"]
+        known = _known(journal)
         if known == job.key:
             return
         if resume:
@@ -186,3 +186,11 @@ def _claim(job: FilmJob, folder: Path, resume: bool) -> None:
         raise RenderError(f"{folder}: expected an empty folder, or one with the frames of a film")
     with replacing(journal) as file:
         file.write(json.dumps({"key": job.key, "fps": job.fps}).encode())
+
+
+def _known(journal: Path) -> str:
+    """Key of the film whose frames are in a folder."""
+    try:
+        return str(json.loads(journal.read_text())["key"])
+    except (ValueError, KeyError, TypeError):
+        raise RenderError(f"{journal}: expected the journal of a film") from None
