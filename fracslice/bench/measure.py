@@ -83,13 +83,6 @@ def errors(mesh: Mesh, what: Workload, resolution: int) -> dict[str, Any]:
 def spread(mesh: Mesh, count: int) -> np.ndarray:
     """Sample points on a surface, uniformly by area and deterministically.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        The mesh.
-    count : int
-        Number of points.
-
     Returns
     -------
     ndarray of float64, shape (count, 3)

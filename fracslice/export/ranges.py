@@ -37,11 +37,6 @@ class Recipe(Hashable, Protocol):
     def run(self, work: Work) -> SliceRun:
         """Plan the run.
 
-        Parameters
-        ----------
-        work : Work
-            Threads.
-
         Returns
         -------
         SliceRun
@@ -50,11 +45,6 @@ class Recipe(Hashable, Protocol):
 
     def encoder(self, run: SliceRun) -> Encode:
         """Return the function that encodes the layers of a run in this format.
-
-        Parameters
-        ----------
-        run : SliceRun
-            The run.
 
         Returns
         -------
@@ -123,10 +113,6 @@ class RangeTask:
         form : str
             Format of the layers.
 
-        Returns
-        -------
-        SliceRun
-
         Raises
         ------
         ClusterError
@@ -186,11 +172,6 @@ def encoded_layers(run: SliceRun, form: str, encode: Encode, start: int) -> Iter
         Encodes a layer.
     start : int
         First layer.
-
-    Yields
-    ------
-    bytes
-        Encoded layers.
     """
     pool = run.work.cluster
     if pool is None:
@@ -207,11 +188,6 @@ def encoded_layers(run: SliceRun, form: str, encode: Encode, start: int) -> Iter
 
 def range_size(run: SliceRun) -> int:
     """Layers of a range, the same for any number of workers.
-
-    Parameters
-    ----------
-    run : SliceRun
-        The run.
 
     Returns
     -------

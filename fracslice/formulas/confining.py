@@ -103,10 +103,6 @@ def moved_slope(inner: Bounds, distance: float) -> float:
         Bounds of the field.
     distance : float
         The constant, scene units.
-
-    Returns
-    -------
-    float
     """
     n = inner.steepening
     # The stretch along circles of latitude ends within 1/n, in narrow rings within 3/n^2.

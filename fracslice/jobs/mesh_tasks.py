@@ -246,10 +246,6 @@ def finished_file(number: int) -> str:
     ----------
     number : int
         Index of the piece; that of the triangles at tips follows the last one.
-
-    Returns
-    -------
-    str
     """
     return f"finished{number}"
 
@@ -261,10 +257,6 @@ def far_file(turn: int) -> str:
     ----------
     turn : int
         How many times the reach has grown.
-
-    Returns
-    -------
-    str
     """
     return f"far{turn}"
 

@@ -40,13 +40,6 @@ class CheckTask(RangeTask):
 def check_run(run: SliceRun, limits: Limits | None = None) -> PrintReport:
     """Check the layers of a run, by the pool of its work if there is one.
 
-    Parameters
-    ----------
-    run : SliceRun
-        The run.
-    limits : Limits, optional
-        Limits of the checks.
-
     Returns
     -------
     PrintReport

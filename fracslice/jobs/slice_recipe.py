@@ -57,15 +57,6 @@ class SliceRecipe:
     def run(self, work: Work) -> SliceRun:
         """Plan the layers.
 
-        Parameters
-        ----------
-        work : Work
-            Threads, progress and cancellation.
-
-        Returns
-        -------
-        SliceRun
-
         Raises
         ------
         SceneError, SliceError, VolumeError, Cancelled
@@ -85,11 +76,6 @@ class SliceRecipe:
 
     def encoder(self, run: SliceRun) -> Encode:
         """Return the function that encodes the layers of a run in this format.
-
-        Parameters
-        ----------
-        run : SliceRun
-            The run.
 
         Returns
         -------

@@ -62,11 +62,6 @@ class ArrayLoop:
     def native(self, frame: np.ndarray) -> Callable[..., None]:
         """Return the loop for native code.
 
-        Parameters
-        ----------
-        frame
-            Frame of the loop.
-
         Returns
         -------
         Callable

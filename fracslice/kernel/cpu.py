@@ -120,11 +120,6 @@ class CompiledLoop:
     def native(self, frame: np.ndarray) -> tuple[Function, np.ndarray, np.ndarray]:
         """Return the loop for native code.
 
-        Parameters
-        ----------
-        frame
-            Frame of the loop.
-
         Returns
         -------
         tuple

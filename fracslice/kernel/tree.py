@@ -106,11 +106,6 @@ def key(root: Node) -> str:
     root
         Scene with resolved depths.
 
-    Returns
-    -------
-    str
-        Key.
-
     Raises
     ------
     KernelError

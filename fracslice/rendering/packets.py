@@ -47,11 +47,6 @@ def workspace(frame: Frame, rays: int) -> int:
         Linked frame.
     rays : int
         Rays of the tile.
-
-    Returns
-    -------
-    int
-        Numbers in W.
     """
     return (Row.px + frame.samples) * rays
 

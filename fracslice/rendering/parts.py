@@ -107,17 +107,7 @@ class PartTask:
 
 
 def frame_key(frame: Frame) -> str:
-    """Key of a linked frame.
-
-    Parameters
-    ----------
-    frame : Frame
-        The frame.
-
-    Returns
-    -------
-    str
-    """
+    """Key of a linked frame."""
     return key(frame.linked.source, frame.linked.parameters)
 
 
@@ -177,13 +167,7 @@ class PoolTracer:
         self._prepasses = 0
 
     def look_ahead(self, work: Work) -> None:
-        """Leave the next cone prepass to the workers.
-
-        Parameters
-        ----------
-        work : Work
-            Threads and cancellation.
-        """
+        """Leave the next cone prepass to the workers."""
         self._prepasses += 1
 
     def add(self, sums: np.ndarray, plan: PassPlan, work: Work) -> None:

@@ -183,13 +183,6 @@ class TraceDialect(FieldDialect):
     def shape(self, name: str, given: Arguments, _: Sequence[Run]) -> str:
         """Write the function of a shape: the field value and the orbit trap.
 
-        Parameters
-        ----------
-        name : str
-            Function name.
-        given : Arguments
-            Function and arguments of the shape.
-
         Returns
         -------
         str

@@ -30,11 +30,6 @@ class Seconds(Parameter):
     def read(self, text: str) -> float:
         """Parse text with an optional unit.
 
-        Parameters
-        ----------
-        text : str
-            The text.
-
         Returns
         -------
         float
@@ -101,11 +96,6 @@ class Keys(Parameter):
 
     def read(self, text: str) -> Keyframes:
         """Parse keyframes separated by semicolons.
-
-        Parameters
-        ----------
-        text : str
-            The text.
 
         Returns
         -------

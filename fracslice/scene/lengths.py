@@ -72,11 +72,6 @@ class Length(Parameter):
     def read(self, text: str) -> float:
         """Parse text with an optional unit.
 
-        Parameters
-        ----------
-        text : str
-            The text.
-
         Returns
         -------
         float
@@ -188,11 +183,6 @@ class Percent(Parameter):
 
     def read(self, text: str) -> tuple[float, ...]:
         """Parse one percentage, or three separated by commas.
-
-        Parameters
-        ----------
-        text : str
-            The text.
 
         Returns
         -------
