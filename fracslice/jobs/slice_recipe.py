@@ -55,13 +55,7 @@ class SliceRecipe:
     blur: int = 0
 
     def run(self, work: Work) -> SliceRun:
-        """Plan the layers.
-
-        Raises
-        ------
-        SceneError, SliceError, VolumeError, Cancelled
-            For a scene or settings that cannot be sliced.
-        """
+        """Plan the layers; see `Recipe.run`."""
         scene = reads(self.scene, self.name)
         stack = slicing.plan_stack(scene.root, self.job, work)
         if self.most is not None:
@@ -75,11 +69,5 @@ class SliceRecipe:
         return SliceRun(stack, screen, work, self.resin, *files, self.sections, self)
 
     def encoder(self, run: SliceRun) -> Encode:
-        """Return the function that encodes the layers of a run in this format.
-
-        Returns
-        -------
-        callable
-            Function of a layer.
-        """
+        """Return the function that encodes the layers of a run in this format; see `Recipe.encoder`."""
         return FORMATS[self.form].encoder(run)

@@ -71,18 +71,7 @@ class CudaLoop:
         launched(self.loop, count, self.parameters, frame, *arguments, count)
 
     def native(self, frame: np.ndarray) -> Callable[..., None]:
-        """Return a function for native code.
-
-        Parameters
-        ----------
-        frame
-            Frame of the loop.
-
-        Returns
-        -------
-        Callable
-            Function of the loop's other arguments.
-        """
+        """Return a function for native code; see `FieldLoop.native`."""
         return partial(self, frame)
 
 

@@ -156,13 +156,7 @@ class PoolTracer:
         return self.tracer.samples
 
     def aim(self, frame: Frame) -> None:
-        """Load another frame; see `CpuTracer.aim`.
-
-        Parameters
-        ----------
-        frame : Frame
-            Linked frame.
-        """
+        """Load another frame; see `CpuTracer.aim`."""
         self.tracer.aim(frame)
         self._prepasses = 0
 
@@ -171,17 +165,7 @@ class PoolTracer:
         self._prepasses += 1
 
     def add(self, sums: np.ndarray, plan: PassPlan, work: Work) -> None:
-        """Add samples to pixels up to their goals; see `CpuTracer.add`.
-
-        Parameters
-        ----------
-        sums : ndarray, shape (height * width * CHANNELS,)
-            Sums of the picture, changed in place.
-        plan : PassPlan
-            Pixels to sample.
-        work : Work
-            Pool and cancellation.
-        """
+        """Add samples to pixels up to their goals; see `CpuTracer.add`."""
         pool, size = work.cluster, (self.tracer.width, self.tracer.height)
         assert pool is not None
         state, places = sums.reshape(-1, CHANNELS), _places(plan.pixels, size)
