@@ -30,8 +30,6 @@ def measured(method: str, what: Workload, resolution: int, work: Work) -> dict[s
     ----------
     method : str
         Name in `METHODS`.
-    what : Workload
-        The solid.
     resolution : int
         Voxels along the cube.
     work : Work

@@ -66,7 +66,7 @@ class Sampled:
     signs : SignBricks
         Its samples.
     contours : SurfaceContours
-        ResultFolder of its surface.
+        Pieces of its surface.
     """
 
     planned: Plan
