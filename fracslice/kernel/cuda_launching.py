@@ -77,27 +77,7 @@ class CudaLoop:
 
 @lru_cache(maxsize=32)
 def compile_loops(linked: Linked, loops: tuple[Loop, ...], precision: Precision) -> Loops:
-    """Compile loops over lanes for the GPU.
-
-    Parameters
-    ----------
-    linked
-        Linked scene.
-    loops
-        Loops to compile.
-    precision
-        "float32" or "float64".
-
-    Returns
-    -------
-    Loops
-        Loops by name, with one lane.
-
-    Raises
-    ------
-    KernelError
-        If a loop cannot be compiled, or no GPU can be used.
-    """
+    """Compile loops for the GPU, with one lane; see `cpu.compile_loops`."""
     module, placed = load_loops(linked, precision, loops), parameters(linked, precision)
     runs = {loop.name: CudaLoop(getattr(module, loop.name), placed) for loop in loops}
     return Loops(1, LANES, runs, on_gpu=True)

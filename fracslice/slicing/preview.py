@@ -1,4 +1,7 @@
-"""Previews of layers: a contact sheet, an animation, and the worst layers of a check."""
+"""Previews of planned layers: a contact sheet, an animation, and the worst layers of a check.
+
+All raise `SliceError` if a layer cannot be sampled, and `Cancelled` when the work is cancelled.
+"""
 
 from __future__ import annotations
 
@@ -48,24 +51,7 @@ def _spread(stack: Stack, count: int) -> list[int]:
 
 
 def contact_sheet(stack: Stack, file: BinaryIO, work: Work | None = None) -> None:
-    """Write a PNG with 24 layers, evenly spaced, each with its height above the bed.
-
-    Parameters
-    ----------
-    stack : Stack
-        The planned layers.
-    file : binary file
-        Where to write.
-    work : Work, optional
-        Threads, progress and cancellation.
-
-    Raises
-    ------
-    SliceError
-        If a layer cannot be sampled.
-    Cancelled
-        When the work is cancelled.
-    """
+    """Write a PNG with 24 layers, evenly spaced, each with its height above the bed."""
     chosen = _spread(stack, CELLS)
     images = list(Slicer(stack, work or Work()).map(lambda layer: thumbnail(layer.coverage), chosen))
     _sheet(stack, chosen, images, math.ceil(math.sqrt(1.5 * max(len(images), 1)))).save(file, "PNG")
@@ -87,24 +73,7 @@ def _sheet(stack: Stack, layers: Sequence[int], images: Sequence[Image], across:
 
 
 def animation(stack: Stack, file: BinaryIO, work: Work | None = None) -> None:
-    """Write an endless animated WebP that climbs through up to 60 layers in three seconds.
-
-    Parameters
-    ----------
-    stack : Stack
-        The planned layers.
-    file : binary file
-        Where to write.
-    work : Work, optional
-        Threads, progress and cancellation.
-
-    Raises
-    ------
-    SliceError
-        If a layer cannot be sampled.
-    Cancelled
-        When the work is cancelled.
-    """
+    """Write an endless animated WebP that climbs through up to 60 layers in three seconds."""
     frames = list(
         Slicer(stack, work or Work()).map(lambda layer: thumbnail(layer.coverage), _spread(stack, FRAMES))
     )
@@ -116,21 +85,8 @@ def worst_layers(stack: Stack, layers: Sequence[int], file: BinaryIO, work: Work
 
     Parameters
     ----------
-    stack : Stack
-        The planned layers.
     layers : sequence of int
         Numbers of the layers; the lowest one if empty.
-    file : binary file
-        Where to write.
-    work : Work, optional
-        Threads, progress and cancellation.
-
-    Raises
-    ------
-    SliceError
-        If a layer cannot be sampled.
-    Cancelled
-        When the work is cancelled.
     """
     from PIL import Image
 
