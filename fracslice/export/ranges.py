@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import TYPE_CHECKING, ClassVar, Protocol, Self
 
 from ..common.digits import counted
 from ..errors import ClusterError, ExportError, SharedError
@@ -59,6 +59,8 @@ class RangeTask:
 
     Attributes
     ----------
+    stage : str
+        First part of its name.
     recipe : Recipe
         The run.
     job : str
@@ -67,6 +69,7 @@ class RangeTask:
         Range.
     """
 
+    stage: ClassVar[str] = "layers"
     recipe: Recipe
     job: str
     first: int
@@ -103,7 +106,7 @@ class RangeTask:
     @property
     def name(self) -> str:
         """Name of the range."""
-        return f"layers-{self.first:06}-{self.end:06}"
+        return f"{self.stage}-{self.first:06}-{self.end:06}"
 
     def planned(self, form: str) -> SliceRun:
         """The run, planned once in a process.
