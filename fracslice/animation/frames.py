@@ -69,10 +69,6 @@ class FrameTask:
             The film.
         numbers : sequence of int
             Numbers of the frames, from 0.
-
-        Returns
-        -------
-        list of FrameTask
         """
         scene, film = job.timeline.scene, key(toolchain(), job.key)
         about = job.size, job.samples, job.fps, job.ending, job.layers, film

@@ -1,4 +1,7 @@
-"""Previews of layers: a contact sheet, an animation, and the worst layers of a check."""
+"""Previews of planned layers: a contact sheet, an animation, and the worst layers of a check.
+
+All raise `SliceError` if a layer cannot be sampled, and `Cancelled` when the work is cancelled.
+"""
 
 from __future__ import annotations
 
@@ -62,21 +65,8 @@ def contact_sheet(
 
     Parameters
     ----------
-    stack : Stack
-        The planned layers.
-    file : binary file
-        Where to write.
-    work : Work, optional
-        Threads, progress and cancellation.
     layers : range, optional
         Layers to choose from; all by default.
-
-    Raises
-    ------
-    SliceError
-        If a layer cannot be sampled.
-    Cancelled
-        When the work is cancelled.
     """
     chosen = _spread(range(len(stack.z)) if layers is None else layers, CELLS)
     images = list(Slicer(stack, work or Work()).map(thumbnail, chosen))
@@ -99,24 +89,7 @@ def _sheet(stack: Stack, layers: Sequence[int], images: Sequence[Image], across:
 
 
 def animation(stack: Stack, file: BinaryIO, work: Work | None = None) -> None:
-    """Write an endless animated WebP that climbs through up to 60 layers in three seconds.
-
-    Parameters
-    ----------
-    stack : Stack
-        The planned layers.
-    file : binary file
-        Where to write.
-    work : Work, optional
-        Threads, progress and cancellation.
-
-    Raises
-    ------
-    SliceError
-        If a layer cannot be sampled.
-    Cancelled
-        When the work is cancelled.
-    """
+    """Write an endless animated WebP that climbs through up to 60 layers in three seconds."""
     chosen = _spread(range(len(stack.z)), FRAMES)
     frames = list(Slicer(stack, work or Work()).map(thumbnail, chosen))
     frames[0].save(file, "WEBP", save_all=True, append_images=frames[1:], duration=50, loop=0, lossless=True)
@@ -127,21 +100,8 @@ def worst_layers(stack: Stack, layers: Sequence[int], file: BinaryIO, work: Work
 
     Parameters
     ----------
-    stack : Stack
-        The planned layers.
     layers : sequence of int
         Numbers of the layers; the lowest one if empty.
-    file : binary file
-        Where to write.
-    work : Work, optional
-        Threads, progress and cancellation.
-
-    Raises
-    ------
-    SliceError
-        If a layer cannot be sampled.
-    Cancelled
-        When the work is cancelled.
     """
     from PIL import Image
 
