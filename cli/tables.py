@@ -44,7 +44,7 @@ def write_row(path: str, output: str, settings: Sequence[str], report: Report) -
 
     numbers = {name: value for name, value in report.as_dict().items() if isinstance(value, int | float)}
     values = dict(setting.split("=", 1) for setting in settings)
-    own = {KEY: output, **values, **numbers, "problems": "; ".join(report.problems)}
+    own: dict[str, object] = {KEY: output, **values, **numbers, "problems": "; ".join(report.problems)}
     rows: dict[str, dict[str, object]] = {**table_rows(path), output: own}
     text = io.StringIO()
     table = csv.DictWriter(text, list(dict.fromkeys(name for row in rows.values() for name in row)))
