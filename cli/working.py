@@ -68,10 +68,6 @@ def working(how: int | Work, quiet: bool, kept: str = NOTHING) -> Iterator[Work]
     kept : str, optional
         What a cancelled command leaves, for the message.
 
-    Yields
-    ------
-    Work
-
     Raises
     ------
     StoppedError

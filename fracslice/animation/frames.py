@@ -69,10 +69,6 @@ class FrameTask:
             The film.
         numbers : sequence of int
             Numbers of the frames, from 0.
-
-        Returns
-        -------
-        list of FrameTask
         """
         scene, film = job.timeline.scene, key(toolchain(), job.key)
         about = job.size, job.samples, job.fps, job.ending, job.layers, film
@@ -175,7 +171,7 @@ def _claim(job: FilmJob, folder: Path, resume: bool) -> None:
     if journal.exists():
         for path in folder.glob(UNFINISHED):
             path.unlink(missing_ok=True)
-        known = json.loads(journal.read_text())["key"]
+        known = _known(journal)
         if known == job.key:
             return
         if resume:
@@ -186,3 +182,11 @@ def _claim(job: FilmJob, folder: Path, resume: bool) -> None:
         raise RenderError(f"{folder}: expected an empty folder, or one with the frames of a film")
     with replacing(journal) as file:
         file.write(json.dumps({"key": job.key, "fps": job.fps}).encode())
+
+
+def _known(journal: Path) -> str:
+    """Key of the film whose frames are in a folder."""
+    try:
+        return str(json.loads(journal.read_text())["key"])
+    except (ValueError, KeyError, TypeError):
+        raise RenderError(f"{journal}: expected the journal of a film") from None

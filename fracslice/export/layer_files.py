@@ -86,13 +86,6 @@ def slice_format(path: str | Path, name: str | None = None) -> str:
 def printers_file(printer: Printer, output: str | Path) -> str:
     """Compare the file to write with the one that a printer reads.
 
-    Parameters
-    ----------
-    printer : Printer
-        The printer.
-    output : str or path
-        The file to write.
-
     Returns
     -------
     str
@@ -120,10 +113,6 @@ def write_slices(run: SliceRun, path: str | Path, name: str | None = None) -> Pa
         The file or folder.
     name : str, optional
         Name of the format; by default, the extension of `path` selects it.
-
-    Returns
-    -------
-    Path
 
     Raises
     ------

@@ -195,11 +195,6 @@ class PrintFormat(LayerFormat):
 def by_pixels(encoding: Encoding) -> Callable[[SliceRun, Layer], bytes]:
     """Return the function that encodes the picture of a layer of a run.
 
-    Parameters
-    ----------
-    encoding : Encoding
-        Encoding of the pixels.
-
     Returns
     -------
     callable

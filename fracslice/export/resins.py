@@ -69,11 +69,6 @@ class Resin:
     def exposures(self, layers: int) -> NDArray[np.float64]:
         """Exposure of each layer.
 
-        Parameters
-        ----------
-        layers : int
-            Number of layers.
-
         Returns
         -------
         float64 [layers]
@@ -84,18 +79,7 @@ class Resin:
         return self.bottom_exposure + share * (self.exposure - self.bottom_exposure)
 
     def seconds(self, layers: int) -> float:
-        """Duration of a print.
-
-        Parameters
-        ----------
-        layers : int
-            Number of layers.
-
-        Returns
-        -------
-        float
-            Seconds.
-        """
+        """Duration of a print."""
         motion = 60 * self.lift * (1 / self.lift_speed + 1 / self.retract_speed)
         return float(self.exposures(layers).sum() + layers * (motion + self.wait))
 
@@ -112,10 +96,6 @@ def resin(name: str, printer: Printer | None, layer: float) -> Resin:
         The printer.
     layer : float
         Layer height, mm; the nearest one in the table counts.
-
-    Returns
-    -------
-    Resin
 
     Raises
     ------
@@ -171,10 +151,6 @@ def moving(resin: Resin, printer: Printer | None, but: Collection[tuple[str, Any
         The printer.
     but : collection of (str, value), optional
         Settings that stay.
-
-    Returns
-    -------
-    Resin
     """
     if printer is None:
         return resin
@@ -193,10 +169,6 @@ def of_table(where: str, values: Mapping[str, Any]) -> Resin:
         File, for messages.
     values : mapping
         Attributes of `Resin`.
-
-    Returns
-    -------
-    Resin
 
     Raises
     ------

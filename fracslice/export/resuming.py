@@ -98,11 +98,6 @@ class Journal:
     def heads(self, size: int) -> Iterator[tuple[bytes, int]]:
         """Iterate over the begins of all layers, without reading the rest.
 
-        Parameters
-        ----------
-        size : int
-            Bytes of a begin.
-
         Yields
         ------
         tuple of bytes and int
@@ -153,10 +148,6 @@ def journal(path: str | Path, job: str) -> Iterator[Journal]:
         The file that the job writes.
     job : str
         Key of everything that determines the bytes.
-
-    Yields
-    ------
-    Journal
 
     Raises
     ------

@@ -81,11 +81,6 @@ def send(path: str | Path, address: str, work: Work) -> str:
     work : Work
         Progress and cancellation.
 
-    Returns
-    -------
-    str
-        Where the file is.
-
     Raises
     ------
     ExportError

@@ -56,23 +56,12 @@ class SliceRecipe:
     blur: int = 0
 
     def run(self, work: Work, scene: Scene | None = None) -> SliceRun:
-        """Plan the layers.
+        """Plan the layers; see `Recipe.run`.
 
         Parameters
         ----------
-        work : Work
-            Threads, progress and cancellation.
         scene : Scene, optional
             The same scene as it was read: its errors name places in its file.
-
-        Returns
-        -------
-        SliceRun
-
-        Raises
-        ------
-        SceneError, SliceError, VolumeError, Cancelled
-            For a scene or settings that cannot be sliced.
         """
         scene = scene or reads(self.scene, self.name)
         stack = slicing.plan_stack(scene.root, self.job, work)
@@ -87,16 +76,5 @@ class SliceRecipe:
         return SliceRun(stack, screen, work, self.resin, *files, self.sections, self)
 
     def encoder(self, run: SliceRun) -> Encode:
-        """Return the function that encodes the layers of a run in this format.
-
-        Parameters
-        ----------
-        run : SliceRun
-            The run.
-
-        Returns
-        -------
-        callable
-            Function of a layer.
-        """
+        """Return the function that encodes the layers of a run in this format; see `Recipe.encoder`."""
         return FORMATS[self.form].encoder(run)

@@ -134,11 +134,6 @@ def _openexr(path: str) -> np.ndarray:
 def radiance(path: str) -> np.ndarray:
     """Read a Radiance picture (Ward 1991, "Real Pixels"): mantissas of 8 bits with a common exponent.
 
-    Parameters
-    ----------
-    path : str
-        The file.
-
     Returns
     -------
     ndarray of float32, shape (height, width, 3)

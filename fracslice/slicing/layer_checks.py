@@ -175,11 +175,6 @@ def check_layers(
     findings : iterator of LayerFindings, optional
         Results of all layers, in order; they are made here by default.
 
-    Returns
-    -------
-    PrintReport
-        The report.
-
     Raises
     ------
     SliceError

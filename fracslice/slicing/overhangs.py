@@ -51,11 +51,6 @@ def unsupported(below: Runs, above: Runs, reach: float) -> Runs:
         Solid pixels of the layers.
     reach : float
         Pixels within this distance of a solid pixel of the layer below are supported, pixels.
-
-    Returns
-    -------
-    Runs
-        The unsupported pixels.
     """
     rows, count, size = np.zeros(len(above.rows), np.int32), len(above.begin), -1
     while count > size:  # most layers have fewer unsupported runs than runs

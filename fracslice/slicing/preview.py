@@ -1,4 +1,7 @@
-"""Previews of layers: a contact sheet, an animation, and the worst layers of a check."""
+"""Previews of planned layers: a contact sheet, an animation, and the worst layers of a check.
+
+All raise `SliceError` if a layer cannot be sampled, and `Cancelled` when the work is cancelled.
+"""
 
 from __future__ import annotations
 
@@ -49,32 +52,23 @@ def _square(stack: Stack, most: float = math.inf) -> tuple[int, int]:
     return max(round(width / side), 1), max(round(height / side), 1)
 
 
-def _spread(stack: Stack, count: int) -> list[int]:
-    """Numbers of `count` layers, evenly spaced over the height, each in the middle of its interval."""
-    total = len(stack.z)
-    return sorted({int((i + 0.5) * total / min(count, total)) for i in range(min(count, total))})
+def _spread(layers: range, count: int) -> list[int]:
+    """At most `count` of the layers, evenly spaced, each in the middle of its interval."""
+    total = len(layers)
+    return sorted(layers[int((i + 0.5) * total / min(count, total))] for i in range(min(count, total)))
 
 
-def contact_sheet(stack: Stack, file: BinaryIO, work: Work | None = None) -> None:
+def contact_sheet(
+    stack: Stack, file: BinaryIO, work: Work | None = None, layers: range | None = None
+) -> None:
     """Write a PNG with 24 layers, evenly spaced, each with its height above the bed.
 
     Parameters
     ----------
-    stack : Stack
-        The planned layers.
-    file : binary file
-        Where to write.
-    work : Work, optional
-        Threads, progress and cancellation.
-
-    Raises
-    ------
-    SliceError
-        If a layer cannot be sampled.
-    Cancelled
-        When the work is cancelled.
+    layers : range, optional
+        Layers to choose from; all by default.
     """
-    chosen = _spread(stack, CELLS)
+    chosen = _spread(range(len(stack.z)) if layers is None else layers, CELLS)
     images = list(Slicer(stack, work or Work()).map(thumbnail, chosen))
     _sheet(stack, chosen, images, math.ceil(math.sqrt(1.5 * max(len(images), 1)))).save(file, "PNG")
 
@@ -95,25 +89,9 @@ def _sheet(stack: Stack, layers: Sequence[int], images: Sequence[Image], across:
 
 
 def animation(stack: Stack, file: BinaryIO, work: Work | None = None) -> None:
-    """Write an endless animated WebP that climbs through up to 60 layers in three seconds.
-
-    Parameters
-    ----------
-    stack : Stack
-        The planned layers.
-    file : binary file
-        Where to write.
-    work : Work, optional
-        Threads, progress and cancellation.
-
-    Raises
-    ------
-    SliceError
-        If a layer cannot be sampled.
-    Cancelled
-        When the work is cancelled.
-    """
-    frames = list(Slicer(stack, work or Work()).map(thumbnail, _spread(stack, FRAMES)))
+    """Write an endless animated WebP that climbs through up to 60 layers in three seconds."""
+    chosen = _spread(range(len(stack.z)), FRAMES)
+    frames = list(Slicer(stack, work or Work()).map(thumbnail, chosen))
     frames[0].save(file, "WEBP", save_all=True, append_images=frames[1:], duration=50, loop=0, lossless=True)
 
 
@@ -122,21 +100,8 @@ def worst_layers(stack: Stack, layers: Sequence[int], file: BinaryIO, work: Work
 
     Parameters
     ----------
-    stack : Stack
-        The planned layers.
     layers : sequence of int
         Numbers of the layers; the lowest one if empty.
-    file : binary file
-        Where to write.
-    work : Work, optional
-        Threads, progress and cancellation.
-
-    Raises
-    ------
-    SliceError
-        If a layer cannot be sampled.
-    Cancelled
-        When the work is cancelled.
     """
     from PIL import Image
 

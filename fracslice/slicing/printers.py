@@ -125,11 +125,6 @@ def printer(name: str) -> Printer:
         A key of `PRINTERS`, or a .toml file with the attributes of `Printer`; its table `resin` has those of
         `fracslice.export.resins.Resin`.
 
-    Returns
-    -------
-    Printer
-        The printer.
-
     Raises
     ------
     SliceError

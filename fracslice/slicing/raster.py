@@ -116,11 +116,6 @@ class Screen:
             Encoding of the picture.
         shown : uint8 [256], optional
             Level for each grey level of the picture, the first 0, the last 255.
-
-        Returns
-        -------
-        bytes
-            Encoded picture.
         """
         if self.compensation or self.blur or layer.mean is not None:
             image = self.picture(layer)
