@@ -241,8 +241,8 @@ class Axis(Choice):
 
 
 @dataclass(frozen=True)
-class Text(Parameter):
-    """Text that is shown to a person."""
+class Label(Parameter):
+    """Text in one line that is shown to a person."""
 
     @property
     def expects(self) -> str:
