@@ -24,6 +24,10 @@ LARGE = 1 << 26
 """Bytes of a replaced file that another thread releases."""
 
 
+FULL = errno.ENOSPC, errno.EDQUOT
+"""Errors of a full disk."""
+
+
 @contextmanager
 def reported(path: str | Path) -> Iterator[None]:
     """Raise errors of the file system as `ExportError`, with the path and the reason in one line.
@@ -42,7 +46,7 @@ def reported(path: str | Path) -> Iterator[None]:
         yield
     except OSError as error:
         reason = error.strerror or str(error)
-        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        if error.errno in FULL:
             reason = "the disk is full; the file was not written"
         elif error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
             reason = "not allowed to write there"
