@@ -68,9 +68,13 @@ class FilmJob:
 
     @property
     def key(self) -> str:
-        """Hash of everything that determines the frames."""
+        """Hash of everything that determines the frames, the pictures that the scene names included."""
         scene = self.timeline.scene
-        return key(program(), scene.hash, self.size, self.samples, self.fps, self.ending, self.layers)
+        names = [light.file for light in scene.view.lights]
+        names += [node.values.get("texture") for node in scene.root.walk()]
+        pictures = [path.read_bytes() for path in map(Path, filter(None, names)) if path.is_file()]
+        about = self.size, self.samples, self.fps, self.ending, self.layers
+        return key(program(), scene.hash, *about, *pictures)
 
     def path(self, folder: Path, number: int) -> Path:
         """Return the file of a frame.

@@ -131,6 +131,16 @@ def test_frames_of_another_film_are_not_mixed_in(
             write_frames(job(scene()), range(1), tmp_path / "mine", False, Work(1))
 
 
+def test_frames_below_another_sky_are_another_film(tmp_path: Path) -> None:
+    sky = tmp_path / "sky.png"
+    text = scene().replace('kind="sun"', f'kind="environment" file="{sky}"')
+    keys = []
+    for colour in ("red", "blue", "red"):
+        Image.new("RGB", (8, 4), colour).save(sky)
+        keys.append(job(text).key)
+    assert keys[0] == keys[2] != keys[1]
+
+
 def test_two_films_at_once_do_not_mix_their_frames(tmp_path: Path) -> None:
     (tmp_path / "frames").mkdir()
     with locked_folder(tmp_path / "frames"), pytest.raises(ExportError, match="another process"):
