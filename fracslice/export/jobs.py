@@ -128,7 +128,7 @@ class SliceRun:
             "grey_levels": screen.levels,
             "blur_pixels": screen.blur,
             "compensation_mm": screen.compensation,
-            "mirror": screen.mirror,
+            "mirror": screen.mirrored,
             "layers": [
                 {"file": f"{name}{i:05d}.png", "top_mm": round(float(z), 6)} for i, z in enumerate(stack.tops)
             ],

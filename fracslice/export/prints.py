@@ -124,8 +124,7 @@ class PrintData:
     @property
     def mirrored(self) -> bool:
         """True if the pictures are mirrored along x."""
-        mirror = self.run.screen.mirror
-        return self.printer.mirror if mirror is None else mirror
+        return self.run.screen.mirrored
 
     @property
     def title(self) -> bytes:

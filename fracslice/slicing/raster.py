@@ -142,7 +142,7 @@ class Screen:
         """The screen for native code."""
         mine = self._place
         at = [on.start - of.start for on, of in zip(mine.on_bed, mine.of_layer, strict=True)]
-        backwards = self._mirrored != self._portrait
+        backwards = self.mirrored != self._portrait
         return ScreenView(self.shape, self._portrait, backwards, (at[0], at[1]), self._levels.tobytes())
 
     @cached_property
@@ -168,15 +168,15 @@ class Screen:
         return bool(self.printer and self.printer.portrait)
 
     @property
-    def _mirrored(self) -> bool:
+    def mirrored(self) -> bool:
         """True if the picture is mirrored along x."""
         return self.mirror if self.mirror is not None else bool(self.printer and self.printer.mirror)
 
     def _bed(self, image: np.ndarray) -> np.ndarray:
         """View of a picture as seen from above, row 0 at the front."""
         if self._portrait:
-            return image[::-1].T if self._mirrored else image[::-1, ::-1].T
-        return image[::-1, ::-1] if self._mirrored else image[::-1]
+            return image[::-1].T if self.mirrored else image[::-1, ::-1].T
+        return image[::-1, ::-1] if self.mirrored else image[::-1]
 
 
 @dataclass(frozen=True)
