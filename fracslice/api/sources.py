@@ -13,7 +13,7 @@ from ..formulas import names as formula_names
 from ..formulas.conversion import shown
 from ..formulas.parameters import REQUIRED
 from ..scene import Scene, library, read, scene
-from .options import Length
+from ..scene.lengths import AnyLength
 
 Source: TypeAlias = Node | Scene | str | os.PathLike[str]
 
@@ -25,10 +25,6 @@ def resolve(source: Source) -> Node | Scene:
     ----------
     source : Node, Scene, path or name
         A shape, a scene, a scene file, or the name of a shipped scene or formula.
-
-    Returns
-    -------
-    Node or Scene
 
     Raises
     ------
@@ -59,7 +55,7 @@ def _is_ready(formula: Formula) -> bool:
     return formula.kind == "shape" and not formula.children[1] and "bounds" in formula.hooks and not required
 
 
-def as_scene(source: Source, size: Length | None = None) -> Scene:
+def as_scene(source: Source, size: AnyLength | None = None) -> Scene:
     """Resolve a source to a scene.
 
     Parameters
@@ -68,10 +64,6 @@ def as_scene(source: Source, size: Length | None = None) -> Scene:
         A shape, a scene, a scene file, or the name of a shipped scene or formula.
     size : float or str, optional
         Longest side of a shape; by default, its scene unit is a millimetre.
-
-    Returns
-    -------
-    Scene
 
     Raises
     ------

@@ -120,13 +120,6 @@ def replacing(path: str | Path, mode: int | None = None) -> Iterator[BinaryIO]:
 def linked(source: str, path: str | Path) -> None:
     """Give a complete file another name atomically; copy it where the file system cannot link it.
 
-    Parameters
-    ----------
-    source
-        The file.
-    path
-        Its other name.
-
     Raises
     ------
     ExportError

@@ -80,17 +80,7 @@ class SliceRun:
         return self.slicer_with(self.work)
 
     def slicer_with(self, work: Work) -> Slicer:
-        """Slicer of the stack with other threads.
-
-        Parameters
-        ----------
-        work : Work
-            Threads, progress and cancellation.
-
-        Returns
-        -------
-        Slicer
-        """
+        """Slicer of the stack with other threads."""
         return Slicer(self.stack, work) if self.sections == 1 else MeanSlicer(self.stack, work, self.sections)
 
     @property
@@ -105,10 +95,6 @@ class SliceRun:
         ----------
         form : str
             Name of the format.
-
-        Returns
-        -------
-        str
         """
         stack = [getattr(self.stack, f.name) for f in fields(self.stack) if f.name != "root"]
         screen = [getattr(self.screen, f.name) for f in fields(self.screen) if f.name != "stack"]

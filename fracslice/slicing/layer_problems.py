@@ -60,11 +60,6 @@ def problems_of(report: PrintReport, stack: Stack, limits: Limits) -> list[Probl
         The layers that it is of.
     limits : Limits
         Limits of the checks.
-
-    Returns
-    -------
-    list of Problem
-        The problems.
     """
 
     def where(feature: Feature) -> dict[str, Any]:

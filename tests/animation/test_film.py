@@ -17,6 +17,7 @@ from PIL import Image, ImageSequence
 from fracslice import read, reads
 from fracslice.animation import FilmJob, Timeline, encode, write_frames
 from fracslice.animation.encode import CODECS
+from fracslice.common.locks import locked_folder
 from fracslice.errors import Cancelled, ExportError, RenderError
 from fracslice.rendering import Renderer, develop
 from fracslice.work import Work
@@ -128,6 +129,13 @@ def test_frames_of_another_film_are_not_mixed_in(
         (tmp_path / "mine" / "film.json").write_text(text)
         with pytest.raises(RenderError, match=r"film\.json: expected the journal of a film"):
             write_frames(job(scene()), range(1), tmp_path / "mine", False, Work(1))
+
+
+def test_two_films_at_once_do_not_mix_their_frames(tmp_path: Path) -> None:
+    (tmp_path / "frames").mkdir()
+    with locked_folder(tmp_path / "frames"), pytest.raises(ExportError, match="another process"):
+        write_frames(job(scene()), range(1), tmp_path / "frames", False, Work(1))
+    assert not list((tmp_path / "frames").iterdir())
 
 
 def test_noise_changes_with_the_frame_unless_it_is_fixed() -> None:
