@@ -62,6 +62,9 @@ def connected(where: str, store: str, threads: int = 1) -> Iterator[workers.Work
             raise ClusterError(f"{where!r}: expected local, local:N or the address of a scheduler")
         else:
             scheduler = where
+        log = logging.getLogger("distributed.client")
+        stack.callback(log.setLevel, log.level)
+        log.setLevel(logging.CRITICAL)  # a scheduler that is gone is an error of the job
         try:
             client = Client(scheduler, timeout=workers.CONNECT, set_as_default=False)
         except (OSError, ValueError) as error:
