@@ -15,6 +15,9 @@ from ..errors import ClusterError
 from . import workers
 from .result_folder import ResultFolder
 
+START = 300.0
+"""Seconds until a local worker has started."""
+
 SETTINGS = {
     "distributed.admin.tick.interval": "1s",
     "distributed.admin.system-monitor.interval": "5s",
@@ -82,17 +85,21 @@ def _local(count: int, threads: int) -> Iterator[Any]:
     with ExitStack() as stack:
         stack.enter_context(dask.config.set(SETTINGS))
         with interrupts_later():
-            cluster = stack.enter_context(
-                LocalCluster(
+            try:
+                cluster = LocalCluster(
                     n_workers=count,
                     threads_per_worker=each,
                     memory_limit=None,
                     dashboard_address=None,
                     scheduler_kwargs={"dashboard_address": ":0"},
-                    silence_logs=logging.ERROR,
+                    silence_logs=logging.CRITICAL,
+                    death_timeout=START,
                 )
-            )
-        yield cluster
+            except (AssertionError, TimeoutError):  # Dask asserts that a worker that it ends has started
+                raise ClusterError(f"local:{count}: no worker started within {START:g} s") from None
+            except (OSError, RuntimeError) as error:
+                raise ClusterError(f"local:{count}: no worker started: {error.__cause__ or error}") from None
+        yield stack.enter_context(cluster)
 
 
 @contextmanager

@@ -16,8 +16,7 @@ import pytest
 from fracslice.cli.main import run as command
 
 from fracslice.animation import FilmJob, Timeline, write_frames
-from fracslice.cluster import ResultFolder, Workers, connected, workers
-from fracslice.cluster.connection import SETTINGS
+from fracslice.cluster import ResultFolder, Workers, connected, connection, workers
 from fracslice.cluster.identity import Identity
 from fracslice.errors import Cancelled, ClusterError, FracsliceWarning
 from fracslice.export.layer_files import write_slices
@@ -276,7 +275,7 @@ thread.join()"""
 @pytest.mark.skipif(sys.platform != "linux", reason="of glibc")
 def test_workers_reuse_freed_memory() -> None:
     """Dask's nanny starts them with a setting that returns each array to the system; threads have heaps."""
-    arenas = str(SETTINGS["distributed.nanny.pre-spawn-environ.MALLOC_ARENA_MAX"])
+    arenas = str(connection.SETTINGS["distributed.nanny.pre-spawn-environ.MALLOC_ARENA_MAX"])
     given = {**os.environ, "MALLOC_TRIM_THRESHOLD_": "65536", "MALLOC_ARENA_MAX": arenas}
     done = subprocess.run(
         [sys.executable, "-c", ARRAYS], env=given, capture_output=True, text=True, check=True
@@ -384,6 +383,18 @@ def test_local_workers_are_processes(tmp_path: Path) -> None:
     assert [worker["nthreads"] for worker in result] == [1, 1] and set(arenas) == {"1"}
     assert all(signal.SIGINT in of for of in blocked.values()), "Ctrl-C is for the client"
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+
+
+def test_local_workers_that_do_not_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from dask import config
+
+    failing = pytest.raises(ClusterError, match="local:1: no worker started: No module named 'nobodys'")
+    with config.set({"distributed.worker.preload": ["nobodys"]}), failing, connected("local:1", "x"):
+        pass
+    monkeypatch.setattr(connection, "START", 0.1)
+    late = pytest.raises(ClusterError, match=r"local:1: no worker started within 0\.1 s")
+    with late, connected("local:1", "x"):
+        pass
 
 
 def test_a_client_of_dask_is_a_cluster(
