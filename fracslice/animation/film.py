@@ -131,17 +131,19 @@ class FilmJob:
     def _traced(self, number: int, work: Work) -> tuple[np.ndarray, np.ndarray]:
         """Mean of the samples of a frame, and their number at each pixel."""
         moments, shift = self.moments(number), number + 1 if self.timeline.animation.noise == "moving" else 0
-        share, begin = self.samples // len(moments), 0
+        taken, begin = 0, 0
         mean = np.zeros((*self.size[::-1], 4), np.float32)
         counts = np.zeros(self.size[::-1], np.float32)
         for scene, same in groupby(moments):
             count = len(list(same))
+            taken += count
+            end = self.samples * taken // len(moments)
             part = SampleRange(begin, shift)
             renderer = Renderer(scene.root, scene.view, self.size, work, self.device, part)
-            *_, done = renderer.passes(count * share)
+            *_, done = renderer.passes(end - begin)
             mean += done.mean * np.float32(count / len(moments))
             counts += renderer.accumulator.host().counts
-            begin += count * share
+            begin = end
         return mean, counts
 
     def file(self, number: int, work: Work) -> bytes:

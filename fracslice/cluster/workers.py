@@ -12,7 +12,7 @@ from secrets import token_hex
 from typing import TYPE_CHECKING, Any
 
 from ..common.cache_files import warn
-from ..common.memory import keep_freed_memory
+from ..common.memory import keep_memory_of_tasks
 from ..errors import ClusterError
 from .identity import Identity
 from .pool import Pool, Task, run
@@ -70,7 +70,7 @@ def on_worker(pickled: bytes, pieces: ResultFolder, expected: Identity) -> None:
 
     if difference := Identity.here().difference(expected):
         raise UnfitWorkerError(get_worker().address, difference)
-    keep_freed_memory()  # Dask starts workers with MALLOC_TRIM_THRESHOLD_=65536
+    keep_memory_of_tasks()  # Dask starts workers with MALLOC_TRIM_THRESHOLD_=65536
     run(pickle.loads(pickled), pieces, Work(threads=1))
 
 

@@ -13,6 +13,9 @@ M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
 KEPT, LARGEST = 32 << 20, 4 << 20
 """Freed bytes that stay with the process, and the largest block among them."""
 
+KEPT_BY_TASKS, LARGEST_OF_TASKS = 512 << 20, 32 << 20
+"""The same in a worker, whose tasks have large arrays, one after another; glibc allows no larger block."""
+
 
 @cache
 def keep_freed_memory() -> None:
@@ -20,14 +23,24 @@ def keep_freed_memory() -> None:
 
     Laying pages anew takes an eighth of the CPU time of a mesh. Other C libraries are left as they are.
     """
+    _tell_glibc({M_TRIM_THRESHOLD: KEPT, M_MMAP_THRESHOLD: LARGEST})
+
+
+@cache
+def keep_memory_of_tasks() -> None:
+    """Let glibc reuse the memory of a task for the next one."""
+    _tell_glibc({M_TRIM_THRESHOLD: KEPT_BY_TASKS, M_MMAP_THRESHOLD: LARGEST_OF_TASKS})
+
+
+def _tell_glibc(values: dict[int, int]) -> None:
     if sys.platform != "linux":
         return
     import ctypes
 
     library = ctypes.CDLL(None)
     if hasattr(library, "mallopt"):
-        library.mallopt(M_TRIM_THRESHOLD, KEPT)
-        library.mallopt(M_MMAP_THRESHOLD, LARGEST)
+        for parameter, value in values.items():
+            library.mallopt(parameter, value)
 
 
 def peak_rss_mb() -> float:

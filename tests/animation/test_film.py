@@ -170,6 +170,28 @@ def test_an_open_shutter_averages_the_times_and_divides_the_samples() -> None:
     assert abs(open_shutter - expected).mean() < 0.3 * abs(closed - expected).mean()
 
 
+def test_a_frame_has_all_of_its_samples(tmp_path: Path) -> None:
+    """12 samples at 8 times: one or two at each."""
+    (tmp_path / "ball.xml").write_text(scene("sky", 'shutter="0.5" times="8"'))
+    exr = ["--frames", "0", "--exr", "--layers", "--samples", 12]
+    assert animate(tmp_path / "ball.xml", "-o", tmp_path / "out", *exr) == 0
+    with OpenEXR.File(str(tmp_path / "out/frame00000.exr"), separate_channels=True) as file:
+        assert file.channels()["Samples.V"].pixels.max() == 12
+
+
+def test_a_film_all_around_for_two_eyes() -> None:
+    """Two pictures side by side, of 360 degrees; their distance is an attribute that a track moves."""
+    eyes = '<track of="camera.stereo" keys="0s: 0; 1s: 1"/>'
+    text = scene(tracks=eyes).replace("<camera ", '<camera kind="equirectangular" ')
+    alpha = job(text).light(7, Work(1))[:, :, 3]
+    halves = alpha[:, :20].sum(0), alpha[:, 20:].sum(0)
+    left, right = (half @ np.arange(20) / half.sum() for half in halves)
+    expected = 20 * 2 * np.arctan(0.875 / 2 / 4) / (2 * np.pi)
+    assert left - right == pytest.approx(expected, rel=0.2), (
+        "the angle between the eyes at the ball's distance"
+    )
+
+
 def test_the_camera_of_a_frame_becomes_a_scene(path: Path, tmp_path: Path) -> None:
     assert animate(path, "-o", tmp_path / "at.xml", "--frames", "4") == 0
     at = read(tmp_path / "at.xml")
