@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 SHARED = {"cluster", "shard", "store"}
 OF_LAYERS = {*SHARED, "pixel", "machine", "picture", "html", "fix"}
-OF_MESHES = {"voxel", "resolution", "dust", "chord", "simplify"}
+OF_MESHES = {"voxel", "resolution", "dust", "chord", "simplify", "proved"}
 OF_SCENES = {*OF_MESHES, *SHARED, "settings", "size"}
 
 ACROSS = 256
@@ -184,7 +184,7 @@ def of_layers(of: Scene | Field, size: Sizing, how: Print, given: CheckOptions, 
         return numbers, lines, problems
     flags = " ".join(f"--{name} {value}" for name, value in settings.items())
     if smaller := settings.pop("size", None):
-        size = replace(size, side=float(smaller[:-2]) / max(size.factors), unit=None)
+        size = replace(size, side=float(smaller[:-2]), unit=None)
     values = {name: Print.kinds()[name].read(text) for name, text in settings.items()}
     after, again, left = examined(f"with {flags}", of, size, replace(how, **values), given, work)
     return {"before": numbers, "flags": flags, "after": after}, [*lines, *again], left
@@ -228,7 +228,7 @@ def shared_check(scene: Scene, job: SliceJob, given: CheckOptions, work: Work) -
     from fracslice.scene.writer import to_xml
 
     recipe = SliceRecipe(to_xml(scene), scene.name, job, given.layer[1], printer=given.machine)
-    run = recipe.run(work)
+    run = recipe.run(work, scene)
     return run.stack, check_run(run, given.limits)
 
 

@@ -149,7 +149,7 @@ def refuse_what_needs_triangles(output: str) -> None:
     if Path(output).suffix.lower() != ".3mf":
         raise click.UsageError(f"{output}: expected a file name that ends in .3mf, for --implicit")
     names = {"chord", "simplify", "colour", "dust", "report", "picture", "cache", "device", "material"}
-    names |= {"price", "cluster", "shard", "store"}
+    names |= {"price", "proved", "cluster", "shard", "store"}
     refuse_options(names, "only for meshes, and --implicit makes none")
 
 

@@ -30,10 +30,5 @@ def provider(role: str) -> Any:
     ----------
     role
         Role, such as "compiler".
-
-    Returns
-    -------
-    Any
-        The module.
     """
     return import_module(_MODULES[role])

@@ -56,10 +56,6 @@ def work_of(options: WorkOptions | Options, work: Work | None = None) -> Work:
     work : Work, optional
         Base record; the defaults of `Work` without it.
 
-    Returns
-    -------
-    Work
-
     Raises
     ------
     TypeError
@@ -84,10 +80,6 @@ def print_of(scene: Scene, options: Options) -> Print:
         The scene with its own print settings.
     options : Options
         Fields to override; None keeps the field of the scene.
-
-    Returns
-    -------
-    Print
     """
     return replace(scene.printing, **_given(options, PrintOptions))
 
@@ -98,11 +90,6 @@ def _given(options: Any, kind: type) -> dict[str, Any]:
 
 def keywords(function: Callable[P, R]) -> Callable[P, R]:
     """Decorate a function whose ``**options`` are a typed dictionary: list them in its signature.
-
-    Parameters
-    ----------
-    function : callable
-        The function.
 
     Returns
     -------

@@ -26,10 +26,6 @@ def resolve(source: Source) -> Node | Scene:
     source : Node, Scene, path or name
         A shape, a scene, a scene file, or the name of a shipped scene or formula.
 
-    Returns
-    -------
-    Node or Scene
-
     Raises
     ------
     SceneError
@@ -68,10 +64,6 @@ def as_scene(source: Source, size: AnyLength | None = None) -> Scene:
         A shape, a scene, a scene file, or the name of a shipped scene or formula.
     size : float or str, optional
         Longest side of a shape; by default, its scene unit is a millimetre.
-
-    Returns
-    -------
-    Scene
 
     Raises
     ------

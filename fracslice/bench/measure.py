@@ -30,8 +30,6 @@ def measured(method: str, what: Workload, resolution: int, work: Work) -> dict[s
     ----------
     method : str
         Name in `METHODS`.
-    what : Workload
-        The solid.
     resolution : int
         Voxels along the cube.
     work : Work
@@ -82,13 +80,6 @@ def errors(mesh: Mesh, what: Workload, resolution: int) -> dict[str, Any]:
 
 def spread(mesh: Mesh, count: int) -> np.ndarray:
     """Sample points on a surface, uniformly by area and deterministically.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The mesh.
-    count : int
-        Number of points.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Meshing methods that are compared."""
+"""Meshing methods that are compared: functions of a workload, the voxels along its cube, and the work."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from ..mesh import Mesh
 from ..mesh.extract import contour, extract
 from ..mesh.simplify import simplify
-from ..volume import sample
+from ..volume import Bricks, sample
 from ..work import Work
 from .workloads import Workload
 
@@ -21,88 +21,33 @@ Made = tuple[Mesh, int, int]
 
 
 def plain(what: Workload, resolution: int, work: Work) -> Made:
-    """Sparse float32 samples and marching cubes.
-
-    Parameters
-    ----------
-    what : Workload
-        The solid.
-    resolution : int
-        Voxels along the cube.
-    work : Work
-        Threads.
-
-    Returns
-    -------
-    Made
-        Mesh, evaluations, samples.
-    """
-    kernel = what.root.kernel()
-    bricks = sample(kernel, what.root.bounds, what.lattice(resolution), work)
+    """Sparse float32 samples and marching cubes."""
+    bricks = _sampled(what, resolution, work)
     return extract(bricks, work.threads), bricks.evaluations, bricks.values.size
 
 
 def exact(what: Workload, resolution: int, work: Work) -> Made:
     """Sparse float32 samples, with vertices on roots of the float64 field.
 
-    Parameters
-    ----------
-    what : Workload
-        The solid.
-    resolution : int
-        Voxels along the cube.
-    work : Work
-        Threads.
-
-    Returns
-    -------
-    Made
-        Mesh, evaluations, samples. Evaluations of the float64 field are not counted.
+    Evaluations of the float64 field are not counted.
     """
-    kernel = what.root.kernel()
-    bricks = sample(kernel, what.root.bounds, what.lattice(resolution), work)
+    bricks = _sampled(what, resolution, work)
     return contour(what.root, bricks, work), bricks.evaluations, bricks.values.size
 
 
+def _sampled(what: Workload, resolution: int, work: Work) -> Bricks:
+    return sample(what.root.kernel(), what.root.bounds, what.lattice(resolution), work)
+
+
 def simplified(what: Workload, resolution: int, work: Work) -> Made:
-    """The mesh of `exact`, simplified.
-
-    Parameters
-    ----------
-    what : Workload
-        The solid.
-    resolution : int
-        Voxels along the cube.
-    work : Work
-        Threads.
-
-    Returns
-    -------
-    Made
-        Mesh, evaluations, samples.
-    """
+    """The mesh of `exact`, simplified."""
     mesh, evaluations, kept = exact(what, resolution, work)
     fewer, _ = simplify(mesh, SIMPLIFY * what.voxel(resolution), work)
     return fewer, evaluations, kept
 
 
 def dense(what: Workload, resolution: int, work: Work) -> Made:
-    """Dense samples by our kernel and scikit-image's marching cubes.
-
-    Parameters
-    ----------
-    what : Workload
-        The solid.
-    resolution : int
-        Voxels along the cube.
-    work : Work
-        Threads.
-
-    Returns
-    -------
-    Made
-        Mesh, evaluations, samples.
-    """
+    """Dense samples by our kernel and scikit-image's marching cubes."""
     from skimage.measure import marching_cubes
 
     values, spacing = grid(what, resolution, work), (what.voxel(resolution),) * 3
@@ -113,15 +58,6 @@ def dense(what: Workload, resolution: int, work: Work) -> Made:
 
 def grid(what: Workload, resolution: int, work: Work) -> np.ndarray:
     """Sample the field at every grid point of the cube.
-
-    Parameters
-    ----------
-    what : Workload
-        The solid.
-    resolution : int
-        Voxels along the cube.
-    work : Work
-        Threads.
 
     Returns
     -------

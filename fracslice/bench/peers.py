@@ -29,16 +29,6 @@ class Peer:
     def read(cls, text: str) -> Peer:
         """Parse NAME=COMMAND.
 
-        Parameters
-        ----------
-        text : str
-            The text.
-
-        Returns
-        -------
-        Peer
-            The peer.
-
         Raises
         ------
         BenchError

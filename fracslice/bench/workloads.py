@@ -50,11 +50,6 @@ class Workload:
         ----------
         resolution : int
             Voxels along the cube.
-
-        Returns
-        -------
-        Lattice
-            The grid.
         """
         return Lattice.around(Box.centred(self.half), self.voxel(resolution))
 

@@ -132,7 +132,7 @@ class Pool(ABC):
         Yields
         ------
         bytes
-            NamedResult of each task.
+            Result of each task.
         """
         following, done = 0, set[int]()
         for index in self.make(tasks, work, stage):

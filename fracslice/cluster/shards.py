@@ -98,13 +98,7 @@ class Shard(Pool):
             yield index
 
     def finished(self, job: str) -> None:
-        """Remove the results of the job before, of which all shards are done; see `Pool.finished`.
-
-        Parameters
-        ----------
-        job : str
-            Key of the job.
-        """
+        """Remove the results of the job before, of which all shards are done; see `Pool.finished`."""
         if self.first:
             for old in self.finished_jobs:
                 self.pieces.remove(old)

@@ -93,11 +93,6 @@ class Kept:
             File name.
         make : callable
             Returns the contents.
-
-        Returns
-        -------
-        bytes
-            Contents.
         """
         data = self.get(name, _checked)
         if data is None:

@@ -21,11 +21,6 @@ def compiled(function: Callable[..., Any]) -> Any:
     Machine code is cached in the folder of the kernels unless other users can write there: Numba would load
     any file.
 
-    Parameters
-    ----------
-    function
-        Function to compile.
-
     Returns
     -------
     Callable

@@ -4,18 +4,6 @@
 def significant(value: float, digits: int = 3) -> str:
     """Format a number with a few significant digits, without an exponent where it is large.
 
-    Parameters
-    ----------
-    value : float
-        Number.
-    digits : int, optional
-        Significant digits.
-
-    Returns
-    -------
-    str
-        The number.
-
     Examples
     --------
     >>> significant(1938.7), significant(0.012345), significant(2e9, 2)
@@ -33,11 +21,6 @@ def counted(count: int, one: str, more: str = "") -> str:
         Number.
     one, more : str
         Singular and plural; the plural is the singular and an s if not given.
-
-    Returns
-    -------
-    str
-        The number and the noun.
 
     Examples
     --------

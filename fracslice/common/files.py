@@ -69,13 +69,15 @@ def check_target(path: str | Path) -> Path:
     Raises
     ------
     ExportError
-        If the folder is missing or not writable, or if `path` is itself a folder.
+        If the folder is missing or not writable, or if `path` is itself a folder, a device or a pipe.
     """
     target = Path(os.path.realpath(path))
     if not target.parent.is_dir():
         raise ExportError(f"{path}: the folder {target.parent} does not exist")
     if target.is_dir():
         raise ExportError(f"{path}: is a folder")
+    if target.exists() and not target.is_file():
+        raise ExportError(f"{path}: is a device or a pipe; expected a file, which is replaced")
     if not os.access(target.parent, os.W_OK | os.X_OK):
         raise ExportError(f"{path}: the folder {target.parent} is not writable")
     return target
@@ -123,13 +125,6 @@ def replacing(path: str | Path, mode: int | None = None) -> Iterator[BinaryIO]:
 
 def linked(source: str, path: str | Path) -> None:
     """Give a complete file another name atomically; copy it where the file system cannot link it.
-
-    Parameters
-    ----------
-    source
-        The file.
-    path
-        Its other name.
 
     Raises
     ------

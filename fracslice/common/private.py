@@ -48,11 +48,6 @@ def opened(
     folder
         Descriptor of the open folder of the file, as from `private_folder`.
 
-    Yields
-    ------
-    BinaryIO
-        Open file.
-
     Raises
     ------
     NotPrivateError
@@ -77,11 +72,6 @@ def private_folder(folder: Path) -> Iterator[int | None]:
 
     Descends from the root and keeps each folder open while it checks the next one, so that nothing already
     checked can be exchanged.
-
-    Parameters
-    ----------
-    folder
-        Folder.
 
     Yields
     ------

@@ -42,11 +42,6 @@ def weighted_quantiles(values: np.ndarray, weights: np.ndarray, *shares: float) 
         Their weights.
     *shares : float
         Shares, 0 to 1.
-
-    Returns
-    -------
-    list of float
-        One of the values for each share.
     """
     order = np.argsort(values, kind="stable")
     upto = np.cumsum(weights[order])

@@ -16,11 +16,6 @@ SIZE = 32
 def seal(text: str) -> str:
     """Return the mark of a text: its hash, keyed by this user's secret.
 
-    Parameters
-    ----------
-    text
-        Text to mark.
-
     Returns
     -------
     str

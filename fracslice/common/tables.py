@@ -19,10 +19,6 @@ def read_text(path: Path, fail: type[Exception], errors: str = "strict") -> str:
     errors : str, optional
         Treatment of invalid bytes, as of `open`.
 
-    Returns
-    -------
-    str
-
     Raises
     ------
     Exception

@@ -15,6 +15,8 @@ from ..version import __version__
 __all__ = ["FORMATS", "application", "check_format", "check_target", "flushing", "replacing", "write"]
 
 Write = Callable[[Mesh, BinaryIO, Mapping[str, str]], None]
+"""Writer of a format: the mesh, mm; a binary file, open for writing and able to seek; names and values of
+metadata, with Application among them."""
 
 
 def _writer(module: str) -> Write:

@@ -22,16 +22,7 @@ HEADERS = 1 << 16
 
 
 def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
-    """Write a mesh without normals, so that viewers use flat shading, as printed.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The mesh, mm.
-    file : file
-        Binary file, open for writing.
-    metadata : mapping of str to str
-        Names and values, with Application among them.
+    """Write a mesh without normals, so that viewers use flat shading, as printed; see `Write`.
 
     Raises
     ------

@@ -85,10 +85,6 @@ def write_image(
     layers : mapping of str to ndarray, float32 [height, width] or [height, width, 3], optional
         Further layers of an OpenEXR file; see `LAYERS`.
 
-    Returns
-    -------
-    Path
-
     Raises
     ------
     ExportError
@@ -122,10 +118,6 @@ def encoded_image(
         Extension, one of `IMAGES`.
     shown, light, bits, text, work, layers
         As for `write_image`.
-
-    Returns
-    -------
-    bytes
     """
     metadata = text or {}
     if ending in LOSSY:
@@ -152,10 +144,6 @@ def lossy(shown: np.ndarray, kind: str, text: Mapping[str, str]) -> bytes:
         The format.
     text : mapping of str to str
         Keywords and texts of the metadata.
-
-    Returns
-    -------
-    bytes
 
     Raises
     ------

@@ -73,10 +73,6 @@ def write_implicit(
     metadata : mapping of str to str
         Names and values.
 
-    Returns
-    -------
-    Path
-
     Raises
     ------
     ExportError

@@ -80,17 +80,7 @@ class SliceRun:
         return self.slicer_with(self.work)
 
     def slicer_with(self, work: Work) -> Slicer:
-        """Slicer of the stack with other threads.
-
-        Parameters
-        ----------
-        work : Work
-            Threads, progress and cancellation.
-
-        Returns
-        -------
-        Slicer
-        """
+        """Slicer of the stack with other threads."""
         return Slicer(self.stack, work) if self.sections == 1 else MeanSlicer(self.stack, work, self.sections)
 
     @property
@@ -105,10 +95,6 @@ class SliceRun:
         ----------
         form : str
             Name of the format.
-
-        Returns
-        -------
-        str
         """
         stack = [getattr(self.stack, f.name) for f in fields(self.stack) if f.name != "root"]
         screen = [getattr(self.screen, f.name) for f in fields(self.screen) if f.name != "stack"]
@@ -118,8 +104,18 @@ class SliceRun:
             *(self.resin, self.sections, sorted(self.metadata.items())),
         )
 
-    def describe(self) -> bytes:
-        """Manifest of the layers, as JSON."""
+    def describe(self, name: str = "") -> bytes:
+        """Manifest of the layers, as JSON.
+
+        Parameters
+        ----------
+        name : str
+            Begin of the names of their files.
+
+        Returns
+        -------
+        bytes
+        """
         stack, screen = self.stack, self.screen
         manifest = {
             "application": "fracslice",
@@ -134,7 +130,7 @@ class SliceRun:
             "compensation_mm": screen.compensation,
             "mirror": screen.mirror,
             "layers": [
-                {"file": f"{i:05d}.png", "top_mm": round(float(z), 6)} for i, z in enumerate(stack.tops)
+                {"file": f"{name}{i:05d}.png", "top_mm": round(float(z), 6)} for i, z in enumerate(stack.tops)
             ],
         }
         return json.dumps(manifest, indent=1).encode()

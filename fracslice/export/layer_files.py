@@ -86,13 +86,6 @@ def slice_format(path: str | Path, name: str | None = None) -> str:
 def printers_file(printer: Printer, output: str | Path) -> str:
     """Compare the file to write with the one that a printer reads.
 
-    Parameters
-    ----------
-    printer : Printer
-        The printer.
-    output : str or path
-        The file to write.
-
     Returns
     -------
     str
@@ -121,10 +114,6 @@ def write_slices(run: SliceRun, path: str | Path, name: str | None = None) -> Pa
     name : str, optional
         Name of the format; by default, the extension of `path` selects it.
 
-    Returns
-    -------
-    Path
-
     Raises
     ------
     ExportError
@@ -135,7 +124,7 @@ def write_slices(run: SliceRun, path: str | Path, name: str | None = None) -> Pa
         When the work is cancelled.
     """
     form = slice_format(path, name)
-    if run.sections > 1 and form not in PICTURES:
-        raise ExportError(f"{path}: contours are of one section per layer")
+    if form not in PICTURES and (run.sections > 1 or run.screen.compensation):
+        raise ExportError(f"{path}: contours are of one section per layer, without compensation")
     FORMATS[form].write(run, Path(path))
     return Path(path)

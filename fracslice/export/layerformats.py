@@ -36,11 +36,6 @@ class LayerFormat(ABC):
     def encoder(self, run: SliceRun) -> Encode:
         """Return the function that encodes the layers of a run.
 
-        Parameters
-        ----------
-        run : SliceRun
-            The run.
-
         Returns
         -------
         callable

@@ -12,17 +12,7 @@ from ..mesh.model import Mesh
 
 
 def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
-    """Write a mesh; every float32 coordinate survives.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The mesh, mm.
-    file : file
-        Binary file, open for writing.
-    metadata : mapping of str to str
-        Names and values, written as comments.
-    """
+    """Write a mesh, with metadata as comments; every float32 coordinate survives. See `Write`."""
     from trimesh.exchange.obj import export_obj
 
     header = "\n# ".join(

@@ -50,11 +50,6 @@ Fragment = Callable[[BinaryIO], Text]
 def deflated(text: bytes) -> tuple[bytes, Text]:
     """Deflate a text by itself.
 
-    Parameters
-    ----------
-    text : bytes
-        The text.
-
     Returns
     -------
     bytes
@@ -87,17 +82,7 @@ def append(blocks: tuple[bytes, Text], file: BinaryIO) -> Text:
 
 
 def followed(one: Text, other: Text) -> Text:
-    """Checksum and length of two texts, one after the other.
-
-    Parameters
-    ----------
-    one, other : Text
-        The texts.
-
-    Returns
-    -------
-    Text
-    """
+    """Checksum and length of two texts, one after the other."""
     return Text(crc32_combine(one.crc, other.crc, other.size), one.size + other.size)
 
 

@@ -9,17 +9,7 @@ from ..mesh.model import Mesh
 
 
 def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
-    """Write a mesh.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The mesh, mm.
-    file : file
-        Binary file, open for writing.
-    metadata : mapping of str to str
-        Names and values, written as comments.
-    """
+    """Write a mesh, with metadata as comments; see `Write`."""
     from trimesh.exchange.ply import export_ply
 
     data = export_ply(mesh.to_trimesh(), vertex_normal=False)

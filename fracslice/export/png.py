@@ -21,28 +21,12 @@ def encode(image: np.ndarray) -> bytes:
     ----------
     image : ndarray, uint8 [rows, columns]
         The picture.
-
-    Returns
-    -------
-    bytes
     """
     return _file((image.shape[0], image.shape[1]), encoded(image, Encoding.PNG))
 
 
 def encode_layer(run: SliceRun, layer: Layer) -> bytes:
-    """Encode the picture of a layer as a PNG file.
-
-    Parameters
-    ----------
-    run : SliceRun
-        The run of the layer.
-    layer : Layer
-        The layer.
-
-    Returns
-    -------
-    bytes
-    """
+    """Encode the picture of a layer as a PNG file."""
     return _file(run.screen.shape, run.screen.encoded(layer, Encoding.PNG))
 
 

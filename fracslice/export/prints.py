@@ -19,6 +19,7 @@ from .._slices import Encoding
 from ..background import ahead, in_background
 from ..common.files import flushing, replacing
 from ..errors import ExportError
+from ..formulas.conversion import printable
 from ..slicing import Layer
 from ..slicing.printers import Printer
 from .jobs import SliceRun
@@ -183,16 +184,16 @@ class PrintFormat(LayerFormat):
             flushing(file),
         ):
             assert run.screen.printer and run.resin
-            self.assemble(PrintData(run, path.stem, run.screen.printer, run.resin, journal, picture), file)
+            name = printable(path.stem)
+            job = PrintData(run, name, run.screen.printer, run.resin, journal, picture)
+            self.assemble(job, file)
+            run.slicer.areas.update(
+                enumerate(job.areas.tolist())
+            )  # those of an earlier or another process, too
 
 
 def by_pixels(encoding: Encoding) -> Callable[[SliceRun, Layer], bytes]:
     """Return the function that encodes the picture of a layer of a run.
-
-    Parameters
-    ----------
-    encoding : Encoding
-        Encoding of the pixels.
 
     Returns
     -------

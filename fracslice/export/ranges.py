@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import TYPE_CHECKING, ClassVar, Protocol, Self
 
 from ..common.digits import counted
 from ..errors import ClusterError, ExportError, SharedError
@@ -37,11 +37,6 @@ class Recipe(Hashable, Protocol):
     def run(self, work: Work) -> SliceRun:
         """Plan the run.
 
-        Parameters
-        ----------
-        work : Work
-            Threads.
-
         Returns
         -------
         SliceRun
@@ -50,11 +45,6 @@ class Recipe(Hashable, Protocol):
 
     def encoder(self, run: SliceRun) -> Encode:
         """Return the function that encodes the layers of a run in this format.
-
-        Parameters
-        ----------
-        run : SliceRun
-            The run.
 
         Returns
         -------
@@ -69,6 +59,8 @@ class RangeTask:
 
     Attributes
     ----------
+    stage : str
+        First part of its name.
     recipe : Recipe
         The run.
     job : str
@@ -77,6 +69,7 @@ class RangeTask:
         Range.
     """
 
+    stage: ClassVar[str] = "layers"
     recipe: Recipe
     job: str
     first: int
@@ -113,7 +106,7 @@ class RangeTask:
     @property
     def name(self) -> str:
         """Name of the range."""
-        return f"layers-{self.first:06}-{self.end:06}"
+        return f"{self.stage}-{self.first:06}-{self.end:06}"
 
     def planned(self, form: str) -> SliceRun:
         """The run, planned once in a process.
@@ -122,10 +115,6 @@ class RangeTask:
         ----------
         form : str
             Format of the layers.
-
-        Returns
-        -------
-        SliceRun
 
         Raises
         ------
@@ -186,11 +175,6 @@ def encoded_layers(run: SliceRun, form: str, encode: Encode, start: int) -> Iter
         Encodes a layer.
     start : int
         First layer.
-
-    Yields
-    ------
-    bytes
-        Encoded layers.
     """
     pool = run.work.cluster
     if pool is None:
@@ -207,11 +191,6 @@ def encoded_layers(run: SliceRun, form: str, encode: Encode, start: int) -> Iter
 
 def range_size(run: SliceRun) -> int:
     """Layers of a range, the same for any number of workers.
-
-    Parameters
-    ----------
-    run : SliceRun
-        The run.
 
     Returns
     -------

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..common.tables import read_table, read_text
 from ..errors import ExportError
-from ..formulas.parameters import REQUIRED, Count, Number
+from ..formulas.parameters import REQUIRED, Count, Number, Text
 from ..formulas.records import attribute, from_table, validate
 from ..slicing.printers import Printer
 
@@ -53,7 +53,7 @@ class Resin:
 
     exposure: float = attribute(Number, REQUIRED, "seconds of each layer", above=0, most=1000)
     bottom_exposure: float = attribute(Number, REQUIRED, "seconds of each bottom layer", above=0, most=1000)
-    name: str = "unknown"
+    name: str = attribute(Text, "unknown", "name of the resin")
     bottom_layers: int = attribute(Count, 5, "bottom layers", most=200)
     transition_layers: int = attribute(Count, 5, "transition layers", most=200)
     lift: float = attribute(Number, 5.0, "mm after each layer", above=0, most=100)
@@ -69,11 +69,6 @@ class Resin:
     def exposures(self, layers: int) -> NDArray[np.float64]:
         """Exposure of each layer.
 
-        Parameters
-        ----------
-        layers : int
-            Number of layers.
-
         Returns
         -------
         float64 [layers]
@@ -84,18 +79,7 @@ class Resin:
         return self.bottom_exposure + share * (self.exposure - self.bottom_exposure)
 
     def seconds(self, layers: int) -> float:
-        """Duration of a print.
-
-        Parameters
-        ----------
-        layers : int
-            Number of layers.
-
-        Returns
-        -------
-        float
-            Seconds.
-        """
+        """Duration of a print."""
         motion = 60 * self.lift * (1 / self.lift_speed + 1 / self.retract_speed)
         return float(self.exposures(layers).sum() + layers * (motion + self.wait))
 
@@ -112,10 +96,6 @@ def resin(name: str, printer: Printer | None, layer: float) -> Resin:
         The printer.
     layer : float
         Layer height, mm; the nearest one in the table counts.
-
-    Returns
-    -------
-    Resin
 
     Raises
     ------
@@ -171,10 +151,6 @@ def moving(resin: Resin, printer: Printer | None, but: Collection[tuple[str, Any
         The printer.
     but : collection of (str, value), optional
         Settings that stay.
-
-    Returns
-    -------
-    Resin
     """
     if printer is None:
         return resin
@@ -193,10 +169,6 @@ def of_table(where: str, values: Mapping[str, Any]) -> Resin:
         File, for messages.
     values : mapping
         Attributes of `Resin`.
-
-    Returns
-    -------
-    Resin
 
     Raises
     ------
@@ -220,8 +192,8 @@ def _of_ini(path: Path) -> Resin:
                 settings[name] = float(values[key]) * times
             except ValueError:
                 raise ExportError(f"{path}: {key} = {values[key]}: expected a number") from None
-    if "transition_layers" in settings:
-        settings["transition_layers"] = int(settings["transition_layers"])
+    if (layers := settings.get("transition_layers", 0.5)).is_integer():
+        settings["transition_layers"] = int(layers)
     return of_table(str(path), settings)
 
 

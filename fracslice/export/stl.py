@@ -18,16 +18,7 @@ BLOCK = 1 << 18
 
 
 def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
-    """Write a mesh.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The mesh, mm.
-    file : file
-        Binary file, open for writing and able to seek.
-    metadata : mapping of str to str
-        Names and values; the header holds Application.
+    """Write a mesh, with Application in the header; see `Write`.
 
     Raises
     ------
@@ -38,22 +29,7 @@ def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
 
 
 def write_pieces(meshes: Iterable[Mesh], file: BinaryIO, metadata: Mapping[str, str]) -> None:
-    """Write a mesh piece by piece, with one piece in memory at a time.
-
-    Parameters
-    ----------
-    meshes : iterable of Mesh
-        The pieces, mm.
-    file : file
-        Binary file, open for writing and able to seek.
-    metadata : mapping of str to str
-        Names and values; the header holds Application.
-
-    Raises
-    ------
-    ExportError
-        For more than 4294967295 triangles.
-    """
+    """Write a mesh, mm, piece by piece, with one piece in memory at a time; see `write`."""
     start, count = file.tell(), 0
     head = header(0, metadata)
     file.write(head)

@@ -146,10 +146,6 @@ def vertex_rows(vertices: NDArray[np.float32]) -> Iterator[bytes]:
     ----------
     vertices : ndarray of float32, shape (n, 3)
         Vertices, mm.
-
-    Returns
-    -------
-    iterator of bytes
     """
     return rows('<vertex x="%.9g" y="%.9g" z="%.9g"/>\n', vertices)
 
@@ -161,9 +157,5 @@ def triangle_rows(triangles: NDArray[np.integer]) -> Iterator[bytes]:
     ----------
     triangles : ndarray of int, shape (n, 3)
         Indices of vertices.
-
-    Returns
-    -------
-    iterator of bytes
     """
     return rows('<triangle v1="%d" v2="%d" v3="%d"/>\n', triangles)

@@ -6,6 +6,7 @@ import math
 
 from .box import Box
 from .field import Bounds
+from .hooks import always_keeps_sign
 from .parameters import REQUIRED, Number, Vector
 from .registry import Fixed, Node, domain_operator
 from .vocabulary import absolute, any_of, floor, maximum, minimum
@@ -52,9 +53,7 @@ def bounds_arguments(node: Node) -> dict[str, object]:
     return {"centre": box.centre, "half": half, "margin": max(half) / 4}
 
 
-@bounds.keeps_sign
-def bounds_keeps_sign(_: Node) -> bool:
-    return True
+bounds.keeps_sign(always_keeps_sign)
 
 
 @bounds.bounds
@@ -103,10 +102,6 @@ def moved_slope(inner: Bounds, distance: float) -> float:
         Bounds of the field.
     distance : float
         The constant, scene units.
-
-    Returns
-    -------
-    float
     """
     n = inner.steepening
     # The stretch along circles of latitude ends within 1/n, in narrow rings within 3/n^2.
@@ -201,9 +196,7 @@ def repeat_arguments(node: Node) -> dict[str, object]:
     }
 
 
-@repeat.keeps_sign
-def repeat_keeps_sign(_: Node) -> bool:
-    return True
+repeat.keeps_sign(always_keeps_sign)
 
 
 @repeat.bounds

@@ -132,10 +132,6 @@ def csg_slope(node: Node) -> float:
     ----------
     node : Node
         A union, intersection or difference.
-
-    Returns
-    -------
-    float
     """
     fields = [child.bounds for child in node.children]
     seams = not (csg_unordered(node) or _needs_conservative(node))

@@ -198,15 +198,6 @@ def _located(
 def definitions(root: Node) -> list[Definition]:
     """Definitions of a tree's formulas, in the order of the tree.
 
-    Parameters
-    ----------
-    root : Node
-        Tree.
-
-    Returns
-    -------
-    list of Definition
-
     Raises
     ------
     SceneError

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 from .box import Box
+from .hooks import always_keeps_sign
 from .parameters import REQUIRED, SMALLEST, Axis, Number
 from .registry import Node, domain_operator
 from .transforms import chosen_axis
@@ -67,9 +68,7 @@ def twist_arguments(node: Node) -> dict[str, object]:
     }
 
 
-@twist.keeps_sign
-def twist_keeps_sign(_: Node) -> bool:
-    return True
+twist.keeps_sign(always_keeps_sign)
 
 
 @twist.bounds
@@ -164,9 +163,7 @@ def bend_arguments(node: Node) -> dict[str, object]:
     }
 
 
-@bend.keeps_sign
-def bend_keeps_sign(_: Node) -> bool:
-    return True
+bend.keeps_sign(always_keeps_sign)
 
 
 @bend.bounds

@@ -31,11 +31,6 @@ def evaluated(function: Callable[..., Any]) -> Callable[..., Any]:
     ----------
     function : callable
         Function of numbers; NaN stands for one that is no constant of the code.
-
-    Returns
-    -------
-    callable
-        The function.
     """
     EVALUATED.add(function)
     return function

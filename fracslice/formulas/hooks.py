@@ -13,6 +13,11 @@ if TYPE_CHECKING:
 Hook = Callable[..., Any]
 
 
+def always_keeps_sign(_: Node) -> bool:
+    """Hook `keeps_sign` of operators that keep it for all parameters."""
+    return True
+
+
 class Hooks:
     """Decorators that set the hooks of a formula. Each takes the function and returns it.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from .box import Box
+from .hooks import always_keeps_sign
 from .palettes import OWN, PALETTES
 from .parameters import Choice, File, Number, Vector
 from .registry import Node, domain_operator
@@ -59,9 +60,7 @@ def material(child, x, y, z):  # type: ignore[no-untyped-def]
     return child(x, y, z)
 
 
-@material.keeps_sign
-def material_keeps_sign(_: Node) -> bool:
-    return True
+material.keeps_sign(always_keeps_sign)
 
 
 @material.bounds

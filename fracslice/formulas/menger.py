@@ -72,10 +72,6 @@ def menger_visible(node: Node, voxel: float) -> Node:
         A Menger sponge.
     voxel : float
         Voxel size in the node's own units.
-
-    Returns
-    -------
-    Node
     """
     deepest = max(math.ceil(math.log(2.0 / voxel, 3.0) - 1e-6) - 1, 0)
     return node if node["level"] <= deepest else node.changed(level=deepest)

@@ -67,15 +67,6 @@ def _registered(parameters: dict[str, Any]) -> Callable[[Callable[..., Any]], Fo
 def grown(node: Node) -> Growth:
     """`kernel.growth.Growth` of a node's orbits.
 
-    Parameters
-    ----------
-    node : Node
-        Orbit.
-
-    Returns
-    -------
-    Growth
-
     Raises
     ------
     SceneError
@@ -99,10 +90,6 @@ def rounds(node: Node) -> int:
     ----------
     node : Node
         Orbit.
-
-    Returns
-    -------
-    int
     """
     return 1 if node["iterations"] == AUTO else int(node["iterations"])
 

@@ -26,11 +26,6 @@ def run_file(path: str) -> list[Formula]:
     path : str
         The file. It is a program, and may do whatever a program may.
 
-    Returns
-    -------
-    list of Formula
-        The formulas of the file.
-
     Raises
     ------
     SceneError

@@ -34,11 +34,6 @@ counts. A smaller value costs fewer evaluations, but makes the level sets steepe
 def products_step(node: Node) -> Stepped:
     """Return the step of an orbit with a `power`: a whole one is a constant of its code.
 
-    Parameters
-    ----------
-    node : Node
-        Orbit.
-
     Returns
     -------
     (callable, dict, tuple or None)

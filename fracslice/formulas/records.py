@@ -23,11 +23,6 @@ def attribute(kind: type[Parameter], *values: Any, **limits: Any) -> Any:
         Default and description.
     **limits
         Further arguments of the class.
-
-    Returns
-    -------
-    Any
-        The field.
     """
     made = kind(*values, **limits)
     return field(default=made.default, metadata={"kind": made})

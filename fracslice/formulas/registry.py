@@ -244,10 +244,6 @@ def register(
     **known
         Other attributes of the formula.
 
-    Returns
-    -------
-    callable
-
     Raises
     ------
     SceneError

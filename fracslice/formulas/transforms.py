@@ -9,6 +9,7 @@ import numpy as np
 
 from .algebra import inverse, length, product, stretches
 from .box import Box
+from .hooks import always_keeps_sign
 from .parameters import REQUIRED, SMALLEST, Axis, Vector
 from .registry import Fixed, Node, domain_operator
 from .vocabulary import absolute
@@ -109,9 +110,7 @@ def transform_arguments(node: Node) -> dict[str, object]:
     return {"back": tuple(flat), "shrink": float(stretches(linear)[-1])}
 
 
-@transform.keeps_sign
-def transform_keeps_sign(_: Node) -> bool:
-    return True
+transform.keeps_sign(always_keeps_sign)
 
 
 @transform.bounds
@@ -154,9 +153,7 @@ def mirror_arguments(node: Node) -> dict[str, object]:
     return {"axis": chosen_axis(node)}
 
 
-@mirror.keeps_sign
-def mirror_keeps_sign(_: Node) -> bool:
-    return True
+mirror.keeps_sign(always_keeps_sign)
 
 
 @mirror.bounds

@@ -56,11 +56,6 @@ Verb = Callable[..., Any]
 def over(verb: Verb) -> Callable[[Verb], Verb]:
     """Decorate the stretch of a verb over a ball.
 
-    Parameters
-    ----------
-    verb : callable
-        The verb.
-
     Returns
     -------
     callable

@@ -91,11 +91,6 @@ class Check:
     def passing(self, pieces: Iterable[Finished]) -> Iterator[Mesh]:
         """Pass pieces on and check them.
 
-        Parameters
-        ----------
-        pieces : iterable of Finished
-            Finished pieces.
-
         Yields
         ------
         Mesh

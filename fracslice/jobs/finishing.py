@@ -147,11 +147,6 @@ class Finish:
         ----------
         tally : Tally
             Sums over all pieces.
-
-        Returns
-        -------
-        MeshReport
-            The report.
         """
         hollow = self.shells.volumes < 0
         bodies, cavities = int((self.stays & ~hollow).sum()), int((self.stays & hollow).sum())

@@ -62,10 +62,6 @@ def make_implicit(
     work : Work, optional
         Threads and cancellation.
 
-    Returns
-    -------
-    Implicit
-
     Raises
     ------
     SceneError, KernelError, VolumeError, ExportError, Cancelled

@@ -153,10 +153,6 @@ class Selection:
             Folder with the files of the job.
         job : str
             Key of the job.
-
-        Returns
-        -------
-        StoredPieces
         """
         return StoredPieces(pieces, job, prefix=self.prefix)
 
@@ -169,19 +165,7 @@ class Selection:
 
 @lru_cache(maxsize=1)
 def read_choice(pieces: ResultFolder, job: str) -> Selection:
-    """Selection of the bodies of a job from its file, read once in a process.
-
-    Parameters
-    ----------
-    pieces : ResultFolder
-        Folder with the files of the job.
-    job : str
-        Key of the job.
-
-    Returns
-    -------
-    Selection
-    """
+    """Selection of the bodies of a job from its file, read once in a process."""
     files = unpacked(pieces.read(job, CHOICE))
     prefix, stride = str(files.pop("prefix")), int(files.pop("stride"))
     return Selection(prefix=prefix, stride=stride, **files)
@@ -210,19 +194,7 @@ class StoredShells(NamedTuple):
 
 @lru_cache(maxsize=1)
 def read_shells(pieces: ResultFolder, job: str) -> StoredShells:
-    """Shells of a job from its file, read once in a process.
-
-    Parameters
-    ----------
-    pieces : ResultFolder
-        Folder with the files of the job.
-    job : str
-        Key of the job.
-
-    Returns
-    -------
-    StoredShells
-    """
+    """Shells of a job from its file, read once in a process."""
     files = unpacked(pieces.read(job, SHELLS))
     searched, prefix, labels = files.pop("searched"), str(files.pop("prefix")), files.pop("labels")
     return StoredShells(WholeShells(**files), searched, prefix, labels)

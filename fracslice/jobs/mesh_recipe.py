@@ -66,7 +66,7 @@ class Sampled:
     signs : SignBricks
         Its samples.
     contours : SurfaceContours
-        ResultFolder of its surface.
+        Pieces of its surface.
     """
 
     planned: Plan
@@ -75,22 +75,7 @@ class Sampled:
 
 
 def samples_key(recipe: MeshRecipe, root_key: str, signs: SignBricks) -> str:
-    """Key of a sampled field.
-
-    Parameters
-    ----------
-    recipe : MeshRecipe
-        The mesh.
-    root_key : str
-        Key of its field.
-    signs : SignBricks
-        Its samples.
-
-    Returns
-    -------
-    str
-        The key.
-    """
+    """Key of a sampled field."""
     return key(program(), recipe, root_key, signs.origin, signs.voxel, signs.ijk, signs.signs)
 
 
@@ -99,17 +84,7 @@ _planned = lru_cache(maxsize=2)(MeshRecipe.plan)
 
 
 def plan_of(recipe: MeshRecipe) -> Plan:
-    """Plan of a recipe, made once in a process.
-
-    Parameters
-    ----------
-    recipe : MeshRecipe
-        The mesh.
-
-    Returns
-    -------
-    Plan
-    """
+    """Plan of a recipe, made once in a process."""
     with _READING:
         return _planned(recipe)
 
@@ -125,10 +100,6 @@ def sampled(recipe: MeshRecipe, pieces: ResultFolder, job: str) -> Sampled:
         Folder with the files of the job.
     job : str
         Key of the job.
-
-    Returns
-    -------
-    Sampled
 
     Raises
     ------

@@ -72,17 +72,7 @@ class SampleTask:
 
 
 def corners_file(step: int) -> str:
-    """Name of the file with the corners of a set of bricks.
-
-    Parameters
-    ----------
-    step : int
-        Number of the set.
-
-    Returns
-    -------
-    str
-    """
+    """Name of the file with the corners of a set of bricks."""
     return f"corners-{step:03}"
 
 

@@ -56,10 +56,6 @@ class Summary:
         ----------
         files : dict
             Arrays by name.
-
-        Returns
-        -------
-        Summary
         """
         head, tail = (Mesh(files[f"{side}_vertices"], files[f"{side}_triangles"]) for side in SEAMS)
         whole = PieceComponents(**{name: files[name] for name in PieceComponents.__dataclass_fields__})

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from abc import ABC, abstractmethod
 from dataclasses import asdict, dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +43,8 @@ class MeshTask(ABC):
 
     Attributes
     ----------
+    stage : str
+        First part of its name.
     recipe : MeshRecipe
         The mesh.
     pieces : ResultFolder
@@ -52,15 +55,16 @@ class MeshTask(ABC):
         Index of the piece.
     """
 
+    stage: ClassVar[str]
     recipe: MeshRecipe
     pieces: ResultFolder
     job: str
     number: int
 
     @property
-    @abstractmethod
     def name(self) -> str:
         """Name of the task."""
+        return f"{self.stage}-{self.number:05}"
 
     @abstractmethod
     def make(self, work: Work) -> Contents:
@@ -77,13 +81,9 @@ class ContourTask(MeshTask):
         Layers of bricks, last excluded.
     """
 
+    stage = "surface"
     first: int
     last: int
-
-    @property
-    def name(self) -> str:
-        """Name of the task."""
-        return f"surface-{self.number:05}"
 
     def make(self, work: Work) -> Contents:
         """Summary of the piece; see `Task.make`."""
@@ -129,10 +129,7 @@ class JoinTask(MeshTask):
 class NestTask(MeshTask):
     """Searches the surroundings of the shells whose rays are in a piece."""
 
-    @property
-    def name(self) -> str:
-        """Name of the task."""
-        return f"nesting-{self.number:05}"
+    stage = "nesting"
 
     def make(self, work: Work) -> Contents:
         """Winding numbers and parents; see `Task.make`."""
@@ -145,10 +142,7 @@ class NestTask(MeshTask):
 class FinishTask(MeshTask):
     """Cleans and checks a piece."""
 
-    @property
-    def name(self) -> str:
-        """Name of the task."""
-        return f"finished-{self.number:05}"
+    stage = "finished"
 
     def make(self, work: Work) -> Contents:
         """Measures; the triangles are a file of their own, see `finished_mesh`. See `Task.make`."""
@@ -246,10 +240,6 @@ def finished_file(number: int) -> str:
     ----------
     number : int
         Index of the piece; that of the triangles at tips follows the last one.
-
-    Returns
-    -------
-    str
     """
     return f"finished{number}"
 
@@ -261,10 +251,6 @@ def far_file(turn: int) -> str:
     ----------
     turn : int
         How many times the reach has grown.
-
-    Returns
-    -------
-    str
     """
     return f"far{turn}"
 

@@ -69,11 +69,6 @@ class Writing:
         finish : Finish
             Selection and placement.
 
-        Returns
-        -------
-        Made
-            The mesh.
-
         Raises
         ------
         MeshError, ExportError, Cancelled
@@ -167,11 +162,6 @@ class Writing:
 
 def metadata(scene: Scene) -> dict[str, str]:
     """Metadata of files made from a scene.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
 
     Returns
     -------

@@ -51,11 +51,6 @@ def planned(scene: Scene, what: MeshJob, size: Sizing, clock: Clock) -> Sized:
     clock : Clock
         Threads, progress, cancellation and timing.
 
-    Returns
-    -------
-    Sized
-        The plan.
-
     Raises
     ------
     SceneError, VolumeError, Cancelled

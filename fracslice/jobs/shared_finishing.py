@@ -126,17 +126,7 @@ def finished(surface: SharedSurface, finish: Finish) -> tuple[SharedCheck, Itera
 
 
 def finish_tasks(surface: SharedSurface) -> list[FinishTask]:
-    """Tasks that finish the pieces.
-
-    Parameters
-    ----------
-    surface : SharedSurface
-        The surface.
-
-    Returns
-    -------
-    list of FinishTask
-    """
+    """Tasks that finish the pieces."""
     return [
         FinishTask(surface.recipe, surface.pool.pieces, surface.job, number)
         for number in range(len(surface.pieces))

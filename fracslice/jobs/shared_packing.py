@@ -41,12 +41,8 @@ class NumberTask(MeshTask):
         Index of the triangles at tips; 0 if there are none.
     """
 
+    stage = "numbered"
     tips: int
-
-    @property
-    def name(self) -> str:
-        """Name of the task."""
-        return f"numbered-{self.number:05}"
 
     def make(self, work: Work) -> Contents:
         """Counts, and the numbers of vertices at tips, -1 for those of other pieces; see `Task.make`."""
@@ -118,10 +114,7 @@ class EncodeTask(MeshTask):
 class EncodeVertices(EncodeTask):
     """Deflates rows of vertices."""
 
-    @property
-    def name(self) -> str:
-        """Name of the task."""
-        return f"encoded-vertices-{self.number:05}"
+    stage = "encoded-vertices"
 
     def rows(self, table: Files, begin: int, end: int) -> Iterator[bytes]:
         """Text of rows, in blocks; see `EncodeTask.rows`."""
@@ -137,10 +130,7 @@ class EncodeVertices(EncodeTask):
 class EncodeTriangles(EncodeTask):
     """Deflates rows of triangles."""
 
-    @property
-    def name(self) -> str:
-        """Name of the task."""
-        return f"encoded-triangles-{self.number:05}"
+    stage = "encoded-triangles"
 
     def rows(self, table: Files, begin: int, end: int) -> Iterator[bytes]:
         """Text of rows, in blocks; see `EncodeTask.rows`."""

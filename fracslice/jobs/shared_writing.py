@@ -35,10 +35,7 @@ ROWS = 160 * PAGE // 2
 class PlaceTask(MeshTask):
     """Writes a range of the triangles to its place in the STL file."""
 
-    @property
-    def name(self) -> str:
-        """Name of the task."""
-        return f"placed-{self.number:05}"
+    stage = "placed"
 
     def make(self, work: Work) -> Contents:
         """Write the range; the result is empty. See `Task.make`."""

@@ -23,10 +23,7 @@ FORM = "checks"
 class CheckTask(RangeTask):
     """Layers `first` to `end` - 1 of a run, each examined by itself."""
 
-    @property
-    def name(self) -> str:
-        """Name of the range."""
-        return f"checked-{self.first:06}-{self.end:06}"
+    stage = "checked"
 
     def make(self, work: Work) -> Contents:
         """Components and widths of the layers; see `Task.make`."""
@@ -39,13 +36,6 @@ class CheckTask(RangeTask):
 
 def check_run(run: SliceRun, limits: Limits | None = None) -> PrintReport:
     """Check the layers of a run, by the pool of its work if there is one.
-
-    Parameters
-    ----------
-    run : SliceRun
-        The run.
-    limits : Limits, optional
-        Limits of the checks.
 
     Returns
     -------

@@ -10,6 +10,7 @@ from ..export.jobs import EPOCH, SliceRun
 from ..export.layer_files import FORMATS
 from ..export.ranges import Encode
 from ..export.resins import Resin
+from ..scene import Scene
 from ..scene.reader import reads
 from ..slicing.printers import Printer
 from ..slicing.raster import Screen
@@ -54,24 +55,15 @@ class SliceRecipe:
     levels: int = 255
     blur: int = 0
 
-    def run(self, work: Work) -> SliceRun:
-        """Plan the layers.
+    def run(self, work: Work, scene: Scene | None = None) -> SliceRun:
+        """Plan the layers; see `Recipe.run`.
 
         Parameters
         ----------
-        work : Work
-            Threads, progress and cancellation.
-
-        Returns
-        -------
-        SliceRun
-
-        Raises
-        ------
-        SceneError, SliceError, VolumeError, Cancelled
-            For a scene or settings that cannot be sliced.
+        scene : Scene, optional
+            The same scene as it was read: its errors name places in its file.
         """
-        scene = reads(self.scene, self.name)
+        scene = scene or reads(self.scene, self.name)
         stack = slicing.plan_stack(scene.root, self.job, work)
         if self.most is not None:
             stack = slicing.adapted(stack, self.most, work)
@@ -84,16 +76,5 @@ class SliceRecipe:
         return SliceRun(stack, screen, work, self.resin, *files, self.sections, self)
 
     def encoder(self, run: SliceRun) -> Encode:
-        """Return the function that encodes the layers of a run in this format.
-
-        Parameters
-        ----------
-        run : SliceRun
-            The run.
-
-        Returns
-        -------
-        callable
-            Function of a layer.
-        """
+        """Return the function that encodes the layers of a run in this format; see `Recipe.encoder`."""
         return FORMATS[self.form].encoder(run)

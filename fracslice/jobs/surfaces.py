@@ -95,11 +95,6 @@ def sampled(planned: Plan, clock: Clock, evaluate: Evaluate | None = None) -> Si
         Threads, progress, cancellation and timing.
     evaluate : callable, optional
         As for `sample_signs`.
-
-    Returns
-    -------
-    SignBricks
-        Signs.
     """
     from ..volume import sample_scene_signs
 

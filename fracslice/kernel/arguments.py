@@ -43,11 +43,6 @@ def arguments(node: Node, leading: int) -> Arguments:
     leading
         Number of the function's arguments that are points, values or a child.
 
-    Returns
-    -------
-    Arguments
-        Function and arguments.
-
     Raises
     ------
     KernelError

@@ -20,22 +20,7 @@ class ArrayField(Field, Protocol):
     """Field whose kernel evaluates arrays."""
 
     def loops(self, loops: Sequence[Loop], precision: Precision, device: Device = "cpu") -> Loops:
-        """Run loops over the field by NumPy, with all points as one vector.
-
-        Parameters
-        ----------
-        loops
-            Loops to run.
-        precision
-            "float32" or "float64".
-        device
-            Not used: the CPU runs them.
-
-        Returns
-        -------
-        Loops
-            Loops by name, with one lane.
-        """
+        """Run loops over the field by NumPy, with all points as one vector; see `Field.loops`."""
         kernel = self.kernel("cpu", precision)
         return Loops(1, BATCH, {loop.name: ArrayLoop(loop, kernel) for loop in loops})
 
@@ -60,16 +45,5 @@ class ArrayLoop:
             self.loop.function(self.kernel.points, frame, *rows, *out, *numbers, rows.shape[1])
 
     def native(self, frame: np.ndarray) -> Callable[..., None]:
-        """Return the loop for native code.
-
-        Parameters
-        ----------
-        frame
-            Frame of the loop.
-
-        Returns
-        -------
-        Callable
-            Python function of the loop's other arguments.
-        """
+        """Return the loop for native code; see `FieldLoop.native`."""
         return partial(self, frame)

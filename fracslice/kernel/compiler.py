@@ -59,11 +59,6 @@ def compile_object(linked: Linked, target: Target, loops: Sequence[Loop]) -> byt
     loops
         Loops to compile.
 
-    Returns
-    -------
-    bytes
-        Object file.
-
     Raises
     ------
     KernelError

@@ -118,18 +118,7 @@ class CompiledLoop:
         self.function(self.parameters, frame, *rows, *out, *numbers, rows.shape[1])
 
     def native(self, frame: np.ndarray) -> tuple[Function, np.ndarray, np.ndarray]:
-        """Return the loop for native code.
-
-        Parameters
-        ----------
-        frame
-            Frame of the loop.
-
-        Returns
-        -------
-        tuple
-            Machine code, parameters and frame.
-        """
+        """Return the loop for native code; see `FieldLoop.native`."""
         return self.function, self.parameters, frame
 
 

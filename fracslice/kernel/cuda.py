@@ -114,23 +114,5 @@ _kernel = lru_cache(maxsize=32)(CudaKernel)
 
 
 def compile_scene(root: Node, precision: Precision = "float32") -> CudaKernel:
-    """Compile the kernel of a scene tree for the GPU.
-
-    Parameters
-    ----------
-    root
-        Scene with resolved depths.
-    precision
-        "float32" or "float64".
-
-    Returns
-    -------
-    CudaKernel
-        Compiled field.
-
-    Raises
-    ------
-    KernelError
-        If the scene cannot be linked or compiled, or no GPU can be used.
-    """
+    """Compile the kernel of a scene tree for the GPU; see `cpu.compile_scene`."""
     return _kernel(link(root), precision)

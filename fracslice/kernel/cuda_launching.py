@@ -71,44 +71,13 @@ class CudaLoop:
         launched(self.loop, count, self.parameters, frame, *arguments, count)
 
     def native(self, frame: np.ndarray) -> Callable[..., None]:
-        """Return a function for native code.
-
-        Parameters
-        ----------
-        frame
-            Frame of the loop.
-
-        Returns
-        -------
-        Callable
-            Function of the loop's other arguments.
-        """
+        """Return a function for native code; see `FieldLoop.native`."""
         return partial(self, frame)
 
 
 @lru_cache(maxsize=32)
 def compile_loops(linked: Linked, loops: tuple[Loop, ...], precision: Precision) -> Loops:
-    """Compile loops over lanes for the GPU.
-
-    Parameters
-    ----------
-    linked
-        Linked scene.
-    loops
-        Loops to compile.
-    precision
-        "float32" or "float64".
-
-    Returns
-    -------
-    Loops
-        Loops by name, with one lane.
-
-    Raises
-    ------
-    KernelError
-        If a loop cannot be compiled, or no GPU can be used.
-    """
+    """Compile loops for the GPU, with one lane; see `cpu.compile_loops`."""
     module, placed = load_loops(linked, precision, loops), parameters(linked, precision)
     runs = {loop.name: CudaLoop(getattr(module, loop.name), placed) for loop in loops}
     return Loops(1, LANES, runs, on_gpu=True)

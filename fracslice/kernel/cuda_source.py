@@ -258,11 +258,6 @@ def _listed(visited: Any) -> list[ast.stmt]:
 def after_parameters(arguments: list[ast.expr]) -> list[ast.expr]:
     """Return the arguments of a call after P: integer offsets into P.
 
-    Parameters
-    ----------
-    arguments
-        Arguments of the call.
-
     Returns
     -------
     list

@@ -17,11 +17,6 @@ from .loops import Loop
 def kernel(function: Callable[..., None]) -> Loop:
     """Decorate a loop that threads are launched on.
 
-    Parameters
-    ----------
-    function
-        Function of the loop.
-
     Returns
     -------
     Loop
@@ -32,11 +27,6 @@ def kernel(function: Callable[..., None]) -> Loop:
 
 def device(function: Function) -> Function:
     """Decorate a function that loops call and whose numbers are typed by hand.
-
-    Parameters
-    ----------
-    function
-        Function to decorate.
 
     Returns
     -------

@@ -92,18 +92,7 @@ class Image:
         self._protect()
 
     def get_function_address(self, name: str) -> int:
-        """Return the address of a function.
-
-        Parameters
-        ----------
-        name
-            Its name.
-
-        Returns
-        -------
-        int
-            Address.
-        """
+        """Return the address of a function."""
         return self._addresses[self._names[name.encode()]]
 
     def _address(self, symbol: Symbol, name: bytes, starts: dict[int, int]) -> int:

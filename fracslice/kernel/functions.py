@@ -22,11 +22,6 @@ def scope(function: Callable[..., Any]) -> dict[str, Any]:
     ----------
     function
         Python function.
-
-    Returns
-    -------
-    dict
-        Values by name.
     """
     assert isinstance(function, FunctionType)
     cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
@@ -49,11 +44,6 @@ def fingerprint(function: Callable[..., Any]) -> Hashable:
     ----------
     function
         Python function.
-
-    Returns
-    -------
-    Hashable
-        Fingerprint.
     """
     assert isinstance(function, FunctionType)
     code, names = function.__code__, outer_names(function.__code__)

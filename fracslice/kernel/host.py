@@ -29,11 +29,6 @@ def lane_count(bits: int) -> int:
     ----------
     bits
         Width of a float: 32 or 64.
-
-    Returns
-    -------
-    int
-        Lanes.
     """
     register = 512 if "+avx512f" in host()[1].split(",") else 256
     return REGISTERS * register // bits

@@ -16,11 +16,6 @@ from .intervals import Interval, Possible
 def on_cells(name: str) -> Callable[..., Any]:
     """Return a function of the vocabulary for NumPy that takes intervals, too.
 
-    Parameters
-    ----------
-    name
-        Name in the vocabulary.
-
     Returns
     -------
     callable

@@ -41,18 +41,7 @@ def intrinsic(function: Function) -> Function:
 
 
 def is_intrinsic(value: Any) -> bool:
-    """Return True if a value is an intrinsic, which loops may call.
-
-    Parameters
-    ----------
-    value
-        Any value.
-
-    Returns
-    -------
-    bool
-        True for an intrinsic.
-    """
+    """Return True if a value is an intrinsic, which loops may call."""
     return callable(value) and value in _INTRINSICS
 
 
@@ -114,11 +103,6 @@ def around(centre: Any, half: float) -> Interval:
 def lower(interval: Interval) -> Any:
     """Lower bound of an interval.
 
-    Parameters
-    ----------
-    interval
-        Interval.
-
     Returns
     -------
     Any
@@ -130,11 +114,6 @@ def lower(interval: Interval) -> Any:
 @intrinsic
 def upper(interval: Interval) -> Any:
     """Upper bound of an interval.
-
-    Parameters
-    ----------
-    interval
-        Interval.
 
     Returns
     -------
@@ -154,11 +133,6 @@ def gather(i: Any, P: np.ndarray) -> Any:
         Whole, possible indices, as reals.
     P
         Parameters of the scene.
-
-    Returns
-    -------
-    Any
-        Elements.
     """
     return P[np.asarray(i).astype(np.intp)]
 
@@ -173,10 +147,5 @@ def field(x: Any, y: Any, z: Any, P: Any) -> Any:
         Coordinates, scene units.
     P
         Parameters of the scene; in Python the field itself.
-
-    Returns
-    -------
-    Any
-        Field values.
     """
     return P(x, y, z)

@@ -22,11 +22,6 @@ def kept_text(kind: str, made_of: tuple[object, ...], make: Callable[[], str]) -
         Everything that the text depends on besides this package's compiler, as for `keys.key`.
     make
         Makes the text.
-
-    Returns
-    -------
-    str
-        The text.
     """
     kept, name = _place(kind, made_of)
     return kept.cached(name, lambda: make().encode()).decode()

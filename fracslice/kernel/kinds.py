@@ -74,11 +74,6 @@ def made_of(kind: Kind, parts: Sequence[Any], lanes: Lanes, builder: ir.IRBuilde
 def joined(a: Kind, b: Kind) -> Kind:
     """Return the common kind of two kinds.
 
-    Parameters
-    ----------
-    a, b
-        Kinds.
-
     Returns
     -------
     Kind
@@ -122,11 +117,6 @@ def as_kind(value: Value, kind: Kind, lanes: Lanes, builder: ir.IRBuilder) -> Va
         Layout of the lanes.
     builder
         LLVM IR builder.
-
-    Returns
-    -------
-    Value
-        Value of that kind.
 
     Raises
     ------

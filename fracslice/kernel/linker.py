@@ -144,11 +144,6 @@ class Linker:
             Structure.
         write
             Writes the function under a name.
-
-        Returns
-        -------
-        Subroutine
-            Function of the structure.
         """
         if (prefix, *key) not in self._parts:
             self._parts[prefix, *key] = write(f"{prefix}{len(self._parts)}")

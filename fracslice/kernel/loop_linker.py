@@ -53,11 +53,6 @@ class LinkedFunction:
 def link_loops(loops: tuple[Loop, ...]) -> dict[str, LinkedFunction]:
     """Link loops and the functions that they call.
 
-    Parameters
-    ----------
-    loops
-        Loops to link.
-
     Returns
     -------
     dict
@@ -76,16 +71,6 @@ def link_loops(loops: tuple[Loop, ...]) -> dict[str, LinkedFunction]:
 
 def loop_source(loops: Sequence[Loop]) -> str:
     """Return the text of loops and of the functions that they call: cached, or linked and cached.
-
-    Parameters
-    ----------
-    loops
-        Loops to link.
-
-    Returns
-    -------
-    str
-        Source text.
 
     Raises
     ------

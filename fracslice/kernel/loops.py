@@ -55,11 +55,6 @@ def loop(arguments: str, points: str = "lanes") -> Callable[[Callable[..., None]
         Arguments of the loop, one letter each.
     points
         Kind of the coordinates that it passes to the field.
-
-    Returns
-    -------
-    Callable
-        Decorator.
     """
     return lambda function: Loop(function, arguments, points=points)
 

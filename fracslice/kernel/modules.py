@@ -23,13 +23,6 @@ def imported(name: str, text: str) -> ModuleType:
 
     If other users could write to the cache folder, the file is private to this process.
 
-    Parameters
-    ----------
-    name
-        Name of the module.
-    text
-        Source text.
-
     Returns
     -------
     module

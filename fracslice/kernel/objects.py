@@ -28,11 +28,6 @@ def object_code(linked: Linked, bits: int, width: int, loops: Sequence[Loop]) ->
     loops
         Loops to compile.
 
-    Returns
-    -------
-    bytes
-        Object file.
-
     Raises
     ------
     KernelError

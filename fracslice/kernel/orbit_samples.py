@@ -165,10 +165,6 @@ def stays(steps: Round, values: Mapping[str, Any], rounds: int, radius: float, o
         Radius.
     outer
         Radius from which no orbit comes back.
-
-    Returns
-    -------
-    bool
     """
     step, start = composed([image(steps, k, values) for k in range(len(steps))]), np.zeros((3, 1))
     w = start

@@ -187,13 +187,6 @@ class Form:
 def field(steps: Round, form: Form) -> Callable[..., Any]:
     """Write the function of an orbit's field.
 
-    Parameters
-    ----------
-    steps
-        Steps of a round.
-    form
-        Form of the field.
-
     Returns
     -------
     Callable

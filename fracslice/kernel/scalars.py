@@ -82,13 +82,6 @@ def common(a: ir.Type, b: ir.Type) -> ir.Type:
 def truth(builder: ir.IRBuilder, value: Any) -> Any:
     """Convert a scalar to a condition: True if it is not zero.
 
-    Parameters
-    ----------
-    builder
-        LLVM IR builder.
-    value
-        Scalar.
-
     Returns
     -------
     Any
@@ -119,15 +112,6 @@ _REAL = {ast.Add: "fadd", ast.Sub: "fsub", ast.Mult: "fmul", ast.Div: "fdiv"}
 
 def operate(builder: ir.IRBuilder, op: ast.operator, a: Any, b: Any) -> Any:
     """Emit arithmetic on two scalars.
-
-    Parameters
-    ----------
-    builder
-        LLVM IR builder.
-    op
-        Operator.
-    a, b
-        Scalars.
 
     Returns
     -------

@@ -54,11 +54,6 @@ def specialised(function: Callable[..., Any], fixed: Mapping[str, Any]) -> ast.F
     fixed
         Values of the fixed arguments.
 
-    Returns
-    -------
-    ast.FunctionDef
-        Specialised tree.
-
     Raises
     ------
     KernelError

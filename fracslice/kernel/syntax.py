@@ -80,13 +80,6 @@ def _names(tree: ast.AST) -> Iterator[ast.Name]:
 def point_names(tree: ast.FunctionDef, first: set[str]) -> set[str]:
     """Return the names whose values differ from point to point.
 
-    Parameters
-    ----------
-    tree
-        Function.
-    first
-        Names of points.
-
     Returns
     -------
     set of str
@@ -130,11 +123,6 @@ def depends_on_points(node: ast.expr, points: set[str]) -> bool:
         Expression.
     points
         Names whose values differ from point to point.
-
-    Returns
-    -------
-    bool
-        True if the value may differ.
     """
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ("any_of", CHILD):
         return node.func.id == CHILD

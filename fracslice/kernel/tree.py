@@ -16,27 +16,7 @@ from .loops import Loop, enclosures
 
 
 def kernel(root: Node, device: Device, precision: Precision) -> Kernel:
-    """Compile the kernel of a tree.
-
-    Parameters
-    ----------
-    root
-        Scene with resolved depths.
-    device
-        "cpu" or "cuda".
-    precision
-        "float32" or "float64".
-
-    Returns
-    -------
-    Kernel
-        Compiled field.
-
-    Raises
-    ------
-    KernelError
-        If the scene cannot be compiled or the device is not available.
-    """
+    """Compile the kernel of a tree with resolved depths; see `Field.kernel`."""
     if device == "cpu":
         return cpu.compile_scene(root, precision)
     from . import cuda
@@ -45,29 +25,7 @@ def kernel(root: Node, device: Device, precision: Precision) -> Kernel:
 
 
 def loops(root: Node, loops: Sequence[Loop], precision: Precision, device: Device = "cpu") -> Loops:
-    """Compile loops over a tree.
-
-    Parameters
-    ----------
-    root
-        Scene with resolved depths.
-    loops
-        Loops to compile.
-    precision
-        "float32" or "float64".
-    device
-        "cpu" or "cuda".
-
-    Returns
-    -------
-    Loops
-        Compiled loops by name.
-
-    Raises
-    ------
-    KernelError
-        If the scene or a loop cannot be compiled or the device is not available.
-    """
+    """Compile loops over a tree with resolved depths; see `Field.loops`."""
     if device == "cpu":
         return cpu.compile_loops(link(root), tuple(loops), precision)
     from . import cuda_launching
@@ -76,46 +34,12 @@ def loops(root: Node, loops: Sequence[Loop], precision: Precision, device: Devic
 
 
 def cells(root: Node, precision: Precision) -> Cells:
-    """Compile proofs that a tree's field has one sign on cells.
-
-    Parameters
-    ----------
-    root
-        Scene with resolved depths.
-    precision
-        "float32" or "float64".
-
-    Returns
-    -------
-    Cells
-        Proofs by intervals.
-
-    Raises
-    ------
-    KernelError
-        If the scene cannot be compiled.
-    """
+    """Compile proofs that a tree's field has one sign on cells; see `Field.cells`."""
     return Enclosures(cpu.compile_loops(link(root.signs()), (enclosures,), precision), np.dtype(precision))
 
 
 def key(root: Node) -> str:
-    """Hash the linked text, parameters and bounds of a tree and of its conservative field.
-
-    Parameters
-    ----------
-    root
-        Scene with resolved depths.
-
-    Returns
-    -------
-    str
-        Key.
-
-    Raises
-    ------
-    KernelError
-        If the scene cannot be linked.
-    """
+    """Hash the text, parameters and bounds of a tree and of its conservative field; see `Field.key`."""
     parts: list[object] = []
     for node in (root, root.conservative()):
         linked = link(node)

@@ -67,18 +67,6 @@ class Lanes:
     def vec(self, builder: ir.IRBuilder, value: Value) -> Vec:
         """Return lanes unchanged; broadcast a scalar.
 
-        Parameters
-        ----------
-        builder
-            LLVM IR builder.
-        value
-            Lanes or scalar.
-
-        Returns
-        -------
-        Vec
-            Lanes.
-
         Raises
         ------
         MismatchError
@@ -106,11 +94,6 @@ class Lanes:
             LLVM IR builder.
         value
             Interval, lanes or scalar.
-
-        Returns
-        -------
-        Interval
-            Interval.
 
         Raises
         ------
@@ -140,11 +123,6 @@ class Lanes:
         value
             Mask or scalar.
 
-        Returns
-        -------
-        Vec
-            Mask.
-
         Raises
         ------
         MismatchError
@@ -165,11 +143,6 @@ class Lanes:
             LLVM IR builder.
         value
             Condition on cells, mask or scalar.
-
-        Returns
-        -------
-        Possible
-            Condition on cells.
 
         Raises
         ------

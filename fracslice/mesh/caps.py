@@ -256,11 +256,6 @@ def disjoint(caps: list[Cap], count: int) -> list[Cap]:
         Caps, the preferred ones first.
     count : int
         Triangles of the mesh.
-
-    Returns
-    -------
-    list of Cap
-        Disjoint caps.
     """
     taken, kept = np.zeros(count, bool), []
     for cap in caps:

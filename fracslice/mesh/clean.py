@@ -78,11 +78,6 @@ def cleaned(
     threads : int, optional
         Threads; 0 for all cores.
 
-    Returns
-    -------
-    Cleaned
-        The cleaned mesh.
-
     Raises
     ------
     MeshError

@@ -77,11 +77,6 @@ class Collapse:
     def run(self, work: Work) -> None:
         """Collapse all edges that the tolerance allows, at first and after each `undo`.
 
-        Parameters
-        ----------
-        work : Work
-            Progress and cancellation.
-
         Raises
         ------
         Cancelled

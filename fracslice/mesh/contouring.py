@@ -65,11 +65,6 @@ class SurfaceContours:
     def refiner(self, work: Work) -> Refiner:
         """Return a root finder for pieces by ascending x.
 
-        Parameters
-        ----------
-        work : Work
-            Threads and cancellation.
-
         Returns
         -------
         Refiner
@@ -161,11 +156,6 @@ def layers(bricks: SignBricks, most: int) -> list[tuple[int, int]]:
 def placement(bricks: Bricks | SignBricks) -> tuple[tuple[float, float, float], float, float]:
     """Placement of samples, for native code.
 
-    Parameters
-    ----------
-    bricks : Bricks or SignBricks
-        Samples.
-
     Returns
     -------
     tuple
@@ -191,11 +181,6 @@ def minimum_edge_parameter(bricks: Bricks | SignBricks) -> float:
     bricks : Bricks or SignBricks
         Samples.
 
-    Returns
-    -------
-    float
-        Minimum edge parameter.
-
     Raises
     ------
     MeshError
@@ -214,13 +199,6 @@ def minimum_edge_parameter(bricks: Bricks | SignBricks) -> float:
 
 def called(function: Callable[..., Any], *arguments: Any) -> Any:
     """Call a native function.
-
-    Parameters
-    ----------
-    function : callable
-        The function.
-    *arguments
-        Its arguments.
 
     Returns
     -------

@@ -44,11 +44,6 @@ class Search(Protocol):
     def memory(self, size: int) -> tuple[np.ndarray, np.ndarray]:
         """Allocate memory for intersections.
 
-        Parameters
-        ----------
-        size
-            Number of intersections.
-
         Returns
         -------
         tuple of ndarray

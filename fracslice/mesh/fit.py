@@ -169,20 +169,7 @@ class Fitted:
 
     @classmethod
     def of(cls, mesh: Mesh, fit: Fit) -> Fitted:
-        """Measure a mesh.
-
-        Parameters
-        ----------
-        mesh : Mesh
-            The mesh.
-        fit : Fit
-            The measuring fit.
-
-        Returns
-        -------
-        Fitted
-            The mesh with its measures.
-        """
+        """Measure a mesh."""
         return cls(mesh, fit, fit.triangles(mesh.corners))
 
     def become(self, mesh: Mesh, parents: NDArray[np.int64], fresh: NDArray[np.bool_]) -> Fitted:
@@ -196,11 +183,6 @@ class Fitted:
             Triangle of this mesh that each triangle of the edited one came from.
         fresh : ndarray of bool, shape (k,)
             True for each changed triangle.
-
-        Returns
-        -------
-        Fitted
-            The edited mesh with its measures.
         """
         measured = self.measured[parents]
         measured[fresh] = self.fit.triangles(mesh.corners[fresh])

@@ -50,11 +50,6 @@ class Flips(NamedTuple):
         ----------
         which : ndarray of bool, shape (k,), or of int64, shape (j,)
             Mask or indices.
-
-        Returns
-        -------
-        Flips
-            Selected flips.
         """
         return Flips(self.old[which], self.new[which], self.ends[which])
 

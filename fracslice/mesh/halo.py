@@ -107,11 +107,6 @@ def strip(mesh: Mesh, vertices: NDArray[np.bool_], threads: int = 0) -> Strip:
         The vertices.
     threads : int, optional
         Threads; 0 for all cores.
-
-    Returns
-    -------
-    Strip
-        The triangles.
     """
     rows = touching(mesh.triangles, vertices, threads)
     triangles, used = mesh.triangles[rows], np.zeros(len(mesh.vertices), bool)

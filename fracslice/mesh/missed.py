@@ -58,13 +58,6 @@ def surface_to_mesh(
 def surface_samples(planned: Plan, work: Work) -> NDArray[np.float64]:
     """Extreme points of a field and other points on its surface, found without a mesh.
 
-    Parameters
-    ----------
-    planned : Plan
-        Sampled field.
-    work : Work
-        Threads and cancellation.
-
     Returns
     -------
     ndarray of float64, shape (n, 3)

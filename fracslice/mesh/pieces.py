@@ -44,13 +44,7 @@ class Pieces:
         return len(self.ends)
 
     def anew(self) -> Pieces:
-        """Return an empty collection in the same place, whose pieces replace those of this one.
-
-        Returns
-        -------
-        Pieces
-            No pieces.
-        """
+        """Return an empty collection in the same place, whose pieces replace those of this one."""
         return Pieces(self.folder)
 
     def add(self, piece: Piece, fresh: int = 0) -> None:
@@ -181,11 +175,6 @@ class Pieces:
             Pieces `first` to `last` - 1.
         seam : float
             Maximum distance from the seam of vertices to be joined, scene units.
-
-        Returns
-        -------
-        Mesh
-            The joined mesh.
         """
         mesh = self.mesh(first)
         for number in range(first + 1, last):
@@ -221,11 +210,6 @@ def joined(one: Mesh, other: Mesh, seam: float, near: float) -> Mesh:
         x of the plane.
     near : float
         Maximum distance of a joined vertex from the plane.
-
-    Returns
-    -------
-    Mesh
-        The joined mesh.
     """
     return seamed(one, other, seam, near)[0].compact()
 

@@ -134,11 +134,6 @@ class Pointed:
         ----------
         head : Mesh
             Triangles at the begin of the first piece.
-
-        Returns
-        -------
-        PointedPiece
-            As for one piece.
         """
         if self.rough:
             return PointedPiece(np.concatenate(self._points)[: MANY + 1], NOTHING, NOTHING)

@@ -70,13 +70,6 @@ def quantised(mesh: Mesh, threads: int = 0) -> Mesh:
     Every triangle is kept, in order; unused vertices are removed. Quantise once, before the check and the
     export, so that both treat the same mesh.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        The mesh.
-    threads : int, optional
-        Threads; 0 for all cores.
-
     Returns
     -------
     Mesh
@@ -92,11 +85,6 @@ def quantised(mesh: Mesh, threads: int = 0) -> Mesh:
 
 def used(mesh: Mesh) -> NDArray[np.bool_]:
     """Vertices of triangles.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The mesh.
 
     Returns
     -------
@@ -194,11 +182,6 @@ def welded(mesh: Mesh) -> Mesh:
     ----------
     mesh : Mesh
         Mesh with float32 coordinates.
-
-    Returns
-    -------
-    Mesh
-        The welded mesh.
     """
     first, labels = _native.weld(mesh.vertices.astype(np.float32))
     return Mesh(mesh.vertices[first], labels[mesh.triangles]) if len(first) < len(mesh.vertices) else mesh

@@ -241,11 +241,6 @@ def _indexed(vertices: array[float], triangles: array[int]) -> Mesh:
 def joined(meshes: list[Mesh]) -> Mesh:
     """Concatenate meshes without welding.
 
-    Parameters
-    ----------
-    meshes : list of Mesh
-        Meshes.
-
     Returns
     -------
     Mesh

@@ -1,9 +1,12 @@
 """Loops over a compiled field that find roots on segments.
 
-Entries of FRAME, in all loops: 0: reciprocal of the voxel size. 1: |f| in voxels at which a root is accepted.
-2: remaining bracket, as a fraction of the segment, at which a root is accepted. 3: step of the finite
-differences, scene units. 4: distance that counts as no clearance, scene units. 5: length of the last step, as
-a fraction of the segment.
+P holds the parameters of the scene. X, Y and Z hold n points, scene units, or the starts of n segments; then
+DX, DY and DZ hold the vectors to their ends. n is a multiple of WIDTH.
+
+Entries of FRAME: 0: reciprocal of the voxel size. 1: |f| in voxels at which a root is accepted. 2: remaining
+bracket, as a fraction of the segment, at which a root is accepted. 3: step of the finite differences, scene
+units. 4: distance that counts as no clearance, scene units. 5: length of the last step, as a fraction of the
+segment.
 """
 
 from __future__ import annotations
@@ -23,17 +26,11 @@ def find(P, FRAME, X, Y, Z, DX, DY, DZ, T, steps, n):
 
     Parameters
     ----------
-    P, FRAME
-        Parameters of the scene, and of the loop.
-    X, Y, Z, DX, DY, DZ
-        Starts of the segments and vectors to their ends, [n] each, scene units.
     T
         Receives the roots as fractions of the segments, [n]. If both ends have the same sign, the end nearer
         to zero; 2 is added to a root that needs more than `steps` steps.
     steps
         Largest number of steps.
-    n
-        Number of segments, a multiple of WIDTH.
     """
     over, small, near, close = FRAME[0], FRAME[1], FRAME[2], FRAME[5]
     for i in range(0, n, WIDTH):
@@ -80,18 +77,12 @@ def polish(P, FRAME, X, Y, Z, DX, DY, DZ, T, NX, NY, NZ, MISS, n):
 
     Parameters
     ----------
-    P, FRAME
-        Parameters of the scene, and of the loop.
-    X, Y, Z, DX, DY, DZ
-        Starts of the segments and vectors to their ends, [n] each, scene units.
     T
         Roots as fractions of the segments, [n]; modified in place.
     NX, NY, NZ
         Receive the unit normals where the steps started, [n] each.
     MISS
         Receives the lengths of the steps as fractions of the segments, [n].
-    n
-        Number of segments, a multiple of WIDTH.
     """
     e = FRAME[3]
     for i in range(0, n, WIDTH):
@@ -122,16 +113,10 @@ def aim(P, FRAME, X, Y, Z, DX, DY, DZ, T, MISS, n):
 
     Parameters
     ----------
-    P, FRAME
-        Parameters of the scene, and of the loop.
-    X, Y, Z, DX, DY, DZ
-        Starts of the segments and vectors to their ends, [n] each, scene units.
     T
         Roots as fractions of the segments, [n]; modified in place.
     MISS
         Receives |f| at the new roots in voxels, [n].
-    n
-        Number of segments, a multiple of WIDTH.
     """
     over = FRAME[0]
     for i in range(0, n, WIDTH):
@@ -168,10 +153,6 @@ def lead(P, FRAME, X, Y, Z, LX, LY, LZ, HX, HY, HZ, OX, OY, OZ, MX, MY, MZ, DX, 
 
     Parameters
     ----------
-    P, FRAME
-        Parameters of the scene, and of the loop.
-    X, Y, Z
-        Points, [n] each, scene units.
     LX, LY, LZ, HX, HY, HZ
         Distances to the lower and upper sides of the trust regions, [n] each, scene units.
     OX, OY, OZ
@@ -180,8 +161,6 @@ def lead(P, FRAME, X, Y, Z, LX, LY, LZ, HX, HY, HZ, OX, OY, OZ, MX, MY, MZ, DX, 
         Vectors to the middle of the known part of the surface, [n] each, scene units, or NaN.
     DX, DY, DZ
         Receive the vectors, [n] each, scene units.
-    n
-        Number of points, a multiple of WIDTH.
     """
     e, tight = FRAME[3], FRAME[4]
     for i in range(0, n, WIDTH):

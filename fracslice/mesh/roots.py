@@ -73,11 +73,6 @@ class Roots:
     def native(self, name: str) -> tuple[Any, ...] | Callable[..., None]:
         """Return a loop for native code.
 
-        Parameters
-        ----------
-        name
-            Name of the loop.
-
         Returns
         -------
         tuple or Callable

@@ -24,11 +24,6 @@ _REASONS = {
 def to_manifold(mesh: Mesh) -> Manifold:
     """Convert a mesh to a manifold3d solid, in double precision, without repair.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        The mesh.
-
     Returns
     -------
     manifold3d.Manifold

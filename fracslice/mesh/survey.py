@@ -37,11 +37,6 @@ def survey(pieces: Pieces, voxel: float, threads: int = 0) -> WholeShells:
         Voxel, in the units of the pieces.
     threads : int, optional
         Threads; 0 for all cores.
-
-    Returns
-    -------
-    WholeShells
-        The shells.
     """
     ends = [-np.inf, *pieces.ends]
 
@@ -64,17 +59,7 @@ def survey(pieces: Pieces, voxel: float, threads: int = 0) -> WholeShells:
 
 
 def levels(count: int) -> Iterator[int]:
-    """Number of nodes at each level of the tree, from the leaves' parents to the root.
-
-    Parameters
-    ----------
-    count : int
-        Leaves.
-
-    Yields
-    ------
-    int
-    """
+    """Number of nodes at each level of the tree, from the leaves' parents to the root."""
     while count > 1:
         count = -(-count // FAN)
         yield count

@@ -34,13 +34,7 @@ class Tally:
     high: tuple[float, ...] = (-np.inf,) * 3
 
     def add(self, piece: Finished) -> None:
-        """Add a piece.
-
-        Parameters
-        ----------
-        piece : Finished
-            The piece.
-        """
+        """Add a piece."""
         from .self_intersections import self_intersecting_triangles
         from .topology import edge_ends
 
@@ -74,13 +68,7 @@ class Tally:
             self.high = tuple(np.maximum(self.high, high).tolist())
 
     def include(self, other: Tally) -> None:
-        """Add the sums over other pieces.
-
-        Parameters
-        ----------
-        other : Tally
-            The sums.
-        """
+        """Add the sums over other pieces."""
         for name in (f.name for f in fields(self)):
             if name not in ("threads", "low", "high"):
                 setattr(self, name, getattr(self, name) + getattr(other, name))
@@ -94,11 +82,6 @@ class Tally:
         ----------
         bodies, cavities, misplaced : int
             Counts of shells.
-
-        Returns
-        -------
-        MeshReport
-            The report.
         """
         manifold = not (self.open_edges or self.nonmanifold_edges or self.nonmanifold_vertices)
         shells, euler = bodies + cavities, self.vertices - self.triangles // 2

@@ -49,11 +49,6 @@ def edge_topology(triangles: NDArray[np.int32], vertices: int, threads: int = 0)
     threads : int, optional
         Threads; 0 for all cores.
 
-    Returns
-    -------
-    EdgeTopology
-        Counts.
-
     Raises
     ------
     ValueError

@@ -43,10 +43,5 @@ def build(mesh: Mesh, threads: int = 0) -> Tree:
         Mesh with at least one triangle.
     threads : int, optional
         Threads; 0 for all cores.
-
-    Returns
-    -------
-    Tree
-        The tree.
     """
     return Tree(*_tree(mesh.vertices, mesh.triangles, threads))

@@ -219,11 +219,6 @@ class WholeShells:
         ----------
         voxel : float
             Voxel, in the units of the shells.
-
-        Returns
-        -------
-        str
-            The note.
         """
         whole, bodies = self.volumes.sum(), self.volumes > 0
         thin = bodies & (2 * self.volumes < voxel * self.areas)

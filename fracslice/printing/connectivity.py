@@ -41,11 +41,6 @@ def sampled_object(root: Field, outer: Box, longest: float, samples: float, work
     work : Work
         Threads, progress and cancellation.
 
-    Returns
-    -------
-    Bricks
-        The samples.
-
     Raises
     ------
     VolumeError

@@ -23,13 +23,6 @@ def edge_crossings(solid: Samples, rows: slice) -> tuple[np.ndarray, np.ndarray,
 
     A smooth surface has one crossing for each grid line along the axis nearest to its normal.
 
-    Parameters
-    ----------
-    solid : Samples
-        The samples.
-    rows : slice
-        Rows of the bricks.
-
     Returns
     -------
     points, normals : float64 [n, 3]

@@ -42,17 +42,6 @@ def framed(planned: Plan, size: Sizing, count: int, work: Work) -> Plan:
     The size of the object is that of the bodies that stay. Bodies that are much smaller than the whole scene
     need samples of their own: the part around them is sampled again, until they fill it.
 
-    Parameters
-    ----------
-    planned : Plan
-        The scene.
-    size : Sizing
-        Size of the bodies that stay.
-    count : int
-        Number of bodies that stay.
-    work : Work
-        Threads, progress and cancellation.
-
     Returns
     -------
     Plan

@@ -51,11 +51,6 @@ class Problem:
 def mended(problems: Sequence[Problem]) -> dict[str, str]:
     """Print settings that mend as many problems as they can.
 
-    Parameters
-    ----------
-    problems : sequence of Problem
-        The problems.
-
     Returns
     -------
     dict

@@ -113,11 +113,6 @@ class _Interpolated(Kernel):
 def together(solid: Bricks, added: Bricks) -> Bricks:
     """Unite two fields sampled on the same grid, possibly in different bricks.
 
-    Parameters
-    ----------
-    solid, added : Bricks
-        The samples.
-
     Returns
     -------
     Bricks

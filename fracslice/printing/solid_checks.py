@@ -117,11 +117,6 @@ def check_object(
     limits, work, finest, origin, drains
         As for `check_solid`.
 
-    Returns
-    -------
-    SolidReport
-        The report.
-
     Raises
     ------
     VolumeError
@@ -167,11 +162,6 @@ def check_solid(
         Point from which places are measured, scene units; by default the middle of the samples' lower face.
     drains : sequence of Drain, optional
         Drain holes, whose rims may be sharp.
-
-    Returns
-    -------
-    SolidReport
-        The report.
 
     Raises
     ------
@@ -288,10 +278,5 @@ def loose(count: int, **where: Any) -> Problem:
         Number of bodies.
     **where
         Fields of `Problem`.
-
-    Returns
-    -------
-    Problem
-        The problem.
     """
     return Problem("bodies", f"{count} loose bodies", mend=BRIDGE, advice="--keep largest", **where)

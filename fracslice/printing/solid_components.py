@@ -247,16 +247,6 @@ def components_of(bricks: Bricks) -> SolidComponents:
 
     Samples are connected along edges of the grid: solids that touch only along a line are not connected. An
     unsampled brick is connected as a whole (union-find, Tarjan 1975).
-
-    Parameters
-    ----------
-    bricks : Bricks
-        The samples.
-
-    Returns
-    -------
-    SolidComponents
-        The components.
     """
     size, empty = bricks.values.size, bricks.index < 0
     total = 1 + size + int(np.count_nonzero(empty))  # beyond the samples, each sample, each unsampled brick

@@ -35,11 +35,6 @@ def projected(root: Field, walls: Walls, voxel: float, work: Work) -> Walls:
     work : Work
         Threads and cancellation.
 
-    Returns
-    -------
-    Walls
-        The projected walls or gaps.
-
     Raises
     ------
     Cancelled

@@ -64,13 +64,7 @@ class Walls(Rows):
 
     @classmethod
     def none(cls) -> Walls:
-        """An empty record.
-
-        Returns
-        -------
-        Walls
-            No walls.
-        """
+        """An empty record."""
         return cls(*np.empty((2, 0, 3)), *np.empty((3, 0)))
 
     def along(self, direction: Direction) -> Walls:
@@ -155,11 +149,6 @@ def walls_of(solid: Samples, limit: float, work: Work, kinds: Sequence[Measure])
         As for `walls`.
     kinds : sequence of Measure
         How each is measured.
-
-    Returns
-    -------
-    list of Walls
-        Walls of each kind.
 
     Raises
     ------

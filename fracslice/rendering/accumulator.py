@@ -95,10 +95,6 @@ def next_choice(passes: int, largest: float) -> int:
         Completed passes after those over grids.
     largest : float
         Largest gain of an unfinished pixel, above zero.
-
-    Returns
-    -------
-    int
     """
     while least_gain(passes) > largest:
         passes += 1

@@ -29,10 +29,6 @@ def rows_of_bands(film: tuple[int, int]) -> int:
     ----------
     film : tuple of int
         Width and height of the picture, pixels.
-
-    Returns
-    -------
-    int
     """
     width, height = film
     free = available_bytes()

@@ -155,9 +155,7 @@ class Look:
         assert part
         dialect = TraceDialect(self.linker, materials=self.paints, traps=traps(self.root))
         lines = [f"f, paint, tone = {link_tree(self.linker, part, dialect)}", "t = 0.0 * x"]
-        values = [
-            (*n["absorb"], n["clear"] * (1 - ((n["index"] - 1) / (n["index"] + 1)) ** 2)) for n in self.all
-        ]
+        values = [(*n["absorb"], n["clear"] * (1 - _head_on(n["index"]))) for n in self.all]
         options: list[tuple[list[str], list[str]]] = [
             ([], [self.linker.argument(v) for v in row]) for row in values
         ]

@@ -80,11 +80,6 @@ class CpuTracer:
 
         The first prepass after `aim` is that of the coarsest blocks. Each later one starts where the one
         before ended.
-
-        Parameters
-        ----------
-        work : Work
-            Threads and cancellation.
         """
         cones = self._cones
         if cones is None:

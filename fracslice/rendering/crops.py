@@ -48,10 +48,6 @@ class Crop:
         crop : tuple of int or None
             Left and upper pixel, width and height; None for the whole film.
 
-        Returns
-        -------
-        Crop
-
         Raises
         ------
         RenderError

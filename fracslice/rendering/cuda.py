@@ -47,49 +47,20 @@ class CudaTracer:
         self.aim(frame)
 
     def aim(self, frame: Frame) -> None:
-        """Load the parameters of another frame of the same source, such as another camera or depth.
-
-        Parameters
-        ----------
-        frame : Frame
-            Linked frame.
-        """
+        """Load the parameters of another frame; see `CpuTracer.aim`."""
         self.frame = frame
         self._parameters = parameters(frame.linked, self._precision)
         self.blocks = -(-self.width // BLOCK)
         self._starts = self._cuda.to_device(np.zeros(self.blocks * -(-self.height // BLOCK), self.dtype))
 
     def look_ahead(self, work: Work) -> None:
-        """Cone prepass: compute the distance up to which all rays of each block are free.
-
-        Parameters
-        ----------
-        work : Work
-            Unused.
-        """
+        """Run the cone prepass; see `CpuTracer.look_ahead`."""
         if self.frame.sharp:
             given = (self._parameters, self._starts, self.blocks, self.dtype.type(STEPS[self.dtype.name]))
             launched(self._loops.cones, self._starts.size, *given)
 
     def add(self, sums: Any, plan: PassPlan, work: Work) -> None:
-        """Add samples to pixels up to their goals; a pixel with k samples takes point k of the sequence.
-
-        Copies nothing back and does not wait for the GPU.
-
-        Parameters
-        ----------
-        sums : device array, shape (height * width * CHANNELS,)
-            Sums of the picture, changed in place.
-        plan : PassPlan
-            Pixels to sample.
-        work : Work
-            Cancellation, checked before each launch.
-
-        Raises
-        ------
-        Cancelled
-            If the work was cancelled.
-        """
+        """Add samples without waiting for the GPU; see `CpuTracer.add`."""
         if len(self._points) < plan.last:
             drawn = self.samples.points(2 * plan.last, self.frame.samples)
             self._points = self._cuda.to_device(drawn)

@@ -55,13 +55,7 @@ class CudaAccumulator:
         self._shown = cuda.device_array((pixels, 3), np.uint8)
 
     def anew(self) -> CudaAccumulator:
-        """Return an empty accumulator in the same memory; this one becomes invalid.
-
-        Returns
-        -------
-        CudaAccumulator
-            The empty accumulator.
-        """
+        """Return an empty accumulator in the same memory; this one becomes invalid."""
         fresh = copy(self)
         fresh.passes, self.passes = 0, GONE
         launched(self._loops.clear, self.sums.size, self.sums)

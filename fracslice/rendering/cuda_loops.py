@@ -16,18 +16,7 @@ from .units.random import centred, sample
 
 
 def loops(frame: Frame) -> tuple[Loop, ...]:
-    """Return the kernels of a frame: `tile`, and `cones` if rays start at the eye.
-
-    Parameters
-    ----------
-    frame : Frame
-        Linked frame.
-
-    Returns
-    -------
-    tuple of Loop
-        The kernels, with the frame fixed.
-    """
+    """Return the kernels of a frame: `tile`, and `cones` if rays start at the eye."""
     return tuple(made.fix(frame=frame) for made in ((tile, cones) if frame.sharp else (tile,)))
 
 
@@ -37,8 +26,6 @@ def tile(P, Q, S, pixels, A, width, limit, blocks, frame):
 
     Parameters
     ----------
-    P : array of real
-        Scene parameters.
     Q : array of int32, shape (points, samples)
         Sample sequence; a pixel with k samples takes point k.
     S : array of real
@@ -47,14 +34,6 @@ def tile(P, Q, S, pixels, A, width, limit, blocks, frame):
         Pixels, ``y << 16 | x``; those at their goals are skipped.
     A : array of real
         Sums of the picture, CHANNELS per pixel, changed in place.
-    width : int
-        Picture width, pixels.
-    limit : real
-        Steps per ray.
-    blocks : int
-        Blocks per row of the picture.
-    frame : Frame
-        Linked frame.
     """
     k = thread()
     pixel = whole(pixels[min(k, pixels.size - 1)])
@@ -123,16 +102,10 @@ def cones(P, S, blocks, limit, frame):
 
     Parameters
     ----------
-    P : array of real
-        Scene parameters.
     S : array of real
         Start distance of each block, written.
-    blocks : int
-        Blocks per row of the picture.
     limit : real
         Steps per cone.
-    frame : Frame
-        Linked frame.
     """
     k = thread()
     if k < S.size:
@@ -162,12 +135,8 @@ def gather(A, a, r, g, b, covered, frame):
         Sums of the picture, changed in place.
     a : int
         Index of the pixel's first sum.
-    r, g, b : real
-        Linear light.
     covered : real
         1 if the camera ray hit.
-    frame : Frame
-        Linked frame.
     """
     bright = brightness(clamped(r), clamped(g), clamped(b))
     if frame.lit:

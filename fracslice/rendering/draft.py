@@ -72,11 +72,6 @@ class Follower:
         size : tuple of int
             Picture width and height, pixels.
 
-        Returns
-        -------
-        Renderer
-            The renderer.
-
         Raises
         ------
         SceneError

@@ -20,11 +20,6 @@ class Drawn:
     def names(self, count: int) -> list[str]:
         """Reserve random numbers.
 
-        Parameters
-        ----------
-        count : int
-            Numbers to reserve.
-
         Returns
         -------
         list of str

@@ -74,13 +74,6 @@ def _numbers(low: Sequence[float], high: Sequence[float], power: float) -> tuple
 def bind(linker: Linker, bodies: list[tuple[float, ...]]) -> list[str]:
     """Bind the units; return the lines for the start v of rays that continue and the share sent to bodies.
 
-    Parameters
-    ----------
-    linker : Linker
-        Linker of the kernel.
-    bodies : list of tuple of float
-        The bodies.
-
     Returns
     -------
     list of str

@@ -111,8 +111,11 @@ def _displayed(path: str) -> np.ndarray:
     """Picture for screens, by Pillow."""
     from PIL import Image
 
-    with Image.open(path) as image:
-        shown = np.asarray(image.convert("RGB"), np.float32) / np.float32(255)
+    try:
+        with Image.open(path) as image:
+            shown = np.asarray(image.convert("RGB"), np.float32) / np.float32(255)
+    except Image.DecompressionBombError as error:
+        raise ValueError(str(error)) from None
     return to_linear(shown)
 
 
@@ -130,11 +133,6 @@ def _openexr(path: str) -> np.ndarray:
 
 def radiance(path: str) -> np.ndarray:
     """Read a Radiance picture (Ward 1991, "Real Pixels"): mantissas of 8 bits with a common exponent.
-
-    Parameters
-    ----------
-    path : str
-        The file.
 
     Returns
     -------

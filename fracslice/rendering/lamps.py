@@ -11,17 +11,7 @@ from .units import lights
 
 
 def casts_shadows(light: Light) -> bool:
-    """Return whether the light may be blocked; the surfaces in view never block a light at the camera.
-
-    Parameters
-    ----------
-    light : Light
-        The light.
-
-    Returns
-    -------
-    bool
-    """
+    """Return whether the light may be blocked; the surfaces in view never block a light at the camera."""
     return light.shadows == "yes" and light.kind != "camera"
 
 

@@ -58,8 +58,6 @@ def store_vector(W, row, m, i, a, b, c):
 
     Parameters
     ----------
-    W : pointer to float
-        Workspace, written.
     row : int
         First row.
     m : int
@@ -79,19 +77,6 @@ def follow(W, L, rays, n, m, limit, P, step):
 
     A ray has missed once its free distance exceeds its end; an over-relaxed step beyond the end does not
     count.
-
-    Parameters
-    ----------
-    W, L, rays : pointer
-        Workspace, lanes, ray of each lane.
-    n, m : int
-        Rays, and numbers per row of W.
-    limit : int
-        Steps per ray.
-    P : pointer to float
-        Scene parameters.
-    step : callable
-        `step_ray` or `step_cone`.
     """
     for lane in range(WIDTH):
         rays[lane] = -1
@@ -120,13 +105,6 @@ def follow(W, L, rays, n, m, limit, P, step):
 def finish(W, L, rays, m, lane):
     """Write the result of a lane's ray.
 
-    Parameters
-    ----------
-    W, L, rays : pointer
-        Workspace, lanes, ray of each lane.
-    m, lane : int
-        Numbers per row of W, and the lane.
-
     Returns
     -------
     int
@@ -146,8 +124,6 @@ def skip_missed(W, m, n, i):
 
     Parameters
     ----------
-    W : pointer to float
-        Workspace.
     m, n, i : int
         Numbers per row of W, rays, first ray.
 
@@ -169,8 +145,6 @@ def take(W, L, rays, m, lane, i):
 
     Parameters
     ----------
-    W, L, rays : pointer
-        Workspace, lanes, ray of each lane.
     m, lane, i : int
         Numbers per row of W, the lane, the ray.
     """
@@ -181,15 +155,7 @@ def take(W, L, rays, m, lane, i):
 
 
 def idle(L, rays, lane):
-    """Park a lane without a ray far from the scene.
-
-    Parameters
-    ----------
-    L, rays : pointer
-        Lanes, ray of each lane.
-    lane : int
-        The lane.
-    """
+    """Park a lane without a ray far from the scene."""
     for k in range(Lane.dz + 1):
         L[k * WIDTH + lane] = 1e4
     L[Lane.end * WIDTH + lane] = 1e30
@@ -200,19 +166,7 @@ def idle(L, rays, lane):
 
 
 def march(L, limit, P, step):
-    """Step all lanes until at least one is done.
-
-    Parameters
-    ----------
-    L : pointer to float
-        Lanes.
-    limit : int
-        Steps per ray.
-    P : pointer to float
-        Scene parameters.
-    step : callable
-        `step_ray` or `step_cone`.
-    """
+    """Step all lanes until at least one is done."""
     ox, oy, oz = load_vector(L, Lane.ox, WIDTH, 0)
     dx, dy, dz = load_vector(L, Lane.dx, WIDTH, 0)
     end = load(L, Lane.end * WIDTH)

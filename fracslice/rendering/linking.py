@@ -97,11 +97,6 @@ def link_frame(root: Node, view: View, camera: Camera, seen: Optics, block: int)
         Lengths of the kernel.
     block : int
         Side of a block of the cone prepass, pixels.
-
-    Returns
-    -------
-    Frame
-        The linked frame.
     """
     return _Frame(root, view, camera, seen, block).linked()
 

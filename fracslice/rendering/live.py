@@ -156,13 +156,7 @@ class Live:
         self._refining.cancel.set()
 
     def look(self, camera: Camera) -> None:
-        """Move the camera to a new place.
-
-        Parameters
-        ----------
-        camera : Camera
-            The new camera.
-        """
+        """Move the camera to a new place."""
         with self._lock:
             self._aim = camera
         self._refining.cancel.set()

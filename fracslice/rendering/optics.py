@@ -77,11 +77,6 @@ def ray_bound(root: Node) -> float:
     ----------
     root : Node
         Root of the formula tree.
-
-    Returns
-    -------
-    float
-        Bound.
     """
     bounds = root.bounds
     return bounds.lipschitz * (ESTIMATE if bounds.exterior_only and root.escape_time_only else 1.0)

@@ -18,18 +18,10 @@ def shade(W, m, first, last, P, frame):
 
     Parameters
     ----------
-    W : pointer to float
-        Workspace.
-    m : int
-        Numbers per row of W.
     first : int
         Row of the bounce's first random number.
     last : float
         1 for the last bounce, else 0.
-    P : pointer to float
-        Scene parameters.
-    frame : Frame
-        Linked frame.
     """
     for i in range(0, m, WIDTH):
         status = load(W, Row.status * m + i)
@@ -87,8 +79,6 @@ def cover(W, m):
     ----------
     W : pointer to float
         Workspace; `Row.cover` is written.
-    m : int
-        Numbers per row of W.
     """
     for i in range(0, m, WIDTH):
         status = load(W, Row.status * m + i)
@@ -97,15 +87,7 @@ def cover(W, m):
 
 
 def clear(W, m):
-    """Remove the light of camera rays that missed.
-
-    Parameters
-    ----------
-    W : pointer to float
-        Workspace.
-    m : int
-        Numbers per row of W.
-    """
+    """Remove the light of camera rays that missed."""
     for i in range(0, m, WIDTH):
         hit = load(W, Row.cover * m + i) > 0.5
         r, g, b = load_vector(W, Row.r, m, i)
@@ -117,14 +99,8 @@ def gather(W, pixels, A, n, m, width, frame):
 
     Parameters
     ----------
-    W, pixels : pointer
-        Workspace and pixels.
     A : pointer to float
         Sums of the picture, changed in place.
-    n, m, width : int
-        Pixels, numbers per row of W, picture width.
-    frame : Frame
-        Linked frame.
     """
     for i in range(0, m, WIDTH):
         r, g, b = load_vector(W, Row.r, m, i)

@@ -8,6 +8,8 @@ Conventions:
   ``W[Row.t * m + i]``.
 - L holds the packet under way: one row per quantity in `Lane`, WIDTH numbers each. `rays` holds the ray of
   each lane, -1 for none.
+- `pixels` holds ``y << 16 | x``. `width` is that of the picture, pixels; `limit` the largest number of steps
+  of a ray; `blocks` the number of blocks in a row of the picture; `frame` the linked frame.
 """
 
 from __future__ import annotations
@@ -23,36 +25,12 @@ from .units.random import centred, sample
 
 
 def loops(frame: Frame) -> tuple[Loop, ...]:
-    """Return the C loops of a frame: `tile`, and `cones` if rays start at the eye.
-
-    Parameters
-    ----------
-    frame : Frame
-        Linked frame.
-
-    Returns
-    -------
-    tuple of Loop
-        The loops, with the frame fixed.
-    """
+    """Return the C loops of a frame: `tile`, and `cones` if rays start at the eye."""
     return tuple(made.fix(frame=frame) for made in ((tile, cones) if frame.sharp else (tile,)))
 
 
 def workspace(frame: Frame, rays: int) -> int:
-    """Return the size of a tile's workspace W.
-
-    Parameters
-    ----------
-    frame : Frame
-        Linked frame.
-    rays : int
-        Rays of the tile.
-
-    Returns
-    -------
-    int
-        Numbers in W.
-    """
+    """Return the size of a tile's workspace W."""
     return (Row.px + frame.samples) * rays
 
 
@@ -72,14 +50,8 @@ def tile(P, Q, S, W, L, rays, pixels, A, n, width, limit, shift, blocks, frame):
         Sums of the picture, `CHANNELS` per pixel.
     n : int
         Pixels.
-    width : int
-        Picture width, pixels.
-    limit : int
-        Steps per ray.
     shift, blocks : int
         Binary logarithm of a block's side, and blocks per row of the picture.
-    frame : Frame
-        Linked frame.
     """
     left = n
     while left > 0:
@@ -109,10 +81,6 @@ def unfinished(pixels, A, n, width):
     ----------
     pixels : pointer to int32
         Pixels, changed in place.
-    A : pointer to float
-        Sums of the picture.
-    n, width : int
-        Pixels, and picture width.
 
     Returns
     -------
@@ -149,8 +117,6 @@ def cones(P, S, C, ids, W, L, rays, n, m, shift, blocks, coarser, parents, limit
         The same for the coarser blocks, whose free distance is known; `coarser` is relative to `shift`.
     limit : int
         Steps per cone.
-    frame : Frame
-        Linked frame.
     """
     for k in range(m):
         block = ids[min(k, n - 1)]
@@ -178,10 +144,6 @@ def draw(W, Q, P, pixels, A, n, m, width, frame):
         Workspace; rows from `Row.px` on are written.
     Q, P, pixels, A : pointer
         Sample sequence, scene parameters, pixels, sums of the picture.
-    n, m, width : int
-        Pixels, numbers per row of W, picture width.
-    frame : Frame
-        Linked frame.
     """
     first = (int(P[frame.far + 2]) << 16) + int(P[frame.far + 1])
     for k in range(m):
@@ -198,17 +160,6 @@ def begin(W, m, P, frame):
     """Create the camera rays of a tile.
 
     Each ray passes through its film point (px, py) and starts where it enters the scene's box.
-
-    Parameters
-    ----------
-    W : pointer to float
-        Workspace, written.
-    m : int
-        Numbers per row of W.
-    P : pointer to float
-        Scene parameters.
-    frame : Frame
-        Linked frame.
     """
     for i in range(0, m, WIDTH):
         u, v = (0.0, 0.0) if frame.sharp else (load(W, (Row.px + 2) * m + i), load(W, (Row.px + 3) * m + i))

@@ -107,17 +107,7 @@ class PartTask:
 
 
 def frame_key(frame: Frame) -> str:
-    """Key of a linked frame.
-
-    Parameters
-    ----------
-    frame : Frame
-        The frame.
-
-    Returns
-    -------
-    str
-    """
+    """Key of a linked frame."""
     return key(frame.linked.source, frame.linked.parameters)
 
 
@@ -166,38 +156,16 @@ class PoolTracer:
         return self.tracer.samples
 
     def aim(self, frame: Frame) -> None:
-        """Load another frame; see `CpuTracer.aim`.
-
-        Parameters
-        ----------
-        frame : Frame
-            Linked frame.
-        """
+        """Load another frame; see `CpuTracer.aim`."""
         self.tracer.aim(frame)
         self._prepasses = 0
 
     def look_ahead(self, work: Work) -> None:
-        """Leave the next cone prepass to the workers.
-
-        Parameters
-        ----------
-        work : Work
-            Threads and cancellation.
-        """
+        """Leave the next cone prepass to the workers."""
         self._prepasses += 1
 
     def add(self, sums: np.ndarray, plan: PassPlan, work: Work) -> None:
-        """Add samples to pixels up to their goals; see `CpuTracer.add`.
-
-        Parameters
-        ----------
-        sums : ndarray, shape (height * width * CHANNELS,)
-            Sums of the picture, changed in place.
-        plan : PassPlan
-            Pixels to sample.
-        work : Work
-            Pool and cancellation.
-        """
+        """Add samples to pixels up to their goals; see `CpuTracer.add`."""
         pool, size = work.cluster, (self.tracer.width, self.tracer.height)
         assert pool is not None
         state, places = sums.reshape(-1, CHANNELS), _places(plan.pixels, size)

@@ -17,11 +17,6 @@ SINGLE = ("depth", "trap")
 def layers(renderer: Renderer) -> dict[str, np.ndarray]:
     """Render the layers of a picture, from the same camera.
 
-    Parameters
-    ----------
-    renderer : Renderer
-        Renderer of the picture.
-
     Returns
     -------
     dict of str to ndarray of float32, shape (height, width, 3) or (height, width)

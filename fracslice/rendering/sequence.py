@@ -51,13 +51,6 @@ class SampleRange:
     def points(self, count: int, dimensions: int) -> np.ndarray:
         """Return the points of the part; see `points`.
 
-        Parameters
-        ----------
-        count : int
-            Number of points.
-        dimensions : int
-            Number of dimensions.
-
         Returns
         -------
         ndarray of int32, shape (count, dimensions)

@@ -48,11 +48,6 @@ class CameraInput:
             Distance to the surface, scene units.
         seconds : float
             Duration of the flight.
-
-        Returns
-        -------
-        Camera
-            The moved camera.
         """
         direction = self.forward, self.right, self.up
         if any(direction):

@@ -16,32 +16,12 @@ from .units.weights import behind, sun_density, sunshine
 
 
 def seen_as_disc(light: Light) -> bool:
-    """Return whether continued rays meet the light: a sun of some size.
-
-    Parameters
-    ----------
-    light : Light
-        The light.
-
-    Returns
-    -------
-    bool
-    """
+    """Return whether continued rays meet the light: a sun of some size."""
     return light.kind == "sun" and light.size > 0 and light.shadows == "yes"
 
 
 def tint(light: Light) -> tuple[float, ...]:
-    """Return the linear colour of a light times its strength.
-
-    Parameters
-    ----------
-    light : Light
-        The light.
-
-    Returns
-    -------
-    tuple of float
-    """
+    """Return the linear colour of a light times its strength."""
     return tuple(c * light.strength for c in linear(light.colour))
 
 

@@ -79,11 +79,6 @@ def text_of(function: Callable[..., Any], lines: Sequence[str]) -> str:
         Function whose name and parameters are used.
     lines : sequence of str
         Body.
-
-    Returns
-    -------
-    str
-        Source text.
     """
     names = ", ".join(functions.parameters(function))
     return "\n    ".join([f"def {function.__name__}({names}):", *lines])

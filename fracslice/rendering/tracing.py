@@ -78,18 +78,7 @@ class TraceDialect(FieldDialect):
     prefix: str = "T"
 
     def kept(self, node: Node) -> Node:
-        """Skip identity nodes, except materials.
-
-        Parameters
-        ----------
-        node : Node
-            Node of the formula tree.
-
-        Returns
-        -------
-        Node
-            First node at or below it that is a material or not an identity.
-        """
+        """Skip identity nodes, except materials; see `Dialect.kept`."""
         while node.is_identity and node.formula.name != material.name:
             node = node.children[0]
         return node
@@ -97,15 +86,7 @@ class TraceDialect(FieldDialect):
     def arguments(self, node: Node) -> Arguments:
         """Return the function and arguments of a node; a material passes its paint number.
 
-        Parameters
-        ----------
-        node : Node
-            Node of the formula tree.
-
-        Returns
-        -------
-        Arguments
-            The node's function and arguments.
+        See `Dialect.arguments`.
         """
         if node.formula.name != material.name:
             given = arguments(node, leading(node))
@@ -118,39 +99,12 @@ class TraceDialect(FieldDialect):
     def order(self, node: Node, parts: Sequence[Subroutine]) -> Sequence[int]:
         """Keep the order of the children: at equal distances the first child's paint is taken.
 
-        Parameters
-        ----------
-        node : Node
-            Parent node.
-        parts : sequence of Subroutine
-            Functions of its children.
-
-        Returns
-        -------
-        sequence of int
-            Indices of the children in their given order.
+        See `Dialect.order`.
         """
         return range(len(parts))
 
     def write(self, name: str, node: Node, given: Arguments, runs: Sequence[Run]) -> str:
-        """Write the function of a node.
-
-        Parameters
-        ----------
-        name : str
-            Function name.
-        node : Node
-            Node of the formula tree.
-        given : Arguments
-            The node's function and arguments.
-        runs : sequence of Run
-            Calls of the children.
-
-        Returns
-        -------
-        str
-            Source text.
-        """
+        """Write the function of a node; see `Dialect.write`."""
         if node.formula.name == material.name:
             return self.painted(name, given, runs[0])
         return super().write(name, node, given, runs)
@@ -181,20 +135,7 @@ class TraceDialect(FieldDialect):
         )
 
     def shape(self, name: str, given: Arguments, _: Sequence[Run]) -> str:
-        """Write the function of a shape: the field value and the orbit trap.
-
-        Parameters
-        ----------
-        name : str
-            Function name.
-        given : Arguments
-            Function and arguments of the shape.
-
-        Returns
-        -------
-        str
-            Source text.
-        """
+        """Write the function of a shape: the field value and the orbit trap; see `FieldDialect.shape`."""
         fixed = dict(given.fixed)
         start, update, tone = _TRAPS[fixed.pop(TRAP, NEAREST)]
         tree = KeepNearest(update).visit(source.specialised(given.function, fixed))
@@ -212,19 +153,7 @@ class TraceDialect(FieldDialect):
     def csg_operator(self, name: str, given: Arguments, runs: Sequence[Run]) -> str:
         """Write the function of a CSG operator: paint and tone of the child that determines the value.
 
-        Parameters
-        ----------
-        name : str
-            Function name.
-        given : Arguments
-            Function and arguments of the operator.
-        runs : sequence of Run
-            Calls of the children.
-
-        Returns
-        -------
-        str
-            Source text.
+        See `FieldDialect.csg_operator`.
         """
         called = self.linker.share(given.function, given.fixed, OF_FORMULAS)
         lines = [f"f, paint, tone = {runs[0].call()}"]
@@ -243,19 +172,7 @@ class TraceDialect(FieldDialect):
     def domain_operator(self, name: str, given: Arguments, runs: Sequence[Run]) -> str:
         """Write the function of a domain operator: paint and tone of the child's lowest evaluation.
 
-        Parameters
-        ----------
-        name : str
-            Function name.
-        given : Arguments
-            Function and arguments of the operator.
-        runs : sequence of Run
-            Call of the child.
-
-        Returns
-        -------
-        str
-            Source text.
+        See `FieldDialect.domain_operator`.
         """
         tree = source.specialised(given.function, dict(given.fixed))
         arguments = [a.arg for a in tree.args.args][4:]

@@ -23,12 +23,7 @@ class WatchedFile:
         self._checked, self._saved = time.monotonic(), self._stamp()
 
     def changed(self) -> bool:
-        """Return whether the file was saved since the last call; the disk is asked at most every `POLL`.
-
-        Returns
-        -------
-        bool
-        """
+        """Return whether the file was saved since the last call; the disk is asked at most every `POLL`."""
         now, saved = time.monotonic(), self._saved
         if now - self._checked < POLL:
             return False

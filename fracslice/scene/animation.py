@@ -28,62 +28,19 @@ class Seconds(Parameter):
         return f"a time in seconds such as 2.5s, from 0 to {LONGEST:g}"
 
     def read(self, text: str) -> float:
-        """Parse text with an optional unit.
-
-        Parameters
-        ----------
-        text : str
-            The text.
-
-        Returns
-        -------
-        float
-            Time, seconds.
-
-        Raises
-        ------
-        ValueError
-            If it is not a time.
-        """
+        """Parse text with an optional unit; see `Parameter.read`."""
         match = _SECONDS.fullmatch(text)
         return self.check(float(match[1]) if match else None)
 
     def check(self, value: Any) -> float:
-        """Validate a number of seconds.
-
-        Parameters
-        ----------
-        value : object
-            Any value.
-
-        Returns
-        -------
-        float
-            Time, seconds.
-
-        Raises
-        ------
-        ValueError
-            If it is not a time.
-        """
+        """Validate a number of seconds; see `Parameter.check`."""
         number = self.read(value) if isinstance(value, str) else finite(value)
         if number is None or not 0 <= number <= LONGEST:
             raise ValueError(self.expects)
         return number
 
     def text(self, value: float) -> str:
-        """Format a time in seconds.
-
-        Parameters
-        ----------
-        value : float
-            Time, seconds.
-
-        Returns
-        -------
-        str
-            The time with its unit.
-        """
+        """Format a time in seconds; see `Parameter.text`."""
         return f"{value!r}s".replace(".0s", "s")
 
 
@@ -100,44 +57,12 @@ class Keys(Parameter):
         return "times and values, such as 0s: 1 0 0; 2.5s: 0 1 0, in the order of time"
 
     def read(self, text: str) -> Keyframes:
-        """Parse keyframes separated by semicolons.
-
-        Parameters
-        ----------
-        text : str
-            The text.
-
-        Returns
-        -------
-        tuple of tuple
-            Time in seconds and text of the value.
-
-        Raises
-        ------
-        ValueError
-            If it is no list of keyframes.
-        """
+        """Parse keyframes separated by semicolons; see `Parameter.read`."""
         pairs = [item.partition(":") for item in text.split(";") if item.strip()]
         return self.check([(time, value) for time, _, value in pairs])
 
     def check(self, value: Any) -> Keyframes:
-        """Validate keyframes.
-
-        Parameters
-        ----------
-        value : object
-            Any value.
-
-        Returns
-        -------
-        tuple of tuple
-            Time in seconds and text of the value.
-
-        Raises
-        ------
-        ValueError
-            If they are no keyframes, or their times do not increase.
-        """
+        """Validate keyframes; see `Parameter.check`."""
         try:
             keys = tuple((Seconds(0.0, "").check(time), " ".join(text.split())) for time, text in value)
         except (TypeError, ValueError, AttributeError):
@@ -147,18 +72,7 @@ class Keys(Parameter):
         return keys
 
     def text(self, value: Keyframes) -> str:
-        """Format keyframes.
-
-        Parameters
-        ----------
-        value : tuple of tuple
-            Time in seconds and text of the value.
-
-        Returns
-        -------
-        str
-            The keyframes, separated by semicolons.
-        """
+        """Format keyframes; see `Parameter.text`."""
         return "; ".join(f"{Seconds(0.0, '').text(time)}: {text}" for time, text in value)
 
 
@@ -172,23 +86,7 @@ class AttributePath(Parameter):
         return "ELEMENT.ATTRIBUTE, such as camera.eye or box[2].round"
 
     def check(self, value: Any) -> str:
-        """Validate the name of an attribute.
-
-        Parameters
-        ----------
-        value : object
-            Any value.
-
-        Returns
-        -------
-        str
-            The name without spaces.
-
-        Raises
-        ------
-        ValueError
-            If it is no name of an attribute.
-        """
+        """Validate the name of an attribute; see `Parameter.check`."""
         if not isinstance(value, str) or not re.fullmatch(r"\w+(\[\d+\])?\.\w+", value):
             raise ValueError(self.expects)
         return value
@@ -219,11 +117,6 @@ class Animation(Part):
     noise: str = attribute(
         Choice, "moving", "whether the pattern of the noise changes from frame to frame", ("moving", "fixed")
     )
-
-    @property
-    def frames(self) -> int:
-        """Number of frames."""
-        return max(round(self.duration * self.fps), 1)
 
 
 CURVES = ("auto", "smooth", "linear", "log", "step", "path", "zoom", "rotation")

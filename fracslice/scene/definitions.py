@@ -59,11 +59,6 @@ def defined(
     source : str
         Name of the file.
 
-    Returns
-    -------
-    Defined
-        The formula.
-
     Raises
     ------
     SceneError
@@ -82,11 +77,6 @@ def defined(
 
 def written(definition: Definition) -> Iterator[str]:
     """Write a definition.
-
-    Parameters
-    ----------
-    definition : Definition
-        The definition.
 
     Yields
     ------

@@ -77,61 +77,18 @@ class Length(Parameter):
         return f"0, or {EXPECTS}" if self.zero else EXPECTS
 
     def read(self, text: str) -> float:
-        """Parse text with an optional unit.
-
-        Parameters
-        ----------
-        text : str
-            The text.
-
-        Returns
-        -------
-        float
-            Length, mm.
-
-        Raises
-        ------
-        ValueError
-            With `expects`, if the text is not a length.
-        """
+        """Parse text with an optional unit; see `Parameter.read`."""
         match = _LENGTH.fullmatch(text)
         if not match:
             raise ValueError(self.expects)
         return self._possible(float(match[1]) * MILLIMETRES[match[2] or "mm"])
 
     def check(self, value: Any) -> float:
-        """Validate text or a number of mm.
-
-        Parameters
-        ----------
-        value : str or float
-            The value.
-
-        Returns
-        -------
-        float
-            Length, mm.
-
-        Raises
-        ------
-        ValueError
-            With `expects`, if the value is not a length.
-        """
+        """Validate text or a number of mm; see `Parameter.check`."""
         return self.read(value) if isinstance(value, str) else self._possible(value)
 
     def text(self, value: float) -> str:
-        """Format a length.
-
-        Parameters
-        ----------
-        value : float
-            Length, mm.
-
-        Returns
-        -------
-        str
-            Text with the unit mm.
-        """
+        """Format a length; see `Parameter.text`."""
         return f"{int(value) if value.is_integer() else value!r}mm"
 
     def _possible(self, value: Any) -> float:
@@ -161,23 +118,7 @@ class Pair(Length):
     expects = f"two lengths, or one for both, each {EXPECTS}"
 
     def check(self, value: Any) -> Any:
-        """Validate one length or a pair.
-
-        Parameters
-        ----------
-        value : str, float, tuple or list
-            One length for both, or two.
-
-        Returns
-        -------
-        tuple of float
-            Two lengths, mm.
-
-        Raises
-        ------
-        ValueError
-            With `expects`, if the value is not a pair of lengths.
-        """
+        """Validate one length or a pair; see `Parameter.check`."""
         pair = tuple(value) if isinstance(value, (tuple, list)) else (value, value)
         if len(pair) != 2:
             raise ValueError(self.expects)
@@ -194,44 +135,12 @@ class Percent(Parameter):
         return f"a percentage such as 102%, or three, from {LEAST:.0%} to {MOST:.0%}"
 
     def read(self, text: str) -> tuple[float, ...]:
-        """Parse one percentage, or three separated by commas.
-
-        Parameters
-        ----------
-        text : str
-            The text.
-
-        Returns
-        -------
-        tuple of float
-            Three factors.
-
-        Raises
-        ------
-        ValueError
-            With `expects`, for any other text.
-        """
+        """Parse one percentage, or three separated by commas; see `Parameter.read`."""
         matches = [_PERCENT.fullmatch(part) for part in text.split(",")]
         return self.check(tuple(float(match[1]) / 100 if match else math.nan for match in matches))
 
     def check(self, value: Any) -> tuple[float, ...]:
-        """Validate text, one factor for all axes, or three.
-
-        Parameters
-        ----------
-        value : str, float, tuple or list
-            The value.
-
-        Returns
-        -------
-        tuple of float
-            Three factors.
-
-        Raises
-        ------
-        ValueError
-            With `expects`, for any other value.
-        """
+        """Validate text, one factor for all axes, or three; see `Parameter.check`."""
         if isinstance(value, str):
             return self.read(value)
         given = [finite(v) for v in (value if isinstance(value, (tuple, list)) else (value,))]

@@ -12,13 +12,7 @@ _COMMENT = re.compile(r"<!--\s*(.*?)\s*-->", re.DOTALL)
 
 
 def folder() -> Path:
-    """Return the folder of the shipped scenes: in the installed package, or beside it in a checkout.
-
-    Returns
-    -------
-    Path
-        The folder.
-    """
+    """Return the folder of the shipped scenes: in the installed package, or beside it in a checkout."""
     package = Path(__file__).parents[1]
     installed = package / "scenes"
     return installed if installed.is_dir() else package.parent / "scenes"
@@ -38,16 +32,6 @@ def names() -> list[str]:
 def path(name: str) -> Path:
     """Return the file of a shipped scene.
 
-    Parameters
-    ----------
-    name : str
-        Name of the scene.
-
-    Returns
-    -------
-    Path
-        The file.
-
     Raises
     ------
     SceneError
@@ -60,11 +44,6 @@ def path(name: str) -> Path:
 
 def about(name: str) -> str:
     """Return the description of a shipped scene: its first comment, on one line.
-
-    Parameters
-    ----------
-    name : str
-        Name of the scene.
 
     Returns
     -------

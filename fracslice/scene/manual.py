@@ -24,13 +24,7 @@ _GROUPS = {
 
 
 def markdown() -> str:
-    """Return the sections of all elements.
-
-    Returns
-    -------
-    str
-        Markdown.
-    """
+    """Return the sections of all elements."""
     return "\n".join(_page())
 
 
@@ -87,11 +81,6 @@ def default(kind: Any) -> str:
 def prose(doc: str) -> str:
     """Return a docstring without its indentation.
 
-    Parameters
-    ----------
-    doc : str
-        The docstring.
-
     Returns
     -------
     str
@@ -101,18 +90,7 @@ def prose(doc: str) -> str:
 
 
 def summary(doc: str) -> str:
-    """Return the first paragraph of a docstring on one line.
-
-    Parameters
-    ----------
-    doc : str
-        The docstring.
-
-    Returns
-    -------
-    str
-        The paragraph.
-    """
+    """Return the first paragraph of a docstring on one line."""
     return " ".join(doc.split("\n\n")[0].split())
 
 
@@ -139,16 +117,6 @@ def _source(formula: Formula) -> str:
 
 def page(name: str) -> str:
     """Return the documentation of one element, as plain text.
-
-    Parameters
-    ----------
-    name : str
-        Element name.
-
-    Returns
-    -------
-    str
-        The page.
 
     Raises
     ------

@@ -47,18 +47,7 @@ class Override:
     text: str
 
     def fail(self, message: str) -> SceneError:
-        """Return the error to raise about this setting.
-
-        Parameters
-        ----------
-        message : str
-            The message.
-
-        Returns
-        -------
-        SceneError
-            The error.
-        """
+        """Return the error to raise about this setting."""
         return SceneError(f"{self.source}: {message}")
 
     def value(self, element: Element) -> Any:
@@ -68,11 +57,6 @@ class Override:
         ----------
         element : Element
             Element with the attribute.
-
-        Returns
-        -------
-        Any
-            The value.
 
         Raises
         ------
@@ -98,11 +82,6 @@ def changed(scene: Scene, settings: Iterable[str]) -> Scene:
         The scene.
     settings : iterable of str
         Settings, "ELEMENT.ATTRIBUTE=VALUE".
-
-    Returns
-    -------
-    Scene
-        The changed scene.
 
     Raises
     ------

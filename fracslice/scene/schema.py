@@ -30,13 +30,7 @@ _LENGTH = rf"\s*\+?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+\-]?[0-9]+)?\s*({'|'.join(MI
 
 
 def relaxng() -> str:
-    """Return the schema in XML form.
-
-    Returns
-    -------
-    str
-        XML.
-    """
+    """Return the schema in XML form."""
     grammar = Tree.Element(
         "grammar",
         {

@@ -40,10 +40,6 @@ def package_stub(modules: Mapping[str, str]) -> str:
     ----------
     modules : mapping of str to str
         Module of each public name, relative to the package.
-
-    Returns
-    -------
-    str
     """
     exported = {**modules, **dict.fromkeys(_shipped(), "formulas")}
     lines = sorted(f"from .{module} import {name} as {name}" for name, module in exported.items())

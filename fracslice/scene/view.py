@@ -177,11 +177,6 @@ class View:
         parts : iterable of Part
             Elements of a scene file.
 
-        Returns
-        -------
-        View
-            The view.
-
         Raises
         ------
         SceneError

@@ -94,11 +94,6 @@ def bends(
         Corners.
     section : CrossSection
         The field in the plane of the layer.
-
-    Returns
-    -------
-    Vertices
-        The bends.
     """
     sides = _guessed(points, following, pixels).bent
     if not len(sides.after):

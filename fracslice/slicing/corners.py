@@ -28,11 +28,6 @@ def corners(points: np.ndarray, following: np.ndarray, pixels: np.ndarray, secti
     ----------
     points, following, pixels, section
         As of `bends`.
-
-    Returns
-    -------
-    Vertices
-        The corners.
     """
     f, slope = _tangents(points, section)
     a, b = slope, slope[following]

@@ -51,11 +51,6 @@ def unsupported(below: Runs, above: Runs, reach: float) -> Runs:
         Solid pixels of the layers.
     reach : float
         Pixels within this distance of a solid pixel of the layer below are supported, pixels.
-
-    Returns
-    -------
-    Runs
-        The unsupported pixels.
     """
     rows, count, size = np.zeros(len(above.rows), np.int32), len(above.begin), -1
     while count > size:  # most layers have fewer unsupported runs than runs
@@ -94,10 +89,9 @@ def farthest(
         None if nothing reaches too far.
     """
     coarse = max(int(overhang / COARSE / max(pixel)), 1)
-    for times in (coarse, max(-(-max(solid.height, solid.width) // FINEST), 1)):
-        far, away = _too_far(
-            solid, bare, times, pixel, overhang - 2 * (times == coarse) * times * max(pixel), span
-        )
+    fine = max(-(-max(solid.height, solid.width) // FINEST), 1)
+    for times, slack in ((coarse, 2 * coarse * max(pixel)), (fine, 0.0)):
+        far, away = _too_far(solid, bare, times, pixel, overhang - slack, span)
         if not far.any():
             return None
     step = np.array(pixel) * times

@@ -143,11 +143,6 @@ def _gaps(rows, begin, end, nx, gaps, gap_begin, gap_end):  # type: ignore[no-un
 def overlaps(below: LayerComponents, above: LayerComponents) -> np.ndarray:
     """Pairs of components of two layers that share a pixel.
 
-    Parameters
-    ----------
-    below, above : LayerComponents
-        Components of the layers.
-
     Returns
     -------
     int64 [n, 2]

@@ -65,13 +65,7 @@ class Vertices(Rows):
 
     @classmethod
     def none(cls) -> Vertices:
-        """An empty record.
-
-        Returns
-        -------
-        Vertices
-            No vertices.
-        """
+        """An empty record."""
         return cls(np.empty((0, 2)), np.empty(0, np.int64), np.empty(0))
 
 

@@ -71,24 +71,12 @@ class Sampler:
         ----------
         z : float64 [n]
             Heights of adjacent layers, scene units.
-
-        Returns
-        -------
-        Slab
-            The slab.
         """
         x0, y0, dx, dy = self.frame.tolist()
         return Slab(self._memory, self._entry, self._probe_bounds, (x0, y0, dx, dy), z.tolist(), *self.shape)
 
     def sample(self, slab: Slab, layer: int) -> None:
         """Sample a layer of a slab.
-
-        Parameters
-        ----------
-        slab : Slab
-            The slab.
-        layer : int
-            Number of the layer in the slab.
 
         Raises
         ------

@@ -169,13 +169,7 @@ class Viewer:
             act()
 
     def hurry(self, factor: float) -> None:
-        """Multiply the pace.
-
-        Parameters
-        ----------
-        factor : float
-            Factor on the pace.
-        """
+        """Multiply the pace."""
         self.controls.pace *= factor
 
     def grasp(self, at: tuple[int, int] | None) -> None:

@@ -45,11 +45,6 @@ def caption(mesh: Mesh) -> str:
     ----------
     mesh : Mesh
         The mesh, mm.
-
-    Returns
-    -------
-    str
-        The caption.
     """
     x, y, z = mesh.size
     return f"{x:.1f} x {y:.1f} x {z:.1f} mm, {len(mesh.triangles):,} triangles"

@@ -70,13 +70,6 @@ def crossed(
 def sides(states: States, work: Work) -> np.ndarray:
     """Sides of unsampled bricks.
 
-    Parameters
-    ----------
-    states
-        States of all bricks.
-    work
-        Execution settings.
-
     Returns
     -------
     ndarray

@@ -96,16 +96,6 @@ class Pruning:
         """Return the share of the unsampled bricks whose sign is proved; None if it is not known.
 
         Where a measured bound discarded them, proofs of a few thousand are looked for.
-
-        Parameters
-        ----------
-        states
-            States of all bricks.
-
-        Returns
-        -------
-        float or None
-            Share.
         """
         if self.everywhere:
             return 1.0

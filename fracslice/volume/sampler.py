@@ -53,23 +53,11 @@ def sample(
         If the job was cancelled.
     """
     values: list[np.ndarray] = []
-
-    def keep(batch: np.ndarray) -> None:
-        values.append(batch)
-
-    run = Exploration(Pruning(kernel, conservative or kernel, bounds, lattice, work or Work(), proofs), keep)
+    pruning = Pruning(kernel, conservative or kernel, bounds, lattice, work or Work(), proofs)
+    run = Exploration(pruning, values.append)
     signs, order = run.signs()
-    return Bricks(
-        signs.origin,
-        signs.voxel,
-        signs.ijk,
-        _gathered(values, order, run.work),
-        signs.index,
-        evaluations=signs.evaluations,
-        repaired=signs.repaired,
-        audited=signs.audited,
-        proved=signs.proved,
-    )
+    gathered = _gathered(values, order, run.work)
+    return Bricks(signs.origin, signs.voxel, signs.ijk, gathered, signs.index, **signs.counts)
 
 
 def sample_signs(

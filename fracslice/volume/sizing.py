@@ -88,10 +88,6 @@ def sizing(
     work : Work, optional
         Threads and cancellation.
 
-    Returns
-    -------
-    Sizing
-
     Raises
     ------
     VolumeError

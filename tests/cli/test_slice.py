@@ -101,6 +101,85 @@ def test_a_full_disk_keeps_the_finished_layers_and_says_so(
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(["ball.xml", name])
 
 
+@pytest.mark.parametrize("ending", ["sl1", "3mf", "png"])
+def test_names_that_are_no_text(ending: str, ball: Path, tmp_path: Path) -> None:
+    """Linux has names of any bytes."""
+    scene, target = (tmp_path / os.fsdecode(b"b\xff." + e) for e in (b"xml", ending.encode()))
+    ball.rename(scene)
+    how = {"sl1": ["slice", "--layer", "5mm", "--printer", "sl1s"], "3mf": ["mesh", "--resolution", "16"]}
+    command = how.get(ending, ["render", "--size", "8x8", "--samples", "1"])
+    assert run([command[0], str(scene), "-o", str(target), *command[1:]]) == 0
+    assert target.stat().st_size
+
+
+@pytest.mark.parametrize("date", ["today", "1e9", "9" * 20])
+def test_an_impossible_date(
+    date: str, ball: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", date)
+    assert sliced(ball, "-o", tmp_path / "layers", "--layer", "5mm") == 2
+    assert capfd.readouterr().err.startswith(f"fracslice: SOURCE_DATE_EPOCH={date}: expected seconds")
+
+
+def test_a_file_that_is_written_is_named_when_its_page_is_stopped(
+    ball: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def stopped(*_: object) -> None:
+        raise Cancelled
+
+    monkeypatch.setattr("fracslice.jobs.slice_checks.check_run", stopped)
+    target = tmp_path / "a.json"
+    assert sliced(ball, "-o", target, "--layer", "5mm", "--html", tmp_path / "a.html") == 130
+    assert capfd.readouterr().err == f"fracslice: stopped; {target} is written\n"
+    assert target.exists() and not (tmp_path / "a.html").exists()
+
+
+def test_an_element_without_an_end_is_named_by_its_line(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    scene = tmp_path / "a.xml"
+    scene.write_text('<scene version="1">\n<solid\nsize="4mm">\n<!-- --><gyroid/></solid></scene>')
+    assert sliced(scene, "-o", tmp_path / "a.json", "--layer", "1mm") == 2
+    assert capfd.readouterr().err.startswith(f"fracslice: {scene}:4: <gyroid> has no end")
+
+
+def test_the_volume_is_the_same_in_all_formats_and_after_an_interruption(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Of a comb, whose layers cannot be interpolated."""
+    scene, add = tmp_path / "comb.xml", Journal.append
+    scene.write_text(
+        '<scene version="1"><solid unit="1mm"><box size="2 2 24"/>'
+        '<repeat period="9 9 3" count="1 1 8"><box size="8 8 1"/></repeat></solid></scene>'
+    )
+
+    def volume(target: str, *options: object) -> str:
+        assert (
+            run(["slice", str(scene), "-o", str(tmp_path / target), "--layer", "0.1mm", *map(str, options)])
+            == 0
+        )
+        return capfd.readouterr().out.splitlines()[1].split(" ml")[0]
+
+    def stopped(self: Journal, data: bytes) -> None:
+        if self.count == 99:
+            raise Cancelled
+        add(self, data)
+
+    layers = volume("layers", "--pixel", "0.05mm")
+    assert float(layers) == pytest.approx((8 * 64 + 16 * 4) / 1000, rel=0.01)
+    assert volume("a.cli", "--pixel", "0.05mm") == layers
+    printer = ("--printer", "sl1s")
+    with monkeypatch.context() as patch:
+        patch.setattr(Journal, "append", stopped)
+        assert run(["slice", str(scene), "-o", str(tmp_path / "a.sl1"), "--layer", "0.1mm", *printer]) == 130
+    assert volume("a.sl1", *printer) == layers
+    with monkeypatch.context() as patch:
+        patch.setattr(Journal, "append", stopped)
+        target = ["-o", str(tmp_path / "b.cli"), "--layer", "0.1mm"]
+        assert run(["slice", str(scene), *target, "--pixel", "0.05mm"]) == 130
+    assert volume("b.cli", "--pixel", "0.05mm").startswith("about ")
+
+
 def test_an_edited_scene_begins_afresh_and_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

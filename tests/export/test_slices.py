@@ -26,7 +26,7 @@ from fracslice.export import layerformats, png, resuming
 from fracslice.export.jobs import SliceRun
 from fracslice.export.layer_files import FORMATS, slice_format, write_slices
 from fracslice.export.resins import Resin
-from fracslice.export.resuming import Journal, journal
+from fracslice.export.resuming import Journal, journal, resumable_folder
 from fracslice.formulas import Node, difference, menger, sphere
 from fracslice.jobs.stack_model import StackModel
 from fracslice.scene import scene
@@ -98,6 +98,7 @@ def test_sl1(tmp_path: Path) -> None:
         assert settings["display_pixels_x"] == "96"
         assert settings["display_orientation"] == "portrait"
         assert pictures == [f"part{k:05d}.png" for k in range(24)]
+        assert [x["file"] for x in json.loads(archive.read("fracslice.json"))["layers"]] == pictures
         with Image.open(io.BytesIO(archive.read(pictures[3]))) as image:
             assert image.size == (80, 96)
             assert image.mode == "L"
@@ -441,6 +442,15 @@ def test_two_at_once_do_not_spoil_each_other(tmp_path: Path) -> None:
         ):
             pass
         assert list(kept) == [b"layer"]
+
+
+def test_two_at_once_do_not_mix_their_layers(tmp_path: Path) -> None:
+    folder = tmp_path / "layers"
+    with resumable_folder(folder, "one", "{:05}.png".format, bool):
+        (folder / "00000.png").write_bytes(b"one")
+        with pytest.raises(ExportError, match="layers: another process is writing it"):
+            write_slices(run(), folder)
+        assert (folder / "00000.png").read_bytes() == b"one"
 
 
 def test_a_layer_that_is_a_link_is_not_written_through(tmp_path: Path) -> None:

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import time
 import tracemalloc
+from typing import Any
 
 import numpy as np
 import pytest
 
 from fracslice.formulas import Node, box, cylinder, difference, menger, sphere, transform, union
 from fracslice.printing.limits import Limits
+from fracslice.scene import Print
 from fracslice.slicing import SliceJob, Slicer, plan_stack
 from fracslice.slicing.feature_graph import Graph
 from fracslice.slicing.layer_checks import PrintReport, check_layers
-from fracslice.slicing.overhangs import unsupported
+from fracslice.slicing.layer_problems import misfit
+from fracslice.slicing.overhangs import farthest, unsupported
 from fracslice.slicing.printers import PRINTERS
 from fracslice.slicing.runs import Runs, layer_components, overlaps
 from fracslice.slicing.thickness import widths
@@ -118,6 +121,27 @@ def test_islands_and_overhang() -> None:
     assert any("1 island in the air" in str(p) for p in report.problems)
 
 
+def test_an_island_above_an_empty_layer_overhangs() -> None:
+    floating = union(box(size=(1, 1, 0.2)), at(box(size=(0.4, 0.4, 0.4)), 0, 0, 0.8))
+    report = checked(floating)
+    assert report.largest_overhang == pytest.approx(16 / 1.21, rel=0.05)
+
+
+@pytest.mark.parametrize("pixel", [0.1, 0.5, 1.0, 2.0])
+def test_cantilevers_are_measured_by_the_limit_with_any_pixel(pixel: float) -> None:
+    below, above = np.zeros((2, 20, 60), bool)
+    below[5:15, 10:20] = above[5:15, 10:20] = True
+
+    def reaches(count: int) -> bool:
+        above[5:15, 20 : 20 + count] = True
+        solid = runs_of(above)
+        bare = unsupported(runs_of(below), solid, 1.0)
+        return farthest(solid, bare, 1, (pixel, pixel), 10 * pixel, 100 * pixel) is not None
+
+    assert not reaches(11)  # the first pixel rests on the one below
+    assert reaches(12)
+
+
 def test_loose_bodies() -> None:
     report = checked(union(at(box(size=(0.4, 0.4, 1)), -0.5, 0, 0), at(box(size=(0.4, 0.4, 1)), 0.5, 0, 0)))
     assert len(report.bodies) == 2
@@ -142,6 +166,26 @@ def test_menger_walls_and_gaps_are_known() -> None:
     assert report.walls.smallest == pytest.approx(10 / 9, abs=0.11)
     assert report.gaps.smallest == pytest.approx(10 / 9, abs=0.11)
     assert sum(report.gaps.counts) > 100
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {},
+        {"scale": 1.1},
+        {"printing": Print(raft=2)},
+        {"printing": Print(base=20), "scale": (1.1, 1.2, 1.05)},
+        {"up": (1, 0, 2)},
+    ],
+)
+def test_an_object_of_the_size_that_is_advised_fits(given: dict[str, Any]) -> None:
+    machine = PRINTERS["sl1s"]
+    bar = box(size=(2, 1, 0.5))
+    unfit = misfit(plan_stack(bar, SliceJob(size=400, layer=1, pixel=1, **given)), machine)
+    assert unfit is not None
+    ((name, size),) = unfit.mend
+    assert name == "size"
+    assert misfit(plan_stack(bar, SliceJob(size=size, layer=1, pixel=1, **given)), machine) is None
 
 
 def test_fit() -> None:

@@ -1,4 +1,4 @@
-"""Camera rays."""
+"""Camera rays: origin and unit direction."""
 
 from __future__ import annotations
 
@@ -12,21 +12,10 @@ def pinhole(px, py, lens_u, lens_v, eye, corner, across, down):
 
     Parameters
     ----------
-    px, py : float
-        Film position, pixels.
-    lens_u, lens_v : float
-        Random numbers in [0, 1) for the lens.
-    eye : tuple of float
-        Position of the camera.
     corner : tuple of float
         Direction to the film's upper left corner.
     across, down : tuple of float
         Change of direction per pixel, to the right and down.
-
-    Returns
-    -------
-    ox, oy, oz, dx, dy, dz : float
-        Origin and unit direction.
     """
     ex, ey, ez = eye
     cx, cy, cz = corner
@@ -44,12 +33,6 @@ def lens(px, py, lens_u, lens_v, eye, corner, across, down, right, up, focus):
 
     Parameters
     ----------
-    px, py : float
-        Film position, pixels.
-    lens_u, lens_v : float
-        Random numbers in [0, 1) for the lens.
-    eye : tuple of float
-        Position of the camera.
     corner : tuple of float
         Direction to the film's upper left corner.
     across, down : tuple of float
@@ -58,11 +41,6 @@ def lens(px, py, lens_u, lens_v, eye, corner, across, down, right, up, focus):
         Half axes of the lens.
     focus : float
         Distance of the plane of focus.
-
-    Returns
-    -------
-    ox, oy, oz, dx, dy, dz : float
-        Origin and unit direction.
     """
     ex, ey, ez = eye
     cx, cy, cz = corner
@@ -86,8 +64,6 @@ def stereo_half(px, width):
 
     Parameters
     ----------
-    px : float
-        Film position, pixels.
     width : float
         Width of one picture, pixels.
 
@@ -107,10 +83,6 @@ def stereo(px, py, lens_u, lens_v, eye, corner, across, down, offset, half, focu
 
     Parameters
     ----------
-    px, py : float
-        Film position, pixels.
-    lens_u, lens_v : float
-        Random numbers, not used.
     eye : tuple of float
         Point between the eyes.
     corner, across, down : tuple of float
@@ -121,11 +93,6 @@ def stereo(px, py, lens_u, lens_v, eye, corner, across, down, offset, half, focu
         Width of one picture, pixels.
     focus : float
         Distance at which the pictures agree.
-
-    Returns
-    -------
-    ox, oy, oz, dx, dy, dz : float
-        Origin and unit direction.
     """
     ex, ey, ez = eye
     cx, cy, cz = corner
@@ -148,10 +115,6 @@ def orthographic(px, py, lens_u, lens_v, eye, corner, across, down, forward):
 
     Parameters
     ----------
-    px, py : float
-        Film position, pixels.
-    lens_u, lens_v : float
-        Random numbers, not used.
     eye : tuple of float
         Not used: `corner` holds it.
     corner : tuple of float
@@ -160,11 +123,6 @@ def orthographic(px, py, lens_u, lens_v, eye, corner, across, down, forward):
         Change of position per pixel, to the right and down.
     forward : tuple of float
         Unit direction of all rays.
-
-    Returns
-    -------
-    ox, oy, oz, dx, dy, dz : float
-        Origin and unit direction.
     """
     cx, cy, cz = corner
     ax, ay, az = across
@@ -182,12 +140,6 @@ def fisheye(px, py, lens_u, lens_v, eye, right, up, forward, middle, pixel):
 
     Parameters
     ----------
-    px, py : float
-        Film position, pixels.
-    lens_u, lens_v : float
-        Random numbers, not used.
-    eye : tuple of float
-        Position of the camera.
     right, up, forward : tuple of float
         Unit axes of the camera.
     middle : tuple of float
@@ -228,23 +180,12 @@ def equirectangular(px, py, lens_u, lens_v, eye, right, up, forward, width, heig
 
     Parameters
     ----------
-    px, py : float
-        Film position, pixels.
-    lens_u, lens_v : float
-        Random numbers, not used.
-    eye : tuple of float
-        Position of the camera.
     right, up, forward : tuple of float
         Unit axes of the camera; `forward` is in the middle of a picture.
     width, height : float
         Size of one picture, pixels.
     radius : float
         Half the distance between the eyes.
-
-    Returns
-    -------
-    ox, oy, oz, dx, dy, dz : float
-        Origin and unit direction.
     """
     ex, ey, ez = eye
     rx, ry, rz = right

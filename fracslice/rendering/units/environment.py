@@ -37,8 +37,6 @@ def seen_at(dx, dy, dz, turn):
 
     Parameters
     ----------
-    dx, dy, dz : float
-        Unit direction.
     turn : float
         Rotation about the z axis, full turns.
 
@@ -64,13 +62,6 @@ def between(light, width, left, right, across, upper, lower, down, P):
         Columns and rows of the four pixels.
     across, down : float
         Weights of the right column and of the lower row.
-    P : array of float
-        Scene parameters.
-
-    Returns
-    -------
-    r, g, b : float
-        Linear light.
     """
     a = light + 3.0 * (upper * width + left)
     b = light + 3.0 * (upper * width + right)
@@ -92,23 +83,12 @@ def surroundings(dx, dy, dz, light, width, height, turn, tint, P):
 
     Parameters
     ----------
-    dx, dy, dz : float
-        Unit direction.
     light : float
         Index of the table of light in P.
-    width, height : float
-        Size of the picture, pixels.
     turn : float
         Rotation about the z axis, full turns.
     tint : tuple of float
         Factor on red, green and blue.
-    P : array of float
-        Scene parameters.
-
-    Returns
-    -------
-    r, g, b : float
-        Linear light.
     """
     tr, tg, tb = tint
     u, v = seen_at(dx, dy, dz, turn)
@@ -139,8 +119,6 @@ def interval(value, first, count, steps, half, P):
         Binary logarithm of the count, rounded up.
     half : float
         Largest power of two below the count.
-    P : array of float
-        Scene parameters.
 
     Returns
     -------
@@ -167,21 +145,15 @@ def towards(u, v, rows, columns, size, steps, halves, turn, P):
 
     Parameters
     ----------
-    u, v : float
-        Random numbers in [0, 1).
     rows, columns : float
         Indices of the tables of probability in P.
     size, steps, halves : tuple
         Width and height of the picture; see `interval`.
     turn : float
         Rotation about the z axis, full turns.
-    P : array of float
-        Scene parameters.
 
     Returns
     -------
-    dx, dy, dz : float
-        Unit direction.
     density : float
         Probability density per unit solid angle.
     """
@@ -202,21 +174,12 @@ def likelihood(dx, dy, dz, rows, columns, size, turn, P):
 
     Parameters
     ----------
-    dx, dy, dz : float
-        Unit direction.
     rows, columns : float
         Indices of the tables of probability in P.
     size : tuple of float
         Width and height of the picture.
     turn : float
         Rotation about the z axis, full turns.
-    P : array of float
-        Scene parameters.
-
-    Returns
-    -------
-    float
-        Probability density per unit solid angle.
     """
     width, height = size
     u, v = seen_at(dx, dy, dz, turn)
@@ -236,15 +199,8 @@ def irradiance(nx, ny, nz, harmonics):
 
     Parameters
     ----------
-    nx, ny, nz : float
-        Unit normal.
     harmonics : tuple of tuple of float
         Factors of 1, y, z, x, xy, yz, 3 z^2 - 1, xz and x^2 - y^2, for red, green and blue.
-
-    Returns
-    -------
-    r, g, b : float
-        Linear light.
     """
     hr, hg, hb = harmonics
     return harmonic(nx, ny, nz, hr), harmonic(nx, ny, nz, hg), harmonic(nx, ny, nz, hb)
@@ -259,11 +215,6 @@ def harmonic(x, y, z, h):
         Unit normal.
     h : tuple of float
         Nine factors.
-
-    Returns
-    -------
-    float
-        Linear light.
     """
     a, b, c, d, e, f, g, i, j = h
     linear = a + b * y + c * z + d * x

@@ -14,11 +14,6 @@ def fog(t, density):
         Distance, scene units.
     density : float
         Extinction per scene unit.
-
-    Returns
-    -------
-    float
-        Fraction of the light that passes.
     """
     return exp(-density * t)
 
@@ -56,11 +51,6 @@ def height_fog(t, z, dz, density, level, height):
         Height of the ray's end, and vertical component of its direction.
     density, level, height : float
         See `thickness`.
-
-    Returns
-    -------
-    float
-        Fraction of the light that passes.
     """
     drop = minimum(maximum(t * dz / height, -40.0), 40.0)
     curved = absolute(drop) > 1e-3

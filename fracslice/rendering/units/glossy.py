@@ -19,11 +19,6 @@ LACQUER = 0.1
 def width(rough):
     """Return the parameter of the distribution: the square of the roughness (Burley 2012).
 
-    Parameters
-    ----------
-    rough : float
-        Roughness, 0 to 1.
-
     Returns
     -------
     float
@@ -41,11 +36,6 @@ def hidden(cosine, a):
         Cosine of the angle between the direction and the normal.
     a : float
         Width of the distribution.
-
-    Returns
-    -------
-    float
-        Lambda.
     """
     c2 = maximum(cosine * cosine, 1e-8)
     return 0.5 * (sqrt(1.0 + a * a * maximum(1.0 - c2, 0.0) / c2) - 1.0)
@@ -56,32 +46,14 @@ def tinted(cosine, least):
 
     Parameters
     ----------
-    cosine : float
-        Cosine of the angle of incidence.
     least : float
         Reflectance at normal incidence.
-
-    Returns
-    -------
-    float
-        Reflectance.
     """
     return where(least > 0.0, fresnel(cosine, least), 0.0)
 
 
 def highlight(nx, ny, nz, dx, dy, dz, lx, ly, lz, rough):
     """Return the reflection of a light, but for Fresnel's factor.
-
-    Parameters
-    ----------
-    nx, ny, nz : float
-        Unit normal.
-    dx, dy, dz : float
-        Unit direction of the ray.
-    lx, ly, lz : float
-        Unit direction to the light.
-    rough : float
-        Roughness.
 
     Returns
     -------
@@ -102,17 +74,6 @@ def highlight(nx, ny, nz, dx, dy, dz, lx, ly, lz, rough):
 
 def glossy(dx, dy, dz, nx, ny, nz, rough, u, v):
     """Sample a reflected ray by the visible microfacets (Heitz 2018).
-
-    Parameters
-    ----------
-    dx, dy, dz : float
-        Unit direction of the ray.
-    nx, ny, nz : float
-        Unit normal.
-    rough : float
-        Roughness.
-    u, v : float
-        Random numbers in [0, 1).
 
     Returns
     -------

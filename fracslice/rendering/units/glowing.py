@@ -21,8 +21,6 @@ def prominence(x, y, z, nx, ny, nz, body):
 
     Parameters
     ----------
-    x, y, z, nx, ny, nz : float
-        Surface point and unit normal.
     body : tuple of float
         Centre and half sides of its box, and the light that it sends out.
 
@@ -44,8 +42,6 @@ def smallness(x, y, z, body):
 
     Parameters
     ----------
-    x, y, z : float
-        Surface point.
     body : tuple of float
         See `prominence`.
 
@@ -65,10 +61,6 @@ def sent_share(x, y, z, nx, ny, nz, P, bodies, count):
 
     Parameters
     ----------
-    x, y, z, nx, ny, nz : float
-        Surface point and unit normal.
-    P : array of float
-        Scene parameters.
     bodies : tuple of tuple of float
         The bodies; see `prominence`.
     count : int
@@ -93,21 +85,12 @@ def towards_body(x, y, z, nx, ny, nz, u, v, w, choice, P, bodies, count):
 
     Parameters
     ----------
-    x, y, z, nx, ny, nz : float
-        Surface point and unit normal.
     u, v, w, choice : float
         Random numbers in [0, 1) for the point and for the body.
-    P : array of float
-        Scene parameters.
     bodies : tuple of tuple of float
         The bodies; see `prominence`.
     count : int
         Number of bodies.
-
-    Returns
-    -------
-    dx, dy, dz : float
-        Unit direction.
     """
     total = 0.0 * x
     px, py, pz = nx, ny, nz
@@ -132,21 +115,10 @@ def body_density(x, y, z, nx, ny, nz, dx, dy, dz, P, bodies, count):
 
     Parameters
     ----------
-    x, y, z, nx, ny, nz : float
-        Surface point and unit normal.
-    dx, dy, dz : float
-        Unit direction.
-    P : array of float
-        Scene parameters.
     bodies : tuple of tuple of float
         The bodies; see `prominence`.
     count : int
         Number of bodies.
-
-    Returns
-    -------
-    float
-        Probability density per unit solid angle.
     """
     total = 0.0 * x
     density = 0.0 * x
@@ -171,8 +143,6 @@ def mixed_density(sent, beside, nx, ny, nz, dx, dy, dz, lx, ly, lz, rough, share
         Density of those in its direction.
     nx, ny, nz, dx, dy, dz, lx, ly, lz : float
         Unit normal, direction of the ray that arrives, direction of the one that continues.
-    rough : float
-        Roughness.
     share : float
         Probability of reflection of the other rays.
 

@@ -24,33 +24,13 @@ GIVEN = frozenset({"blocker", "field", "gather", "transparent"})
 
 @intrinsic
 def blocker(x, y, z, P):
-    """Evaluate the field of the opaque parts of the scene.
-
-    Parameters
-    ----------
-    x, y, z : float
-        Coordinates, scene units.
-    P : array of float
-        Scene parameters.
-
-    Returns
-    -------
-    float
-        Field value.
-    """
+    """Evaluate the field of the opaque parts of the scene."""
     raise NotImplementedError
 
 
 @intrinsic
 def transparent(x, y, z, P):
     """Evaluate the field of the transparent parts of the scene.
-
-    Parameters
-    ----------
-    x, y, z : float
-        Coordinates, scene units.
-    P : array of float
-        Scene parameters.
 
     Returns
     -------
@@ -63,35 +43,13 @@ def transparent(x, y, z, P):
 
 @intrinsic
 def camera_ray(px, py, lens_u, lens_v, P):
-    """Return the ray through a point of the film and a point of the lens.
-
-    Parameters
-    ----------
-    px, py : float
-        Film position, pixels.
-    lens_u, lens_v : float
-        Random numbers in [0, 1) for the lens.
-    P : array of float
-        Scene parameters.
-
-    Returns
-    -------
-    ox, oy, oz, dx, dy, dz : float
-        Origin and unit direction.
-    """
+    """Return the ray through a point of the film and a point of the lens."""
     raise NotImplementedError
 
 
 @intrinsic
 def span_box(ox, oy, oz, dx, dy, dz, P):
     """Return the interval of a ray in the scene's box.
-
-    Parameters
-    ----------
-    ox, oy, oz, dx, dy, dz : float
-        Origin and unit direction of the ray.
-    P : array of float
-        Scene parameters.
 
     Returns
     -------
@@ -104,19 +62,6 @@ def span_box(ox, oy, oz, dx, dy, dz, P):
 @intrinsic
 def step_ray(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P):
     """Take one step along a ray: `march.advance` with the scene's parameters.
-
-    Parameters
-    ----------
-    ox, oy, oz, dx, dy, dz : float
-        Origin and unit direction of the ray.
-    t, before, stride : float
-        Distance along the ray, radius of the previous ball, step taken from its centre.
-    side : float
-        -1 inside the solid, 1 outside.
-    path : float
-        Length of the path before this ray.
-    P : array of float
-        Scene parameters.
 
     Returns
     -------
@@ -132,16 +77,8 @@ def step_cone(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P):
 
     Parameters
     ----------
-    ox, oy, oz, dx, dy, dz : float
-        Origin and unit direction of the ray.
-    t, before, stride : float
-        Distance along the ray, radius of the previous ball, step taken from its centre.
-    side : float
-        Unused.
     path : float
         Half width of the cone at distance 1.
-    P : array of float
-        Scene parameters.
 
     Returns
     -------
@@ -157,24 +94,10 @@ def surface(x, y, z, dx, dy, dz, t, path, steps, side, last, u, P):
 
     Parameters
     ----------
-    x, y, z : float
-        Surface point.
-    dx, dy, dz : float
-        Unit direction of the ray.
-    t : float
-        Distance along the ray.
-    path : float
-        Length of the path before this ray.
-    steps : float
-        Steps of the ray.
-    side : float
-        -1 inside the solid, 1 outside.
     last : float
         1 if the ray is not continued, else 0.
     u : tuple of float
         Random numbers in [0, 1).
-    P : array of float
-        Scene parameters.
 
     Returns
     -------
@@ -193,16 +116,7 @@ def background(dx, dy, dz, q, P):
 
     Parameters
     ----------
-    dx, dy, dz : float
-        Unit direction of the ray.
     q : float
         Density of the direction; see `units.weights`.
-    P : array of float
-        Scene parameters.
-
-    Returns
-    -------
-    r, g, b : float
-        Linear light.
     """
     raise NotImplementedError

@@ -1,4 +1,4 @@
-"""Lights, as seen from a point."""
+"""Lights, as seen from a point: unit direction to the light, its distance, fraction of its strength."""
 
 from __future__ import annotations
 
@@ -12,16 +12,6 @@ def frame(x, y, z):
     """Return two unit vectors orthogonal to a unit vector and to each other.
 
     Duff et al. 2017, "Building an Orthonormal Basis, Revisited".
-
-    Parameters
-    ----------
-    x, y, z : float
-        The unit vector.
-
-    Returns
-    -------
-    ax, ay, az, bx, by, bz : float
-        The two vectors.
     """
     sign = where(z < 0.0, -1.0, 1.0 + 0.0 * z)
     a = -1.0 / (sign + z)
@@ -34,16 +24,6 @@ def disc(u, v):
 
     Neighbours in the square stay neighbours, so fewer samples suffice than with radius and angle (Shirley and
     Chiu 1997, "A Low Distortion Map Between Disk and Square").
-
-    Parameters
-    ----------
-    u, v : float
-        Random numbers in [0, 1).
-
-    Returns
-    -------
-    p, q : float
-        Point of the disc.
     """
     a = 2.0 * u - 1.0
     b = 2.0 * v - 1.0
@@ -61,21 +41,12 @@ def sun(x, y, z, u, v, towards, spread, far):
 
     Parameters
     ----------
-    x, y, z : float
-        Surface point.
-    u, v : float
-        Random numbers in [0, 1).
     towards : tuple of float
         Unit direction to its centre.
     spread : float
         Tangent of half its angular diameter.
     far : float
         Distance of the light.
-
-    Returns
-    -------
-    dx, dy, dz, distance, strength : float
-        Unit direction, distance, fraction of the strength.
     """
     lx, ly, lz = towards
     zero = 0.0 * x
@@ -92,19 +63,10 @@ def sharp_sun(x, y, z, u, v, towards, far):
 
     Parameters
     ----------
-    x, y, z : float
-        Surface point.
-    u, v : float
-        Random numbers in [0, 1).
     towards : tuple of float
         Unit direction to the sun.
     far : float
         Distance of the light.
-
-    Returns
-    -------
-    dx, dy, dz, distance, strength : float
-        Unit direction, distance, fraction of the strength.
     """
     lx, ly, lz = towards
     zero = 0.0 * x
@@ -116,19 +78,10 @@ def lamp(x, y, z, u, v, position, radius):
 
     Parameters
     ----------
-    x, y, z : float
-        Surface point.
-    u, v : float
-        Random numbers in [0, 1).
     position : tuple of float
         Centre of the lamp.
     radius : float
         Radius of the lamp.
-
-    Returns
-    -------
-    dx, dy, dz, distance, strength : float
-        Unit direction, distance, fraction of the strength.
     """
     px, py, pz = position
     h = 1.0 - 2.0 * u
@@ -146,17 +99,8 @@ def sharp_lamp(x, y, z, u, v, position):
 
     Parameters
     ----------
-    x, y, z : float
-        Surface point.
-    u, v : float
-        Random numbers in [0, 1).
     position : tuple of float
         Centre of the lamp.
-
-    Returns
-    -------
-    dx, dy, dz, distance, strength : float
-        Unit direction, distance, fraction of the strength.
     """
     px, py, pz = position
     lx = px - x
@@ -168,20 +112,7 @@ def sharp_lamp(x, y, z, u, v, position):
 
 
 def upward(nx, ny, nz, u, v):
-    """Sample a direction about a normal with cosine-weighted density (Malley's method).
-
-    Parameters
-    ----------
-    nx, ny, nz : float
-        Unit normal.
-    u, v : float
-        Random numbers in [0, 1).
-
-    Returns
-    -------
-    dx, dy, dz : float
-        Unit direction.
-    """
+    """Sample a direction about a normal with cosine-weighted density (Malley's method)."""
     ax, ay, az, bx, by, bz = frame(nx, ny, nz)
     p, q = disc(u, v)
     h = sqrt(maximum(1.0 - p * p - q * q, 0.0))
@@ -195,15 +126,8 @@ def sky(dx, dy, dz, zenith, horizon, ground):
 
     Parameters
     ----------
-    dx, dy, dz : float
-        Unit direction.
     zenith, horizon, ground : tuple of float
         Linear colours.
-
-    Returns
-    -------
-    r, g, b : float
-        Linear light.
     """
     zr, zg, zb = zenith
     hr, hg, hb = horizon

@@ -16,8 +16,6 @@ def span(ox, oy, oz, dx, dy, dz, lo, hi):
 
     Parameters
     ----------
-    ox, oy, oz, dx, dy, dz : float
-        Origin and unit direction of the ray.
     lo, hi : tuple of float
         Lower and upper corner of the box.
 
@@ -60,18 +58,6 @@ def advance(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness,
 
     Parameters
     ----------
-    ox, oy, oz, dx, dy, dz : float
-        Origin and unit direction of the ray.
-    t, before, stride : float
-        Distance along the ray, radius of the previous ball, step taken from its centre.
-    side : float
-        -1 inside the solid, 1 outside.
-    path : float
-        Length of the path before this ray.
-    P : array of float
-        Scene parameters.
-    steepness : float
-        Reciprocal of the field's Lipschitz bound.
     cone, least : float
         Half width of a pixel at distance 1; resolution of positions.
     glass : bool
@@ -115,18 +101,8 @@ def widen(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness):
 
     Parameters
     ----------
-    ox, oy, oz, dx, dy, dz : float
-        Origin and unit direction of the ray.
-    t, before, stride : float
-        Distance along the ray, radius of the previous ball, step taken from its centre.
-    side : float
-        Unused.
     path : float
         Half width of the cone at distance 1.
-    P : array of float
-        Scene parameters.
-    steepness : float
-        Reciprocal of the field's Lipschitz bound.
 
     Returns
     -------
@@ -154,10 +130,6 @@ def visible(x, y, z, dx, dy, dz, far, least, P, steepness, patience, glass):
         Distance of the light.
     least : float
         Smallest step.
-    P : array of float
-        Scene parameters.
-    steepness : float
-        Reciprocal of the field's Lipschitz bound.
     patience : int
         Maximum steps.
     glass : bool
@@ -187,22 +159,7 @@ def visible(x, y, z, dx, dy, dz, far, least, P, steepness, patience, glass):
 def tinted_shadow(x, y, z, dx, dy, dz, far, least, P, steepness, patience):
     """Return the light that transparent parts pass on to a point, as if they did not bend it.
 
-    Parameters
-    ----------
-    x, y, z : float
-        Start of the ray.
-    dx, dy, dz : float
-        Unit direction to the light.
-    far : float
-        Distance of the light.
-    least : float
-        Smallest step.
-    P : array of float
-        Scene parameters.
-    steepness : float
-        Reciprocal of the field's Lipschitz bound.
-    patience : int
-        Maximum steps.
+    The arguments are those of `visible`.
 
     Returns
     -------

@@ -7,18 +7,7 @@ from .intrinsics import field
 
 
 def normalised(x, y, z):
-    """Normalise a vector; the zero vector stays zero.
-
-    Parameters
-    ----------
-    x, y, z : float
-        The vector.
-
-    Returns
-    -------
-    x, y, z : float
-        Vector of length 1.
-    """
+    """Normalise a vector; the zero vector stays zero."""
     over = rsqrt(maximum(x * x + y * y + z * z, 1e-36))
     return x * over, y * over, z * over
 
@@ -28,17 +17,8 @@ def normal(x, y, z, h, P):
 
     Parameters
     ----------
-    x, y, z : float
-        Surface point.
     h : float
         Half edge of the cube that contains the corners.
-    P : array of float
-        Scene parameters.
-
-    Returns
-    -------
-    nx, ny, nz : float
-        Normalised gradient of the field.
     """
     gx, gy, gz = 0.0 * x, 0.0 * x, 0.0 * x
     for k in range(4):

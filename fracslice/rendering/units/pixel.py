@@ -11,34 +11,12 @@ UNKNOWN = 1e30
 
 
 def clamped(c):
-    """Clamp light to [0, 1e4]; NaN becomes 0.
-
-    Parameters
-    ----------
-    c : float
-        Linear light.
-
-    Returns
-    -------
-    float
-        The clamped value.
-    """
+    """Clamp light to [0, 1e4]; NaN becomes 0."""
     return minimum(maximum(where(c == c, c, 0.0), 0.0), 1e4)
 
 
 def brightness(r, g, b):
-    """Return the luminance of a colour as displayed, compressed to [0, 1).
-
-    Parameters
-    ----------
-    r, g, b : float
-        Linear light.
-
-    Returns
-    -------
-    float
-        Displayed brightness.
-    """
+    """Return the luminance of a colour as displayed, compressed to [0, 1)."""
     bright = 0.2126 * r + 0.7152 * g + 0.0722 * b
     return bright / (1.0 + bright)
 
@@ -64,29 +42,13 @@ def squared_error(bright, squares, n):
 
 
 def filmic(c):
-    """Filmic tone curve: contrast with soft shoulders (Narkowicz 2016, "ACES Filmic Tone Mapping Curve").
-
-    Parameters
-    ----------
-    c : float
-        Linear light of one channel.
-
-    Returns
-    -------
-    float
-        Tone-mapped light.
-    """
+    """Filmic tone curve: contrast with soft shoulders (Narkowicz 2016, "ACES Filmic Tone Mapping Curve")."""
     a = c * 0.6
     return a * (2.51 * a + 0.03) / (a * (2.43 * a + 0.59) + 0.14)
 
 
 def reinhard(r, g, b):
     """Return the factor of a luminance tone curve with white at 4; hues are kept (Reinhard et al. 2002).
-
-    Parameters
-    ----------
-    r, g, b : float
-        Linear light.
 
     Returns
     -------
@@ -122,10 +84,5 @@ def linear(colour: Sequence[float]) -> tuple[float, ...]:
     ----------
     colour : sequence of float
         sRGB components in [0, 1].
-
-    Returns
-    -------
-    tuple of float
-        Linear components.
     """
     return tuple(c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour)

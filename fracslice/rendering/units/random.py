@@ -4,18 +4,7 @@ from __future__ import annotations
 
 
 def reversed_bits(a):
-    """Reverse the bits of a 32-bit integer.
-
-    Parameters
-    ----------
-    a : int
-        The integer.
-
-    Returns
-    -------
-    int
-        The reversed integer.
-    """
+    """Reverse the bits of a 32-bit integer."""
     a = ((a >> 1) & 0x55555555) | ((a & 0x55555555) << 1)
     a = ((a >> 2) & 0x33333333) | ((a & 0x33333333) << 2)
     a = ((a >> 4) & 0x0F0F0F0F) | ((a & 0x0F0F0F0F) << 4)
@@ -24,18 +13,7 @@ def reversed_bits(a):
 
 
 def hashed(a):
-    """Hash a 32-bit integer (Wellons 2018, lowbias32).
-
-    Parameters
-    ----------
-    a : int
-        The integer.
-
-    Returns
-    -------
-    int
-        32-bit hash.
-    """
+    """Hash a 32-bit integer (Wellons 2018, lowbias32)."""
     a = ((a ^ (a >> 16)) * 0x7FEB352D) & 0xFFFFFFFF
     a = ((a ^ (a >> 15)) * 0x846CA68B) & 0xFFFFFFFF
     return a ^ (a >> 16)
@@ -50,11 +28,6 @@ def scrambled(a, seed):
         Fraction, bits reversed.
     seed : int
         32-bit seed.
-
-    Returns
-    -------
-    int
-        Scrambled fraction, bits in order.
     """
     a = (a ^ (a * 0x3D20ADEA)) & 0xFFFFFFFF
     a = (a + seed) & 0xFFFFFFFF
@@ -73,11 +46,6 @@ def seeded(pixel, dimension):
         Pixel, ``y << 16 | x``.
     dimension : int
         Dimension of a coordinate, below 64.
-
-    Returns
-    -------
-    int
-        32-bit seed.
     """
     return hashed((pixel * 64 + (pixel >> 26) * 0x9E3779B9 + dimension) & 0xFFFFFFFF)
 
@@ -93,11 +61,6 @@ def sample(a, pixel, dimension):
         Pixel, ``y << 16 | x``.
     dimension : int
         Dimension of the coordinate.
-
-    Returns
-    -------
-    float
-        Number in [0, 1).
     """
     return (scrambled(a & 0xFFFFFFFF, seeded(pixel, dimension)) >> 8) * 5.9604644775390625e-08
 
@@ -113,11 +76,6 @@ def centred(a, pixel, dimension):
         Pixel, ``y << 16 | x``.
     dimension : int
         Dimension of the coordinate.
-
-    Returns
-    -------
-    float
-        Number in [0, 1).
     """
     seed = seeded(pixel, dimension)
     shifted = scrambled(a & 0xFFFFFFFF, seed) ^ scrambled(0, seed) ^ 0x80000000

@@ -12,19 +12,8 @@ def phong(nx, ny, nz, dx, dy, dz, lx, ly, lz, specular, shininess):
 
     Parameters
     ----------
-    nx, ny, nz : float
-        Unit normal.
-    dx, dy, dz : float
-        Unit direction of the ray.
-    lx, ly, lz : float
-        Unit direction to the light.
     specular, shininess : float
         Strength and exponent of the highlight.
-
-    Returns
-    -------
-    diffuse, gloss : float
-        Factors on the light.
     """
     diffuse = maximum(nx * lx + ny * ly + nz * lz, 0.0)
     hx, hy, hz = normalised(lx - dx, ly - dy, lz - dz)
@@ -37,12 +26,6 @@ def occlusion(x, y, z, nx, ny, nz, P, strength, reach):
 
     Parameters
     ----------
-    x, y, z : float
-        Surface point.
-    nx, ny, nz : float
-        Unit normal.
-    P : array of float
-        Scene parameters.
     strength : float
         Factor on the occlusion.
     reach : float
@@ -70,17 +53,10 @@ def palette(tone, P, stops, count):
     ----------
     tone : float
         Position in [0, 1].
-    P : array of float
-        Scene parameters.
     stops : tuple of float
         Red, green and blue of each stop.
     count : int
         Number of stops.
-
-    Returns
-    -------
-    r, g, b : float
-        The colour.
     """
     r = 0.0 * tone
     g = 0.0 * tone
@@ -125,30 +101,12 @@ def lacquer(facing, coat):
         Cosine of the angle of incidence.
     coat : float
         Strength of the lacquer.
-
-    Returns
-    -------
-    float
-        Reflectance.
     """
     return coat * fresnel(facing, 0.04)
 
 
 def mirrored(dx, dy, dz, nx, ny, nz):
-    """Return the direction of reflection.
-
-    Parameters
-    ----------
-    dx, dy, dz : float
-        Unit direction of the ray.
-    nx, ny, nz : float
-        Unit normal.
-
-    Returns
-    -------
-    x, y, z : float
-        Unit direction.
-    """
+    """Return the direction of reflection."""
     twice = 2.0 * (dx * nx + dy * ny + dz * nz)
     return dx - twice * nx, dy - twice * ny, dz - twice * nz
 
@@ -158,15 +116,8 @@ def fresnel(cosine, least):
 
     Parameters
     ----------
-    cosine : float
-        Cosine of the angle of incidence.
     least : float
         Reflectance at normal incidence; at grazing incidence it is 1.
-
-    Returns
-    -------
-    float
-        Reflectance.
     """
     a = 1.0 - minimum(maximum(cosine, 0.0), 1.0)
     a2 = a * a
@@ -178,10 +129,6 @@ def bent(dx, dy, dz, nx, ny, nz, cosine, ratio):
 
     Parameters
     ----------
-    dx, dy, dz : float
-        Unit direction of the ray.
-    nx, ny, nz : float
-        Unit normal.
     cosine : float
         Cosine of the angle between the normal and the reversed ray.
     ratio : float
@@ -204,17 +151,8 @@ def reflects(dx, dy, dz, nx, ny, nz, reflect):
 
     Parameters
     ----------
-    dx, dy, dz : float
-        Unit direction of the ray.
-    nx, ny, nz : float
-        Unit normal.
     reflect : float
         Reflectance at normal incidence.
-
-    Returns
-    -------
-    part, x, y, z : float
-        Reflectance and direction.
     """
     cosine = -(dx * nx + dy * ny + dz * nz)
     part = where(reflect > 0.0, fresnel(cosine, reflect), 0.0)
@@ -230,12 +168,6 @@ def goes_on(dx, dy, dz, nx, ny, nz, side, reflect, clear, index, chance):
 
     Parameters
     ----------
-    dx, dy, dz : float
-        Unit direction of the ray.
-    nx, ny, nz : float
-        Unit normal.
-    side : float
-        -1 inside the solid, 1 outside.
     reflect, clear : float
         Reflectance at normal incidence; fraction of the light that a transparent surface passes on.
     index : float

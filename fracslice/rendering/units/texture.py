@@ -15,15 +15,6 @@ def repeated(u, v, light, width, height, P):
         Coordinates, pictures.
     light : float
         Index of its table in P.
-    width, height : float
-        Size of the picture, pixels.
-    P : array of float
-        Scene parameters.
-
-    Returns
-    -------
-    r, g, b : float
-        Linear light.
     """
     a = width * (u - floor(u)) - 0.5
     b = height * (v - floor(v)) - 0.5
@@ -43,18 +34,10 @@ def triplanar(x, y, z, nx, ny, nz, light, width, height, tile, P):
 
     Parameters
     ----------
-    x, y, z : float
-        Surface point.
-    nx, ny, nz : float
-        Unit normal.
     light : float
         Index of the picture's table in P.
-    width, height : float
-        Size of the picture, pixels.
     tile : float
         Width of the picture, scene units.
-    P : array of float
-        Scene parameters.
 
     Returns
     -------

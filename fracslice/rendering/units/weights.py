@@ -35,19 +35,8 @@ def facet_density(nx, ny, nz, dx, dy, dz, lx, ly, lz, rough):
 
     Parameters
     ----------
-    nx, ny, nz : float
-        Unit normal.
-    dx, dy, dz : float
-        Unit direction of the ray.
     lx, ly, lz : float
         Unit direction of reflection.
-    rough : float
-        Roughness.
-
-    Returns
-    -------
-    float
-        Probability density per unit solid angle.
     """
     a = width(rough)
     value, _ = highlight(nx, ny, nz, dx, dy, dz, lx, ly, lz, rough)
@@ -61,23 +50,10 @@ def weights(dense, diffuse, nx, ny, nz, dx, dy, dz, lx, ly, lz, rough, share, fr
 
     Parameters
     ----------
-    dense : float
-        Density of the sample per unit solid angle.
     diffuse : float
         Cosine of the angle between light and normal.
-    nx, ny, nz, dx, dy, dz, lx, ly, lz : float
-        Unit normal, direction of the ray, direction to the light.
-    rough : float
-        Roughness; a smooth surface reflects into one direction.
-    share : float
-        Probability of reflection.
     free : float
         1 if no continued ray can meet the light.
-
-    Returns
-    -------
-    scattered, reflected : float
-        Weights.
     """
     facets = share * facet_density(nx, ny, nz, dx, dy, dz, lx, ly, lz, rough)
     scattered = heuristic(dense, (1.0 - share) * diffuse / HALF_TURN)
@@ -90,19 +66,10 @@ def mixed_weights(dense, likely, rough, free):
 
     Parameters
     ----------
-    dense : float
-        Density of the sample per unit solid angle.
     likely : float
         Density of a ray that continues in its direction; see `glowing.mixed_density`.
-    rough : float
-        Roughness; a smooth surface reflects into one direction.
     free : float
         1 if no continued ray can meet the light.
-
-    Returns
-    -------
-    scattered, reflected : float
-        Weights.
     """
     weight = where(free > 0.5, 1.0, heuristic(dense, likely))
     return weight, where(rough > 0.0, weight, 1.0)
@@ -117,10 +84,6 @@ def density_onward(chosen, nx, ny, nz, dx, dy, dz, ex, ey, ez, rough, share):
         True if it is reflected, not scattered.
     nx, ny, nz, dx, dy, dz, ex, ey, ez : float
         Unit normal, direction of the ray, direction of the continued ray.
-    rough : float
-        Roughness.
-    share : float
-        Probability of reflection.
 
     Returns
     -------
@@ -138,17 +101,10 @@ def sun_density(dx, dy, dz, towards, spread):
 
     Parameters
     ----------
-    dx, dy, dz : float
-        Unit direction.
     towards : tuple of float
         Unit direction to the centre of the sun.
     spread : float
         Tangent of half its angular diameter.
-
-    Returns
-    -------
-    float
-        Probability density per unit solid angle.
     """
     lx, ly, lz = towards
     cosine = dx * lx + dy * ly + dz * lz
