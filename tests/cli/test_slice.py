@@ -80,27 +80,6 @@ def test_a_folder_that_is_not_this_job(ball: Path, tmp_path: Path, capfd: pytest
     assert (tmp_path / "layers" / "job.json").read_text() == '{"mine": 1}'
 
 
-@pytest.mark.parametrize(("name", "pixels"), [("a.sl1", "--printer=sl1s"), ("layers", "--pixel=1mm")])
-def test_a_full_disk_keeps_the_finished_layers_and_says_so(
-    name: str,
-    pixels: str,
-    ball: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
-) -> None:
-    def full(_: int) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    given = ["slice", str(ball), "-o", str(tmp_path / name), "--layer=1mm", pixels]
-    with monkeypatch.context() as patch:
-        patch.setattr("os.fsync", full)
-        assert run(given) == 2
-    assert "the disk is full; the same command goes on from the finished layers" in capfd.readouterr().err
-    assert run(given) == 0
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(["ball.xml", name])
-
-
 @pytest.mark.parametrize("ending", ["sl1", "3mf", "png"])
 def test_names_that_are_no_text(ending: str, ball: Path, tmp_path: Path) -> None:
     """Linux has names of any bytes."""
@@ -178,6 +157,27 @@ def test_the_volume_is_the_same_in_all_formats_and_after_an_interruption(
         target = ["-o", str(tmp_path / "b.cli"), "--layer", "0.1mm"]
         assert run(["slice", str(scene), *target, "--pixel", "0.05mm"]) == 130
     assert volume("b.cli", "--pixel", "0.05mm").startswith("about ")
+
+
+@pytest.mark.parametrize(("name", "pixels"), [("a.sl1", "--printer=sl1s"), ("layers", "--pixel=1mm")])
+def test_a_full_disk_keeps_the_finished_layers_and_says_so(
+    name: str,
+    pixels: str,
+    ball: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    given = ["slice", str(ball), "-o", str(tmp_path / name), "--layer=1mm", pixels]
+    with monkeypatch.context() as patch:
+        patch.setattr("os.fsync", full)
+        assert run(given) == 2
+    assert "the disk is full; the same command goes on from the finished layers" in capfd.readouterr().err
+    assert run(given) == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(["ball.xml", name])
 
 
 def test_an_edited_scene_begins_afresh_and_says_so(
