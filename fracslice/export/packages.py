@@ -30,7 +30,7 @@ LAST_BLOCK = zlib.compressobj(wbits=-zlib.MAX_WBITS).flush()
 """Empty block that ends a deflate stream."""
 
 
-class Text(NamedTuple):
+class TextSum(NamedTuple):
     """Checksum and length of a text.
 
     Attributes
@@ -43,26 +43,26 @@ class Text(NamedTuple):
     size: int
 
 
-Fragment = Callable[[BinaryIO], Text]
+Fragment = Callable[[BinaryIO], TextSum]
 """Appends a text to a file, deflated and ended at a byte, so that another one may follow."""
 
 
-def deflated(text: bytes) -> tuple[bytes, Text]:
+def deflated(text: bytes) -> tuple[bytes, TextSum]:
     """Deflate a text by itself.
 
     Returns
     -------
     bytes
         Blocks of a deflate stream, none of them the last; they end at a byte.
-    Text
+    TextSum
         Checksum and length.
     """
     packer = zlib.compressobj(LEVEL, zlib.DEFLATED, -zlib.MAX_WBITS)
     blocks = packer.compress(text) + packer.flush(zlib.Z_FULL_FLUSH)
-    return blocks, Text(crc32(text), len(text))
+    return blocks, TextSum(crc32(text), len(text))
 
 
-def append(blocks: tuple[bytes, Text], file: BinaryIO) -> Text:
+def append(blocks: tuple[bytes, TextSum], file: BinaryIO) -> TextSum:
     """Append a deflated text to a file; a `Fragment` once its first argument is given.
 
     Parameters
@@ -74,16 +74,16 @@ def append(blocks: tuple[bytes, Text], file: BinaryIO) -> Text:
 
     Returns
     -------
-    Text
+    TextSum
         Checksum and length of the text.
     """
     file.write(blocks[0])
     return blocks[1]
 
 
-def followed(one: Text, other: Text) -> Text:
+def followed(one: TextSum, other: TextSum) -> TextSum:
     """Checksum and length of two texts, one after the other."""
-    return Text(crc32_combine(one.crc, other.crc, other.size), one.size + other.size)
+    return TextSum(crc32_combine(one.crc, other.crc, other.size), one.size + other.size)
 
 
 def join(file: BinaryIO, fragments: Iterable[Fragment], is_large: bool) -> None:
@@ -101,7 +101,7 @@ def join(file: BinaryIO, fragments: Iterable[Fragment], is_large: bool) -> None:
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=LEVEL) as archive:
         for name, text in SMALL:
             archive.writestr(zipfile.ZipInfo(name), text, zipfile.ZIP_DEFLATED)
-        info, whole = zipfile.ZipInfo("3D/3dmodel.model"), Text(0, 0)
+        info, whole = zipfile.ZipInfo("3D/3dmodel.model"), TextSum(0, 0)
         info.compress_type, info.external_attr = zipfile.ZIP_DEFLATED, 0o600 << 16
         info.header_offset, info.CRC = file.tell(), 0
         file.write(info.FileHeader(is_large))

@@ -209,7 +209,7 @@ def resumable_folder(
     ExportError
         For a folder with other files, an error of the file system, or if another process is writing there.
     """
-    with _resumed(folder):
+    with reported(folder):
         folder.mkdir(exist_ok=True)
     with _resumed(folder), locked_folder(folder):
         names = set(os.listdir(folder))

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..cluster import Contents, Files, ResultFolder, packed, unpacked
 from ..export import text as texts
-from ..export.packages import Fragment, Text, deflated, followed
+from ..export.packages import Fragment, TextSum, deflated, followed
 from ..export.threemf import triangle_rows, vertex_rows
 from ..work import Work, chunks
 from .finished_pieces import piece_rows, read_finished, welded
@@ -93,7 +93,7 @@ class EncodeTask(MeshTask):
         """Checksum and length of the text, which is a file of its own; see `Task.make`."""
         table = unpacked(self.pieces.read(self.job, NUMBERS))
         begin = self.number * BLOCKS * texts.ROWS
-        blocks, whole = list[bytes](), Text(0, 0)
+        blocks, whole = list[bytes](), TextSum(0, 0)
         for text in self.rows(table, begin, begin + BLOCKS * texts.ROWS):
             block, about = deflated(text)
             blocks.append(block)
@@ -194,7 +194,7 @@ def model_rows(surface: SharedSurface, tips: int) -> tuple[Rows, Rows]:
 
     def fragments() -> Iterator[Fragment]:
         for task, data in zip(tasks, pool.results(tasks, clock.work, "writing"), strict=True):
-            yield partial(_append, pool.pieces, task, Text(*unpacked(data)["text"].tolist()))
+            yield partial(_append, pool.pieces, task, TextSum(*unpacked(data)["text"].tolist()))
 
     made = fragments()
     return (rows[0], islice(made, counts[0])), (rows[1], made)
@@ -225,7 +225,7 @@ def _numbered(surface: SharedSurface, tips: int) -> tuple[NDArray[np.int64], NDA
     return vertices, triangles
 
 
-def _append(pieces: ResultFolder, task: EncodeTask, text: Text, file: BinaryIO) -> Text:
+def _append(pieces: ResultFolder, task: EncodeTask, text: TextSum, file: BinaryIO) -> TextSum:
     """Append the deflated text of a task to a file; a `Fragment` but for its first arguments."""
     pieces.append(task.job, task.text_file, file)
     return text
