@@ -65,20 +65,18 @@ def animate(given: FilmOptions) -> None:
     fracslice animate my.xml -o film.mp4 --preview
     fracslice animate mandelbulb -o flight.mp4 --fly 10s --size 640x360
     """
-    from fracslice.animation import FilmJob, Timeline, check_film, encode, flown, write_frames
+    from fracslice.animation import FilmJob, Timeline, check_film, encode, flown, sheet_frames, write_frames
     from fracslice.export import replacing
     from fracslice.scene.writer import to_xml
 
     target, ending = Path(given.output), Path(given.output).suffix.lower()
-    if ending and ending != ".xml":
-        check_film(target)
     if given.exr and ending:
         raise click.UsageError("--exr: expected a folder as OUT; films are made of PNG frames")
     if given.layers and not given.exr:
         raise click.UsageError("--layers: expected --exr, whose frames hold them")
     folder = target.with_suffix(".preview.frames" if given.preview else ".frames") if ending else target
-    check_folder(folder)
     check_targets(given.source, given.output if ending else None)
+    check_folder(folder)
     scene = load_scene(given.source, given.settings)
     film = scene.view.film
     (width, height), samples = given.size or (film.width, film.height), given.samples or film.samples
@@ -88,6 +86,8 @@ def animate(given: FilmOptions) -> None:
     if given.preview:
         width, height, samples = max(width // SMALLER, 1), max(height // SMALLER, 1), FEWER
     rate = given.fps or timeline.animation.fps
+    if ending and ending != ".xml":
+        check_film(target, rate)
     form = ".exr" if given.exr else ".png"
     job = FilmJob(timeline, (width, height), samples, rate, form, given.device, given.layers)
     chosen = given.frames or range(job.frames)
@@ -102,10 +102,11 @@ def animate(given: FilmOptions) -> None:
                 f"{given.output}: " + ("the film as a scene" if whole else f"scene of frame {chosen[0]}")
             )
         return
+    numbers = sheet_frames(chosen) if ending == ".png" else chosen
     with given.working(f"the frames in {folder} are whole, and --resume goes on") as work:
-        paths = write_frames(job, chosen, folder, given.resume, work)
-    if ending:
-        encode(paths, target, rate)
+        paths = write_frames(job, numbers, folder, given.resume, work)
+        if ending:
+            encode(paths, target, rate, work)
     if not given.quiet:
         frames = counted(len(paths), "frame")
-        click.echo(f"{given.output}: {frames} of {width} x {height} pixels, {len(paths) / rate:.2f} s")
+        click.echo(f"{given.output}: {frames} of {width} x {height} pixels, {len(chosen) / rate:.2f} s")

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 SHARED = {"cluster", "shard", "store"}
 OF_LAYERS = {*SHARED, "pixel", "machine", "picture", "html", "fix"}
-OF_MESHES = {"voxel", "resolution", "dust", "chord", "simplify"}
+OF_MESHES = {"voxel", "resolution", "dust", "chord", "simplify", "proved"}
 OF_SCENES = {*OF_MESHES, *SHARED, "settings", "size"}
 
 ACROSS = 256
@@ -228,7 +228,7 @@ def shared_check(scene: Scene, job: SliceJob, given: CheckOptions, work: Work) -
     from fracslice.scene.writer import to_xml
 
     recipe = SliceRecipe(to_xml(scene), scene.name, job, given.layer[1], printer=given.machine)
-    run = recipe.run(work)
+    run = recipe.run(work, scene)
     return run.stack, check_run(run, given.limits)
 
 

@@ -35,9 +35,6 @@ class ExploreOptions(SceneOptions):
         metavar="X",
         default=0.3,
     )
-    parent: str | None = option(
-        str, "Scene of an earlier sheet to vary instead of SCENE.", "--from", metavar="FILE.xml"
-    )
     size: tuple[int, int] = option(
         PIXELS, "Pixels of each picture, across and down; 240x180 by default.", default="240x180"
     )
@@ -50,19 +47,19 @@ def explore(given: ExploreOptions) -> None:
 
     The first picture is SCENE itself. In the others the numbers of its elements are changed at random within
     their ranges; materials, transforms, boxes and the view stay. Picture 7 of sheet.png is sheet/07.xml,
-    which --from takes. Nothing is written before all pictures are done.
+    which is a SCENE to go on from. Nothing is written before all pictures are done.
 
     Examples
     --------
     fracslice explore mandelbox -o sheet.png --spread 0.5
-    fracslice explore mandelbox -o next.png --from sheet/07.xml --seed 1
+    fracslice explore sheet/07.xml -o next.png --seed 1
     """
     from fracslice.scene.variation import varied
 
     target, count = Path(given.output), given.count
     check_targets(given.source, given.output)
     check_folder(target.with_suffix(""))
-    scene = load_scene(given.parent or given.source, given.settings)
+    scene = load_scene(given.source, given.settings)
     scenes = [scene, *(varied(scene, (given.seed, k), given.spread) for k in range(1, count))]
     with given.working() as work:
         pictures = [rendered(one, given.size, given.samples, k / count, work) for k, one in enumerate(scenes)]

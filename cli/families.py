@@ -18,6 +18,7 @@ from fracslice.errors import SharedError
 
 from .inputs import load_scene
 from .options import SceneOptions
+from .tables import is_table
 
 R = TypeVar("R", bound=SceneOptions)
 
@@ -25,12 +26,15 @@ MOST = 10_000
 """Greatest number of members."""
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-_RANGE = re.compile(rf"(?P<name>[^=]+)=\s*({_NUMBER})\s*\.\.\s*({_NUMBER})\s*(?::\s*({_NUMBER})\s*)?")
+_RANGE = re.compile(rf"(?<!\S)({_NUMBER})\s*\.\.\s*({_NUMBER})(?:\s*:\s*({_NUMBER}))?(?!\S)")
 
 
 def suffixed(path: str, suffix: str) -> str:
-    """Insert text before the extension of a file name."""
-    return str(Path(path).with_name(Path(path).stem + suffix + Path(path).suffix)) if suffix else path
+    """Insert text before the extension of a file name; a table stays one file."""
+    file = Path(path)
+    if not suffix or is_table(path):
+        return path
+    return str(file.with_name(file.stem + suffix + file.suffix))
 
 
 def members(settings: Sequence[str]) -> list[tuple[tuple[str, ...], str]]:
@@ -47,12 +51,16 @@ def members(settings: Sequence[str]) -> list[tuple[tuple[str, ...], str]]:
 
 
 def _values(setting: str) -> Iterator[tuple[str, str]]:
-    """Settings of a range, and their part of the file name; the setting itself if it has none."""
-    match = _RANGE.fullmatch(setting)
+    """Settings of a range, which may be one number of several, and their part of the file name.
+
+    The setting itself if it has no range.
+    """
+    name, _, text = setting.partition("=")
+    match, name = _RANGE.search(text), name.strip()
     if not match:
         yield setting, ""
         return
-    name, (first, last, step) = match["name"].strip(), map(Decimal, (match[2], match[3], match[4] or "1"))
+    first, last, step = (Decimal(number or 1) for number in match.groups())
     if not step or (last - first) / step < 0:
         raise click.UsageError(f"--set {setting}: expected a range such as {name}=2..9:0.5")
     if (last - first) / step >= MOST:
@@ -60,7 +68,10 @@ def _values(setting: str) -> Iterator[tuple[str, str]]:
     for k in range(int((last - first) / step) + 1):
         value = f"{first + k * step:f}"
         value = value.rstrip("0").rstrip(".") if "." in value else value
-        yield f"{name}={value}", f"-{name.rpartition('.')[2]}{value}"
+        yield (
+            f"{name}={text[: match.start()]}{value}{text[match.end() :]}",
+            f"-{name.rpartition('.')[2]}{value}",
+        )
 
 
 def families(*names: str) -> Callable[[Callable[[R], int | None]], Callable[[R], int]]:

@@ -15,6 +15,7 @@ from .families import MOST, families, going_on, suffixed
 from .inputs import check_folder, check_targets, load_scene, refuse_options
 from .options import MeshOptions, argument, command, flag, option, output
 from .summary import summary
+from .tables import TABLE, is_table, table_rows, write_row
 from .value_types import AMOUNT, SECONDS, Name
 
 if TYPE_CHECKING:
@@ -43,7 +44,10 @@ class MeshFileOptions(ClusterOptions, MeshOptions):
         SECONDS,
         "Mesh the scene at this interval, such as 0.5s, from the start to the end of its <animation>.",
     )
-    report: str | None = option(Name("FILE.json", ".json"), "Write the figures and the accuracy of the mesh.")
+    report: str | None = option(
+        Name("FILE.json", ".json", TABLE),
+        "Write the figures and the accuracy of the mesh; to a .csv file, as a row for each mesh.",
+    )
     picture: str | None = option(Name("FILE.png", ".png"), "Write a shaded picture of the mesh.")
     implicit: bool = flag(
         "Write the formula instead of triangles: an .3mf file for programs with the implicit extension."
@@ -111,7 +115,10 @@ def write_mesh(scene: Scene, given: MeshFileOptions, work: Work) -> bool:
     """Make the mesh, the report and the picture; True if the mesh would not print."""
     result = made(scene, given, work)
     if given.report is not None:
-        write_report(result.report, given.report)
+        if is_table(given.report):
+            write_row(given.report, given.output, given.settings, result.report)
+        else:
+            write_report(result.report, given.report)
     if not given.quiet:
         click.echo(summary(given.output, result.report))
         click.echo(os.linesep.join(of_mesh(result, given.material, given.price).lines()))
@@ -141,7 +148,7 @@ def refuse_what_needs_triangles(output: str) -> None:
     if Path(output).suffix.lower() != ".3mf":
         raise click.UsageError(f"{output}: expected a file name that ends in .3mf, for --implicit")
     names = {"chord", "simplify", "colour", "dust", "report", "picture", "cache", "device", "material"}
-    names |= {"price", "cluster", "shard", "store"}
+    names |= {"price", "proved", "cluster", "shard", "store"}
     refuse_options(names, "only for meshes, and --implicit makes none")
 
 
@@ -202,6 +209,8 @@ def check_outputs(given: MeshFileOptions) -> None:
         known = ", ".join([*FORMATS, GRID])
         raise click.UsageError(f"{given.output}: unknown kind of file; known are {known}")
     check_targets(given.source, given.output, given.report, given.picture)
+    if given.report is not None and is_table(given.report):
+        table_rows(given.report)
     if given.picture is not None:
         from fracslice.viewer import need_pyvista
 

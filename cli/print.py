@@ -11,6 +11,7 @@ from .closing import duration
 from .inputs import check_targets, load_scene
 from .options import MeshOptions, argument, command, option, output
 from .value_types import Name
+from .working import keeping
 
 TOLERANCE = 0.02
 """Default tolerance of the simplified mesh, mm."""
@@ -79,7 +80,8 @@ def print_(given: SlicerOptions) -> int:
             many = f"; expected at most {MOST:,}: a larger --voxel or --simplify" if count > MOST else ""
             click.echo(f"{count:,} triangles: {chosen.title} takes about {duration(count * SECONDS)}{many}")
         warnings = chosen.slice(model, given.profiles, Path(output), work)
-        sent = send(output, address, work) if address is not None else None
+        with keeping(f"{output} is written"):
+            sent = send(output, address, work) if address is not None else None
     for warning in warnings:
         click.echo(f"{chosen.title}: {warning}", err=True)
     if not given.quiet:

@@ -16,10 +16,11 @@ from fracslice.common.digits import counted
 from .closing import of_layers
 from .cluster import ClusterOptions
 from .families import families
-from .inputs import check_targets, load_scene
+from .inputs import check_targets, load_scene, refuse_options
 from .layers import LAYER, LayerOptions, layer_option, printer_option, read_shift, write_page
 from .options import argument, command, option, output
 from .value_types import AMOUNT, NUMBER, Name, Parsed, Whole
+from .working import keeping
 
 if TYPE_CHECKING:
     from fracslice.export.jobs import SliceRun
@@ -29,6 +30,9 @@ if TYPE_CHECKING:
     from fracslice.slicing import SliceJob, Stack
     from fracslice.slicing.printers import Printer
     from fracslice.work import Work
+
+DATE = "SOURCE_DATE_EPOCH"
+OF_PICTURES = {"compensation", "gamma", "levels", "blur", "mirror", "sections"}
 
 
 class SliceOptions(ClusterOptions, LayerOptions):
@@ -114,8 +118,8 @@ def slice_(given: SliceOptions) -> int:
 
     output = given.output
     kind, resin = slice_format(output, given.form), resin_of(given)
-    if given.sections != "1" and kind not in PICTURES:
-        raise click.UsageError(f"{output}: --sections is for pictures; contours are of one section per layer")
+    if kind not in PICTURES:
+        refuse_options(OF_PICTURES, f"only for pictures, and {kind} files have contours")
     if kind in PRINTS:
         refuse_what_no_print_has(given, kind, resin)
     if given.address is not None:
@@ -126,18 +130,19 @@ def slice_(given: SliceOptions) -> int:
     last: list[str] = []
     kept = "the same command goes on from the finished layers"
     with given.working(kept) as work:
-        run = recipe(given, scene, kind, resin, work).run(work)
+        run = recipe(given, scene, kind, resin, work).run(work, scene)
         write_slices(run, output, given.form)
-        if given.preview:
-            write_preview(run.stack, given.preview, work)
-        sent = uploaded(output, given.address, work)
-        if not given.quiet or given.html:
-            notes = layers_amount(run.slicer, work)[1]
-            last = list(of_layers(run, given.price).lines())
-        if given.html:
-            from fracslice.jobs.slice_checks import check_run
+        with keeping(f"{output} is written"):
+            if given.preview:
+                write_preview(run.stack, given.preview, work)
+            sent = uploaded(output, given.address, work)
+            if not given.quiet or given.html:
+                notes = layers_amount(run.slicer, work)[1]
+                last = list(of_layers(run, given.price).lines())
+            if given.html:
+                from fracslice.jobs.slice_checks import check_run
 
-            write_page(run.stack, check_run(run), last, output, given.html, work)
+                write_page(run.stack, check_run(run), last, output, given.html, work)
     if not given.quiet:
         lines = described(run, output, notes)
         click.echo(os.linesep.join([*lines, *last, *([sent] if sent else [])]))
@@ -238,9 +243,13 @@ def refuse_to_send(output: str, kind: str, address: str) -> None:
 
 def created() -> datetime:
     """Date of print files, UTC: now, or of SOURCE_DATE_EPOCH."""
-    seconds = os.environ.get("SOURCE_DATE_EPOCH")
-    now = datetime.now(UTC)
-    return datetime.fromtimestamp(int(seconds), UTC) if seconds else now
+    seconds = os.environ.get(DATE)
+    if not seconds:
+        return datetime.now(UTC)
+    try:
+        return datetime.fromtimestamp(int(seconds), UTC)
+    except (ValueError, OverflowError, OSError):
+        raise click.UsageError(f"{DATE}={seconds}: expected seconds since 1970") from None
 
 
 def job(scene: Scene, given: SliceOptions, work: Work) -> SliceJob:

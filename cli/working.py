@@ -26,6 +26,21 @@ class KeptError(Cancelled):
     """Cancelled work whose partial result was written; the message names it."""
 
 
+@contextmanager
+def keeping(text: str) -> Iterator[None]:
+    """Let the message of work that is cancelled in a block name what was written before.
+
+    Raises
+    ------
+    KeptError
+        When the work is cancelled.
+    """
+    try:
+        yield
+    except Cancelled:
+        raise KeptError(text) from None
+
+
 class StoppedError(FracsliceError):
     """A signal stopped the work.
 

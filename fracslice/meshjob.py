@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from .common.digits import significant
 from .errors import SceneError
@@ -10,7 +12,7 @@ from .formulas.material import TRAPS
 from .formulas.parameters import Choice, Number, Vector
 from .formulas.records import attribute, validate
 from .scene import Print, Scene
-from .scene.lengths import Length, Percent
+from .scene.lengths import AnyLength, AnyScale, Length, Percent
 
 RESOLUTION = 256.0
 """Default number of voxels along the longest side, and the detail that automatic depths resolve."""
@@ -87,6 +89,23 @@ class MeshJob:
     scale: tuple[float, float, float] = attribute(Percent, (1.0, 1.0, 1.0), "compensation of shrinkage")
     colour: str | None = attribute(Choice, None, "colours of vertices", COLOURS)
     proved: bool = False
+
+    if TYPE_CHECKING:  # what it takes is more than what it holds
+
+        def __init__(
+            self,
+            size_mm: AnyLength | None = None,
+            voxel_mm: AnyLength | None = None,
+            resolution: float | None = None,
+            dust_mm3: float | None = None,
+            printing: Print | None = None,
+            chord_mm: AnyLength | None = None,
+            simplify_mm: AnyLength | None = None,
+            up: Sequence[float] = (0.0, 0.0, 1.0),
+            scale: AnyScale = 1.0,
+            colour: str | None = None,
+            proved: bool = False,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         if self.voxel_mm is not None and self.resolution is not None:

@@ -1,9 +1,18 @@
 """Films: a scene over time, its frames and their files."""
 
-from .encode import ENDINGS, check_film, encode
+from .encode import ENDINGS, check_film, encode, sheet_frames
 from .film import FilmJob
 from .flight import flown
 from .frames import write_frames
 from .timeline import Timeline
 
-__all__ = ["ENDINGS", "FilmJob", "Timeline", "check_film", "encode", "flown", "write_frames"]
+__all__ = [
+    "ENDINGS",
+    "FilmJob",
+    "Timeline",
+    "check_film",
+    "encode",
+    "flown",
+    "sheet_frames",
+    "write_frames",
+]

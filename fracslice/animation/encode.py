@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import subprocess
 import tempfile
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from ..common.extras import lacking
 from ..errors import ExportError
 from ..export import replacing
+from ..work import Work
 
 CODECS = {
     ".mp4": ("libx264", "-pix_fmt", "yuv420p", "-crf", "18", "-movflags", "+faststart"),
@@ -20,32 +23,40 @@ CODECS = {
     ".mkv": ("libsvtav1", "-pix_fmt", "yuv420p", "-crf", "28", "-preset", "6"),
 }
 """Codec and options of ffmpeg by ending: H.264, VP9, ProRes 422 HQ and AV1."""
+COLOURS = ("-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv")
+"""Tags of a film's colours: a player guesses the matrix of a film without them by its size."""
 COLUMNS, ROWS, THUMBNAIL = 6, 4, 240
 """Pictures of a contact sheet, and their width in pixels."""
+FASTEST_GIF = 50.0
+"""Most frames per second of a .gif: browsers take a frame of a hundredth of a second for one of a tenth."""
 ENDINGS = (*CODECS, ".gif", ".apng", ".png")
 
 
-def check_film(path: Path) -> None:
+def check_film(path: Path, fps: float) -> None:
     """Check that a film file can be made.
 
     Parameters
     ----------
     path : Path
         The file.
+    fps : float
+        Frames per second.
 
     Raises
     ------
     ExportError
-        For an unknown ending, or a missing imageio-ffmpeg.
+        For an unknown ending, a missing imageio-ffmpeg, or too many frames per second.
     """
     if path.suffix.lower() not in ENDINGS:
         raise ExportError(f"{path}: unknown kind of film; known are {', '.join(ENDINGS)}, and a folder")
     missing = lacking("imageio_ffmpeg", f"{path.suffix} films need", "imageio-ffmpeg")
     if path.suffix.lower() in CODECS and missing:
         raise ExportError(missing)
+    if path.suffix.lower() == ".gif" and fps > FASTEST_GIF:
+        raise ExportError(f"{path}: {fps:g} frames per second: expected at most {FASTEST_GIF:g} for .gif")
 
 
-def encode(frames: Sequence[Path], path: Path, fps: float) -> None:
+def encode(frames: Sequence[Path], path: Path, fps: float, work: Work) -> None:
     """Write frames as one file, by its ending: a film, an animated picture, or a contact sheet (.png).
 
     Parameters
@@ -56,49 +67,81 @@ def encode(frames: Sequence[Path], path: Path, fps: float) -> None:
         The file.
     fps : float
         Frames per second.
+    work : Work
+        Progress and cancellation.
 
     Raises
     ------
     ExportError
         If the file cannot be made.
+    Cancelled
+        When the work is cancelled.
     """
-    check_film(path)
+    check_film(path, fps)
     ending = path.suffix.lower()
+    pictures = _pictures(frames, work)
     with replacing(path) as file:
         if ending in CODECS:
-            file.write(_encoded(frames, ending, fps))
+            file.write(_encoded(pictures, ending, fps))
         elif ending == ".png":
-            contact_sheet(frames).save(file, "png")
+            _contact_sheet(pictures, len(frames)).save(file, "png")
+        elif ending == ".gif":
+            first, *others = map(_of_few_colours, pictures)
+            times = _hundredths(len(frames), fps)
+            first.save(file, "gif", save_all=True, append_images=others, duration=times, loop=0)
         else:
-            first, *others = map(_opened, frames)
-            form = "gif" if ending == ".gif" else "png"
-            first.save(file, form, save_all=True, append_images=others, duration=1000 / fps, loop=0)
+            first, *others = pictures
+            first.save(file, "png", save_all=True, append_images=others, duration=1000 / fps, loop=0)
 
 
-def contact_sheet(frames: Sequence[Path]) -> Any:
-    """Return a sheet of frames at equal intervals.
+def sheet_frames(frames: Sequence[int]) -> list[int]:
+    """Choose the frames of a contact sheet, at equal intervals.
 
     Parameters
     ----------
-    frames : sequence of Path
-        PNG files, in order.
+    frames : sequence of int
+        Numbers of the frames of a film.
 
     Returns
     -------
-    PIL.Image.Image
-        At most `COLUMNS` x `ROWS` pictures.
+    list of int
+        At most `COLUMNS` x `ROWS` of them, the first and the last one included.
     """
+    count = min(COLUMNS * ROWS, len(frames))
+    return [frames[k * (len(frames) - 1) // max(count - 1, 1)] for k in range(count)]
+
+
+def _contact_sheet(pictures: Iterator[Any], count: int) -> Any:
+    """Sheet of pictures in rows."""
     from PIL import Image
 
-    count = min(COLUMNS * ROWS, len(frames))
-    chosen = [_opened(frames[k * (len(frames) - 1) // max(count - 1, 1)]) for k in range(count)]
-    width = min(THUMBNAIL, chosen[0].width)
-    height = max(round(width * chosen[0].height / chosen[0].width), 1)
-    sheet = Image.new("RGB", (width * min(COLUMNS, count), height * -(-count // COLUMNS)))
-    for k, picture in enumerate(chosen):
+    sheet = None
+    for k, picture in enumerate(pictures):
+        width = min(THUMBNAIL, picture.width)
+        height = max(round(width * picture.height / picture.width), 1)
+        sheet = sheet or Image.new("RGB", (width * min(COLUMNS, count), height * -(-count // COLUMNS)))
         small = picture.resize((width, height), Image.Resampling.LANCZOS)
         sheet.paste(small, (k % COLUMNS * width, k // COLUMNS * height))
     return sheet
+
+
+def _hundredths(count: int, fps: float) -> list[int]:
+    """Milliseconds of each frame of a .gif: whole hundredths of a second, whose sum is the film's."""
+    ends = [10 * round(100 * k / fps) for k in range(count + 1)]
+    return [after - before for before, after in pairwise(ends)]
+
+
+def _of_few_colours(picture: Any) -> Any:
+    """Picture of 256 colours: means of clusters, since a median cut leaves few to what is small and vivid."""
+    return picture.quantize(kmeans=max(picture.width * picture.height // 100, 1))
+
+
+def _pictures(frames: Sequence[Path], work: Work) -> Iterator[Any]:
+    """Pictures of the frames, one by one."""
+    for done, frame in enumerate(frames, 1):
+        work.check()
+        yield _opened(frame)
+        work.progress("film", done / len(frames))
 
 
 def _opened(path: Path) -> Any:
@@ -109,24 +152,37 @@ def _opened(path: Path) -> Any:
         return picture.convert("RGB")
 
 
-def _encoded(frames: Sequence[Path], ending: str, fps: float) -> bytes:
-    """Film made by ffmpeg, in a process of its own; odd sides get a black row, as the codecs need."""
+def _encoded(pictures: Iterator[Any], ending: str, fps: float) -> bytes:
+    """Film made by ffmpeg, in a process of its own."""
     import imageio_ffmpeg
 
-    width, height = _opened(frames[0]).size
+    first = _even(next(pictures))
+    height, width, _ = first.shape
     source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-framerate", repr(fps)]
     codec, *options = CODECS[ending]
     with tempfile.TemporaryDirectory(prefix="fracslice-") as folder, tempfile.TemporaryFile() as log:
         film = Path(folder) / f"film{ending}"
         command = [imageio_ffmpeg.get_ffmpeg_exe(), "-loglevel", "error", *source, "-i", "-"]
-        command += ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", codec, *options, str(film)]
+        command += ["-vf", "scale=out_color_matrix=bt709", "-c:v", codec, *options, *COLOURS, str(film)]
         with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=log) as process:
             assert process.stdin
-            with suppress(BrokenPipeError):  # ffmpeg's own message says more
-                for frame in frames:
-                    process.stdin.write(_opened(frame).tobytes())
+            try:
+                for pixels in chain([first], map(_even, pictures)):
+                    process.stdin.write(pixels.tobytes())
+            except BrokenPipeError:  # ffmpeg's own message says more
+                pass
+            except BaseException:
+                process.kill()
+                raise
         if process.returncode:
             log.seek(0)
             lines = log.read().decode(errors="replace").split("\n")
             raise ExportError(f"ffmpeg: {next(filter(None, reversed(lines)), 'failed')}")
         return film.read_bytes()
+
+
+def _even(picture: Any) -> np.ndarray:
+    """Pixels of a picture; the last row or column is repeated for even sides, as the codecs need."""
+    pixels = np.asarray(picture)
+    height, width, _ = pixels.shape
+    return np.pad(pixels, ((0, height % 2), (0, width % 2), (0, 0)), "edge")

@@ -13,6 +13,7 @@ from ..cluster import Shard
 from ..common.digits import counted
 from ..common.files import replacing, reported
 from ..common.keys import key
+from ..common.locks import locked_folder
 from ..errors import RenderError, SharedError
 from ..kernel.devices import chosen
 from ..kernel.host import toolchain
@@ -115,27 +116,37 @@ def write_frames(job: FilmJob, numbers: Sequence[int], folder: Path, resume: boo
     ------
     RenderError
         If the folder has the frames of another film, or files that are no frames of a film.
+    ExportError
+        For an error of the file system, or if another process is writing there.
     SharedError
         For a shard that does not write the frames, when its own are made.
     """
     if isinstance(work.cluster, Shard) and not work.cluster.first:
         count = work.cluster.share(FrameTask.all(job, numbers), work)
         raise SharedError(f"this shard made {counted(count, 'frame')}; shard 1 writes them")
-    _claim(job, folder, resume)
-    missing = [number for number in numbers if not (resume and job.path(folder, number).exists())]
+    with reported(folder):
+        folder.mkdir(exist_ok=True)
+    with locked_folder(folder):
+        _claim(job, folder, resume)
+        missing = [number for number in numbers if not (resume and job.path(folder, number).exists())]
+        _write(job, missing, folder, work)
+    return [job.path(folder, number) for number in numbers]
+
+
+def _write(job: FilmJob, numbers: Sequence[int], folder: Path, work: Work) -> None:
+    """Make frames and write them, by the pool of the work if there is one."""
 
     def write(number: int, data: bytes) -> None:
         with replacing(job.path(folder, number)) as file:
             file.write(data)
 
     if work.cluster is None:
-        _write_here(job, missing, write, work)
-    elif missing:
-        tasks = FrameTask.all(job, missing)
-        for number, data in zip(missing, work.cluster.results(tasks, work, "frames"), strict=True):
+        _write_here(job, numbers, write, work)
+    elif numbers:
+        tasks = FrameTask.all(job, numbers)
+        for number, data in zip(numbers, work.cluster.results(tasks, work, "frames"), strict=True):
             write(number, data)
         work.cluster.finished(tasks[0].job)
-    return [job.path(folder, number) for number in numbers]
 
 
 def _write_here(
@@ -152,7 +163,7 @@ def _write_here(
 
 
 def _claim(job: FilmJob, folder: Path, resume: bool) -> None:
-    """Make the folder this film's; frames of an earlier film are removed, unless it is to be resumed.
+    """Make a folder this film's; frames of an earlier film are removed, unless it is to be resumed.
 
     A process that was killed leaves the unfinished file that it was writing; it is removed.
     """
@@ -160,16 +171,22 @@ def _claim(job: FilmJob, folder: Path, resume: bool) -> None:
     if journal.exists():
         for path in folder.glob(UNFINISHED):
             path.unlink(missing_ok=True)
-        known = json.loads(journal.read_text())["key"]
+        known = _known(journal)
         if known == job.key:
             return
         if resume:
             raise RenderError(f"{folder}: has frames of another film: expected those of this one, to resume")
         for path in folder.glob("frame?????.*"):
             path.unlink()
-    elif folder.exists() and any(folder.iterdir()):
+    elif any(folder.iterdir()):
         raise RenderError(f"{folder}: expected an empty folder, or one with the frames of a film")
-    with reported(folder):
-        folder.mkdir(exist_ok=True)
     with replacing(journal) as file:
         file.write(json.dumps({"key": job.key, "fps": job.fps}).encode())
+
+
+def _known(journal: Path) -> str:
+    """Key of the film whose frames are in a folder."""
+    try:
+        return str(json.loads(journal.read_text())["key"])
+    except (ValueError, KeyError, TypeError):
+        raise RenderError(f"{journal}: expected the journal of a film") from None

@@ -13,8 +13,9 @@ from ..jobs.mesh_result import MeshResult
 from ..mesh import Mesh
 from ..meshjob import MeshJob
 from ..scene import parse_length
+from ..scene.lengths import AnyLength, AnyScale
 from ..work import Work
-from .options import Length, Options, Scale, keywords, print_of, work_of
+from .options import Options, keywords, print_of, work_of
 from .sources import Source, as_scene
 
 if TYPE_CHECKING:
@@ -53,6 +54,9 @@ class Result(Mesh):
         made = self.report.mesh
         counts = f"{counted(made.triangles, 'triangle')}, {counted(made.vertices, 'vertex', 'vertices')}"
         return f"<Result of {counts}, only in its file>"
+
+    def _repr_png_(self) -> bytes | None:
+        return None if self.made.whole is None else super()._repr_png_()
 
     @property
     def mesh(self) -> Mesh:
@@ -109,13 +113,13 @@ def make_mesh(
     what: MeshJob | None = None,
     work: Work | None = None,
     *,
-    size: Length | None = None,
+    size: AnyLength | None = None,
     up: Sequence[float] | None = None,
-    scale: Scale | None = None,
+    scale: AnyScale | None = None,
     resolution: float | None = None,
-    voxel: Length | None = None,
-    chord: Length | None = None,
-    simplify: Length | None = None,
+    voxel: AnyLength | None = None,
+    chord: AnyLength | None = None,
+    simplify: AnyLength | None = None,
     dust: float | None = None,
     colour: Literal["material", "point", "axes", "planes", "sphere", "steps", "direction"] | None = None,
     proved: bool | None = None,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from functools import wraps
 from inspect import Parameter, signature
@@ -12,16 +12,11 @@ from typing import Any, Literal, ParamSpec, TypedDict, TypeVar, get_type_hints
 from ..common.suggestions import hint
 from ..kernel.devices import chosen
 from ..scene import Print, Scene
+from ..scene.lengths import AnyLength
 from ..work import Work
 
 P = ParamSpec("P")
 R = TypeVar("R")
-
-Length = float | str
-"""A number in mm, or text with a unit, such as "0.5mm"."""
-
-Scale = float | str | Sequence[float]
-"""One factor for all axes, three, or text such as "102%" or "102%,102%,101%"."""
 
 
 class WorkOptions(TypedDict, total=False):
@@ -38,13 +33,13 @@ class PrintOptions(TypedDict, total=False):
 
     cavities: Literal["keep", "fill"] | None
     keep: int | Literal["all", "largest"] | None
-    bridge: Length | None
-    gap: Length | None
-    thickness: Length | None
-    hollow: Length | None
-    drain: Length | None
-    base: Length | None
-    raft: Length | None
+    bridge: AnyLength | None
+    gap: AnyLength | None
+    thickness: AnyLength | None
+    hollow: AnyLength | None
+    drain: AnyLength | None
+    base: AnyLength | None
+    raft: AnyLength | None
 
 
 class Options(PrintOptions, WorkOptions, total=False):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Generic, TypeVar, Unpack, overload
@@ -13,10 +14,11 @@ from ..common.digits import counted
 from ..common.extras import lacking
 from ..errors import SliceError
 from ..scene import parse_length
+from ..scene.lengths import AnyLength, AnyScale
 from ..slicing import Contours, Layer, SliceJob, Slicer, Stack, adapted, plan_stack
 from ..volume.sizing import sizing
 from ..work import Work
-from .options import Length, Options, Scale, keywords, print_of, work_of
+from .options import Options, keywords, print_of, work_of
 from .sources import Source, as_scene
 
 if TYPE_CHECKING:
@@ -48,6 +50,15 @@ class Layers(Sequence[T_co], Generic[T_co]):
     chosen: range
     make: Callable[[Layer], T_co]
     work: Work
+
+    def _repr_png_(self) -> bytes | None:
+        """Contact sheet in a notebook; None without layers."""
+        from ..slicing.preview import contact_sheet
+
+        file = io.BytesIO()
+        if len(self):
+            contact_sheet(self.stack, file, self.work, self.chosen)
+        return file.getvalue() or None
 
     def __len__(self) -> int:
         return len(self.chosen)
@@ -119,12 +130,12 @@ class Slices(Layers[NDArray[np.uint8]]):
 @keywords
 def slice_layers(
     shape: Source,
-    layer: Length | tuple[Length, Length] = "0.05mm",
+    layer: AnyLength | tuple[AnyLength, AnyLength] = "0.05mm",
     *,
-    size: Length | None = None,
-    pixel: Length | tuple[Length, Length] = "0.05mm",
+    size: AnyLength | None = None,
+    pixel: AnyLength | tuple[AnyLength, AnyLength] = "0.05mm",
     up: Sequence[float] = (0.0, 0.0, 1.0),
-    scale: Scale = 1.0,
+    scale: AnyScale = 1.0,
     **options: Unpack[Options],
 ) -> Slices:
     """Slice a shape into the layers of a print, directly from its field.
@@ -182,7 +193,7 @@ def slice_layers(
     longest = None if size is None else parse_length(size, "size")
     given = sizing(scene, longest, work=work)
     how = print_of(scene, options), scale, given.unit
-    job = SliceJob(given.side, low, pixel, up, *how)  # type: ignore[arg-type]
+    job = SliceJob(given.side, low, pixel, up, *how)
     stack = plan_stack(scene.root, job, work)
     if high is not None:
         stack = adapted(stack, parse_length(high, "layer"), work)

@@ -13,7 +13,7 @@ from ..formulas import names as formula_names
 from ..formulas.conversion import shown
 from ..formulas.parameters import REQUIRED
 from ..scene import Scene, library, read, scene
-from .options import Length
+from ..scene.lengths import AnyLength
 
 Source: TypeAlias = Node | Scene | str | os.PathLike[str]
 
@@ -55,7 +55,7 @@ def _is_ready(formula: Formula) -> bool:
     return formula.kind == "shape" and not formula.children[1] and "bounds" in formula.hooks and not required
 
 
-def as_scene(source: Source, size: Length | None = None) -> Scene:
+def as_scene(source: Source, size: AnyLength | None = None) -> Scene:
     """Resolve a source to a scene.
 
     Parameters

@@ -134,6 +134,7 @@ class _Attempt:
 
         self.pool, self.tasks, self.expected = pool, tasks, Identity.here()
         self.token, self.count = token_hex(3), 0
+        self.address = pool.client.scheduler.address
         self.refused: set[str] = set()
         self.futures: dict[Future, int] = {}
         self.queue: Any = as_completed(loop=pool.client.loop)
@@ -146,6 +147,8 @@ class _Attempt:
             self.submit(indices)
             while missing:
                 work.check()
+                if pool.client.status == "closed":
+                    raise self.silent()
                 for index in self.ended():
                     if index in missing:
                         missing.discard(index)
@@ -167,6 +170,8 @@ class _Attempt:
         """Submit tasks under new names, preferably to workers that fit and are not stuck with one."""
         self.count += 1
         known = self.known()
+        if not known:
+            warn(f"{self.address}: no worker yet; the job waits {self.pool.limit / 60:g} min for one")
         fit = [address for address in known if address not in self.refused]
         if self.refused and not fit:
             raise ClusterError("no worker fits: none has the fracslice and the Python of this process")
@@ -188,9 +193,15 @@ class _Attempt:
         try:
             about = client.sync(client.scheduler.identity, n_workers=-1, callback_timeout=CONNECT)
         except (OSError, TimeoutError):
-            raise ClusterError(f"{client.scheduler.address}: the scheduler does not answer") from None
+            raise self.silent() from None
         workers: dict[str, Any] = about["workers"]
         return workers
+
+    def silent(self) -> ClusterError:
+        """Error of a scheduler that is gone or hangs."""
+        return ClusterError(
+            f"{self.address}: the scheduler does not answer; the same command goes on with what is there"
+        )
 
     @property
     def busy(self) -> set[str]:
@@ -217,7 +228,11 @@ class _Attempt:
                 continue
             if isinstance(error, UnfitWorkerError | ImportError) and len(error.args) == 2:
                 self.refuse(*error.args)
-            elif type(error).__name__ != "KilledWorker":
+            elif type(error).__name__ == "KilledWorker":
+                warn(
+                    f"{self.tasks[index].name}: its workers ended, one by one; their memory may be too small"
+                )
+            else:
                 raise ClusterError(f"{self.tasks[index].name}: {error or type(error).__name__}") from error
             self.submit([index])
 

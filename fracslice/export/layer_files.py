@@ -124,7 +124,7 @@ def write_slices(run: SliceRun, path: str | Path, name: str | None = None) -> Pa
         When the work is cancelled.
     """
     form = slice_format(path, name)
-    if run.sections > 1 and form not in PICTURES:
-        raise ExportError(f"{path}: contours are of one section per layer")
+    if form not in PICTURES and (run.sections > 1 or run.screen.compensation):
+        raise ExportError(f"{path}: contours are of one section per layer, without compensation")
     FORMATS[form].write(run, Path(path))
     return Path(path)

@@ -19,6 +19,7 @@ from .._slices import Encoding
 from ..background import ahead, in_background
 from ..common.files import flushing, replacing
 from ..errors import ExportError
+from ..formulas.conversion import printable
 from ..slicing import Layer
 from ..slicing.printers import Printer
 from .jobs import SliceRun
@@ -183,7 +184,8 @@ class PrintFormat(LayerFormat):
             flushing(file),
         ):
             assert run.screen.printer and run.resin
-            self.assemble(PrintData(run, path.stem, run.screen.printer, run.resin, journal, picture), file)
+            name = printable(path.stem)
+            self.assemble(PrintData(run, name, run.screen.printer, run.resin, journal, picture), file)
 
 
 def by_pixels(encoding: Encoding) -> Callable[[SliceRun, Layer], bytes]:

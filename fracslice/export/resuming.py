@@ -16,6 +16,7 @@ from typing import BinaryIO
 from isal.isal_zlib import crc32
 
 from ..common.files import check_target, replacing, reported
+from ..common.locks import lock, locked_folder
 from ..common.private import OWNER_ONLY, opened
 from ..common.seals import seal
 from ..errors import ExportError, FracsliceWarning
@@ -158,7 +159,7 @@ def journal(path: str | Path, job: str) -> Iterator[Journal]:
     with reported(path):
         _remove_foreign(part)
         with opened(part, "r+b", os.O_CREAT) as file:
-            _lock(file, path)
+            lock(file.fileno(), path)
             if _read(manifest) != _manifest(job):
                 if os.fstat(file.fileno()).st_size:
                     _warn_discarded(path)
@@ -203,10 +204,11 @@ def resumable_folder(
     Raises
     ------
     ExportError
-        For a folder with other files, or an error of the file system.
+        For a folder with other files, an error of the file system, or if another process is writing there.
     """
     with reported(folder):
         folder.mkdir(exist_ok=True)
+    with reported(folder), locked_folder(folder):
         names = set(os.listdir(folder))
         manifest = _read(folder / JOB)
         if names and not (manifest.startswith(OURS) and all(n == JOB or LAYER.fullmatch(n) for n in names)):
@@ -257,20 +259,3 @@ def _remove_foreign(part: Path) -> None:
         return
     except OSError:
         part.unlink()
-
-
-def _lock(file: BinaryIO, path: str | Path) -> None:
-    """Lock a file against other processes, where the file system supports it."""
-    try:
-        try:
-            import fcntl
-        except ImportError:
-            import msvcrt
-
-            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined]
-        else:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except (BlockingIOError, PermissionError):
-        raise ExportError(f"{path}: another process is writing it") from None
-    except OSError:
-        pass  # some file systems have no locks

@@ -59,6 +59,7 @@ def printer_address(text: str) -> tuple[str, str, int, str]:
     try:
         url = urlsplit(text)
         host, port = url.hostname, url.port
+        (host or "").encode("idna")
     except ValueError:
         host, port = None, None
     if not host or url.path not in STORAGES.get(url.scheme, ()) or url.username:
@@ -104,13 +105,15 @@ def send(path: str | Path, address: str, work: Work) -> str:
 
 def _key() -> str:
     """Key of PrusaLink."""
-    if os.environ.get(KEY):
-        return os.environ[KEY]
-    if not (name := os.environ.get(KEY_FILE)):
+    key, name = os.environ.get(KEY), os.environ.get(KEY_FILE)
+    if not key and not name:
         raise ExportError(
             f"PrusaLink needs a key: expected it in {KEY}, or the name of a file with it in {KEY_FILE}"
         )
-    return read_text(Path(name), ExportError).strip()
+    key = key or read_text(Path(str(name)), ExportError).strip()
+    if not (key.isascii() and key.isprintable()):
+        raise ExportError(f"the key of PrusaLink, in {KEY} or {KEY_FILE}: expected ASCII in one line")
+    return key
 
 
 def _packets(file: BufferedReader, size: int, work: Work) -> Iterator[bytes]:

@@ -17,6 +17,11 @@ def shown(value: Any) -> str:
     return line if len(line) <= 60 else line[:57] + "..."
 
 
+def printable(text: str) -> str:
+    """Text with "?" for what cannot be printed, such as a byte of a file's name that is not UTF-8."""
+    return "".join(c if c.isprintable() else "?" for c in text)
+
+
 def finite(value: Any) -> float | None:
     """Convert a real number to a float.
 

@@ -241,6 +241,20 @@ class Axis(Choice):
 
 
 @dataclass(frozen=True)
+class Text(Parameter):
+    """Text that is shown to a person."""
+
+    @property
+    def expects(self) -> str:
+        return "text in one line"
+
+    def check(self, value: Any) -> Any:
+        if not isinstance(value, str) or not value.isprintable():
+            raise ValueError(self.expects)
+        return value
+
+
+@dataclass(frozen=True)
 class File(Parameter):
     """Name of a file; in a scene file, relative to its folder."""
 

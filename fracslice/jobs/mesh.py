@@ -236,6 +236,6 @@ class _Job:
             ),
             depths=planned.depths,
             contact_mm2=float(f"{made.contact:.9g}"),  # sums over pieces differ in the last digit
-            cavities_mm3=float(f"{finish.cavities:.9g}"),
+            cavities_mm3=float(f"{finish.cavities + 0.0:.9g}"),
         )
         return MeshResult(report, finish.place, planned, made.whole, clock.work)

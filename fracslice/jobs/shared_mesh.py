@@ -142,7 +142,6 @@ def shared_surface(
     job = key(own, pieces)
     arrays = packed(ijk=signs.ijk, signs=signs.signs, index=signs.index, key=np.array(own))
     pool.pieces.write(job, SAMPLES, arrays)
-    stored = StoredPieces(pool.pieces, job, HALO * planned.voxel)
     with clock("meshing"):
         summary = _summary((recipe, pool, job), pieces, planned.voxel, clock)
         first = np.cumsum([0, *summary.components.counts[:-1]])

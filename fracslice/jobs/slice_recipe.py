@@ -10,6 +10,7 @@ from ..export.jobs import EPOCH, SliceRun
 from ..export.layer_files import FORMATS
 from ..export.ranges import Encode
 from ..export.resins import Resin
+from ..scene import Scene
 from ..scene.reader import reads
 from ..slicing.printers import Printer
 from ..slicing.raster import Screen
@@ -54,9 +55,15 @@ class SliceRecipe:
     levels: int = 255
     blur: int = 0
 
-    def run(self, work: Work) -> SliceRun:
-        """Plan the layers; see `Recipe.run`."""
-        scene = reads(self.scene, self.name)
+    def run(self, work: Work, scene: Scene | None = None) -> SliceRun:
+        """Plan the layers; see `Recipe.run`.
+
+        Parameters
+        ----------
+        scene : Scene, optional
+            The same scene as it was read: its errors name places in its file.
+        """
+        scene = scene or reads(self.scene, self.name)
         stack = slicing.plan_stack(scene.root, self.job, work)
         if self.most is not None:
             stack = slicing.adapted(stack, self.most, work)

@@ -21,6 +21,13 @@ CLAY = "#efe3d0"
 class Exchange:
     """Export methods of `Mesh`."""
 
+    def _repr_png_(self) -> bytes | None:
+        """Picture in a notebook; None for an empty mesh."""
+        from .thumbnail import thumbnail
+
+        mesh = cast("Mesh", self)
+        return thumbnail(mesh) if len(mesh.triangles) else None
+
     def export(self, path: str | Path, metadata: Mapping[str, str] | None = None) -> Path:
         """Write the mesh to a file atomically.
 

@@ -95,7 +95,7 @@ class _Composite(Kernel):
     """Kernel of an edited field."""
 
     def __init__(self, root: Kernel, does: Does, shape: Kernel) -> None:
-        self.dtype = root.dtype
+        self.dtype, self.batch = root.dtype, min(root.batch, shape.batch)
         self._root, self._does, self._shape = root, does, shape
 
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:

@@ -72,7 +72,7 @@ def printable(planned: Plan, size: Sizing, how: Print, work: Work | None = None)
         job.work.progress(stage, 0.0)
         job.put(change())
         job.work.progress(stage, 1.0)
-    return standing(job.planned, how, job.scale), job.scale
+    return standing(job.planned, how, job.scale, job.work), job.scale
 
 
 class _Edits(Preparation):

@@ -7,11 +7,12 @@ from dataclasses import replace
 from ..errors import VolumeError
 from ..formulas import Box, box, plane, transform
 from ..scene import Print
-from ..volume import Plan
+from ..volume import Plan, extent
+from ..work import Work
 from .edits import edited_field
 
 
-def standing(made: Plan, how: Print, scale: float) -> Plan:
+def standing(made: Plan, how: Print, scale: float, work: Work) -> Plan:
     """Cut off the base and add the raft.
 
     The raft extends a tenth of the longest side beyond the object, and half its height into it.
@@ -24,6 +25,8 @@ def standing(made: Plan, how: Print, scale: float) -> Plan:
         Heights of the base and the raft, mm.
     scale : float
         mm per scene unit.
+    work : Work
+        Threads and cancellation.
 
     Returns
     -------
@@ -34,6 +37,8 @@ def standing(made: Plan, how: Print, scale: float) -> Plan:
     ------
     VolumeError
         If the base leaves nothing, or the raft is thinner than a voxel.
+    Cancelled
+        When the work is cancelled.
     """
     root, extents, outer = made.root, made.box, made.outer
     (x0, y0, z0), (x1, y1, z1) = extents.lo, extents.hi
@@ -47,6 +52,8 @@ def standing(made: Plan, how: Print, scale: float) -> Plan:
         if z0 >= z1:
             raise VolumeError(f"a base of {base * scale:g} mm leaves nothing of the object")
         root = edited_field(root, "keep", plane(normal=(0, 0, -1), offset=-z0))
+        left = extent(root, max(extents.size) / made.voxel, work).box  # the widest part may be cut off
+        (x0, y0, _), (x1, y1, _) = left.lo, left.hi
         extents = Box((x0, y0, z0), (x1, y1, z1))
     if raft:
         rim = max(extents.size) / 10

@@ -111,8 +111,11 @@ def _displayed(path: str) -> np.ndarray:
     """Picture for screens, by Pillow."""
     from PIL import Image
 
-    with Image.open(path) as image:
-        shown = np.asarray(image.convert("RGB"), np.float32) / np.float32(255)
+    try:
+        with Image.open(path) as image:
+            shown = np.asarray(image.convert("RGB"), np.float32) / np.float32(255)
+    except Image.DecompressionBombError as error:
+        raise ValueError(str(error)) from None
     return to_linear(shown)
 
 

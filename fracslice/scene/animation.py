@@ -118,11 +118,6 @@ class Animation(Part):
         Choice, "moving", "whether the pattern of the noise changes from frame to frame", ("moving", "fixed")
     )
 
-    @property
-    def frames(self) -> int:
-        """Number of frames."""
-        return max(round(self.duration * self.fps), 1)
-
 
 CURVES = ("auto", "smooth", "linear", "log", "step", "path", "zoom", "rotation")
 

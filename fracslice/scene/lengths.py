@@ -4,12 +4,19 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 from ..errors import SceneError
 from ..formulas.conversion import finite, shown
 from ..formulas.parameters import Parameter
+
+AnyLength: TypeAlias = float | str
+"""A number in mm, or text with a unit, such as "0.5mm"."""
+
+AnyScale: TypeAlias = float | str | Sequence[float]
+"""One factor for all axes, three, or text such as "102%" or "102%,102%,101%"."""
 
 MILLIMETRES = {"um": 1e-3, "µm": 1e-3, "mm": 1.0, "cm": 10.0, "in": 25.4, "m": 1000.0}
 SMALLEST, LARGEST = 1e-6, 1e6

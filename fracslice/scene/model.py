@@ -7,14 +7,14 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import SceneError
 from ..formulas import Node, get
 from ..formulas.definitions import definitions
 from ..formulas.parameters import AUTO
 from .animation import Animation, Track
-from .lengths import parse_length
+from .lengths import AnyLength, parse_length
 from .printing import Print
 from .view import View
 
@@ -57,6 +57,20 @@ class Scene:
     animation: Animation | None = None
     tracks: tuple[Track, ...] = ()
     unit_mm: float | None = None
+
+    if TYPE_CHECKING:  # what it takes is more than what it holds
+
+        def __init__(
+            self,
+            root: Node,
+            size_mm: AnyLength | None,
+            name: str = "scene",
+            view: View = ...,
+            printing: Print = ...,
+            animation: Animation | None = None,
+            tracks: tuple[Track, ...] = (),
+            unit_mm: AnyLength | None = None,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         if (self.size_mm is None) == (self.unit_mm is None):
@@ -105,8 +119,8 @@ class Scene:
 
 def scene(
     *elements: Node,
-    size: str | float | None = None,
-    unit: str | float | None = None,
+    size: AnyLength | None = None,
+    unit: AnyLength | None = None,
     name: str = "scene",
     view: View | None = None,
     printing: Print | None = None,
@@ -149,7 +163,7 @@ def scene(
         raise SceneError("a scene needs at least one element")
     root = elements[0] if len(elements) == 1 else get("union")(*elements)
     parts = view or View(), printing or Print()
-    return Scene(root, size, name, *parts, unit_mm=unit)  # type: ignore[arg-type]
+    return Scene(root, size, name, *parts, unit_mm=unit)
 
 
 def _refuse_impossible(root: Node) -> None:

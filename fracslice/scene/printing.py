@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from ..formulas.parameters import Choice, Count
 from ..formulas.records import attribute
 from .element import Part
-from .lengths import Length
+from .lengths import AnyLength, Length
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +42,22 @@ class Print(Part):
     )
     base: float = attribute(Length, 0.0, "height that is cut off at the bottom, to stand flat", zero=True)
     raft: float = attribute(Length, 0.0, "the object stands on a plate of this height", zero=True)
+
+    if TYPE_CHECKING:  # what it takes is more than what it holds
+
+        def __init__(
+            self,
+            *,
+            cavities: Literal["keep", "fill"] = "keep",
+            keep: int | Literal["all", "largest"] = "all",
+            bridge: AnyLength = 0.0,
+            gap: AnyLength = 0.0,
+            thickness: AnyLength = 0.0,
+            hollow: AnyLength = 0.0,
+            drain: AnyLength = 3.0,
+            base: AnyLength = 0.0,
+            raft: AnyLength = 0.0,
+        ) -> None: ...
 
     def validate(self) -> None:
         """Raise `SceneError` for `keep` combined with `bridge`."""

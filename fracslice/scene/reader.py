@@ -16,6 +16,7 @@ from xml.parsers import expat
 from ..common.suggestions import hint
 from ..errors import SceneError
 from ..formulas import Node
+from ..formulas.conversion import printable
 from ..formulas.parameters import REQUIRED, File, Parameter
 from ..formulas.registry import DEEPEST, TOO_DEEP
 from .animation import Animation, Track
@@ -69,7 +70,7 @@ def read(path: str | os.PathLike[str]) -> Scene:
             data = file.read(LARGEST_FILE + 1)
     except OSError as error:
         raise SceneError(f"{source}: {error.strerror or error}") from None
-    return _scene(data, source, Path(source).stem)
+    return _scene(data, source, printable(Path(source).stem))
 
 
 def reads(text: str | bytes, name: str = "scene") -> Scene:
@@ -278,5 +279,5 @@ def _value(opened: _Open, attribute: str, text: str) -> Any:
 
 def _quoted(text: str) -> str:
     """A value as one short quoted line."""
-    line = "".join(c if c.isprintable() else "?" for c in text)
+    line = printable(text)
     return f'"{line if len(line) <= 60 else line[:57] + "..."}"'

@@ -210,10 +210,11 @@ class _Collector:
         for k, now in enumerate(findings):
             below = solid.last
             reach = max(float(stack.heights[k]) / min(stack.pixel), 1.0)
-            bare = unsupported(below.runs, now.solid.runs, reach) if below else now.solid.runs.none
+            above = now.solid.runs
+            bare = above.none if below is None else unsupported(below.runs, above, reach)
             overhangs.append(square * float((bare.end - bare.begin).sum()))
             if len(bare.begin):
-                worst = farthest(now.solid.runs, bare, k, stack.pixel, limits.overhang, limits.span)
+                worst = farthest(above, bare, k, stack.pixel, limits.overhang, limits.span)
                 far.extend([worst] if worst else [])
             solid.add(now.solid)
             empty.add(now.empty)

@@ -89,10 +89,9 @@ def farthest(
         None if nothing reaches too far.
     """
     coarse = max(int(overhang / COARSE / max(pixel)), 1)
-    for times in (coarse, max(-(-max(solid.height, solid.width) // FINEST), 1)):
-        far, away = _too_far(
-            solid, bare, times, pixel, overhang - 2 * (times == coarse) * times * max(pixel), span
-        )
+    fine = max(-(-max(solid.height, solid.width) // FINEST), 1)
+    for times, slack in ((coarse, 2 * coarse * max(pixel)), (fine, 0.0)):
+        far, away = _too_far(solid, bare, times, pixel, overhang - slack, span)
         if not far.any():
             return None
     step = np.array(pixel) * times

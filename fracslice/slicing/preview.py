@@ -23,37 +23,53 @@ INK = np.array([(24, 26, 33), (240, 196, 105)], float)
 ALARM = (214, 60, 60)
 
 
-def thumbnail(image: np.ndarray) -> Image:
+def thumbnail(layer: Layer) -> Image:
     """Shrink a layer's coverage by box averaging, in colour.
 
     Parameters
     ----------
-    image : uint8 [ny, nx]
-        Coverage.
+    layer : Layer
+        The layer.
 
     Returns
     -------
     PIL.Image.Image
-        At most `CELL` pixels along a side.
+        At most `CELL` pixels along a side, in the proportions of the object.
     """
     from PIL import Image
 
-    small = Image.fromarray(np.ascontiguousarray(image[::-1]))
-    small.thumbnail((CELL, CELL), Image.Resampling.BOX, reducing_gap=None)
+    whole = Image.fromarray(np.ascontiguousarray(layer.coverage[::-1]))
+    small = whole.resize(_square(layer.stack, CELL), Image.Resampling.BOX)
     share = np.asarray(small, float)[..., None] / 255
     return Image.fromarray(np.uint8(INK[0] + share * (INK[1] - INK[0])))
 
 
-def _spread(stack: Stack, count: int) -> list[int]:
-    """Numbers of `count` layers, evenly spaced over the height, each in the middle of its interval."""
-    total = len(stack.z)
-    return sorted({int((i + 0.5) * total / min(count, total)) for i in range(min(count, total))})
+def _square(stack: Stack, most: float = math.inf) -> tuple[int, int]:
+    """Width and height of a layer's picture with square pixels, at most `most` along a side."""
+    (ny, nx), (across, along) = stack.shape, stack.pixel
+    width, height = nx * across, ny * along
+    side = max(min(across, along), max(width, height) / most)
+    return max(round(width / side), 1), max(round(height / side), 1)
 
 
-def contact_sheet(stack: Stack, file: BinaryIO, work: Work | None = None) -> None:
-    """Write a PNG with 24 layers, evenly spaced, each with its height above the bed."""
-    chosen = _spread(stack, CELLS)
-    images = list(Slicer(stack, work or Work()).map(lambda layer: thumbnail(layer.coverage), chosen))
+def _spread(layers: range, count: int) -> list[int]:
+    """At most `count` of the layers, evenly spaced, each in the middle of its interval."""
+    total = len(layers)
+    return sorted(layers[int((i + 0.5) * total / min(count, total))] for i in range(min(count, total)))
+
+
+def contact_sheet(
+    stack: Stack, file: BinaryIO, work: Work | None = None, layers: range | None = None
+) -> None:
+    """Write a PNG with 24 layers, evenly spaced, each with its height above the bed.
+
+    Parameters
+    ----------
+    layers : range, optional
+        Layers to choose from; all by default.
+    """
+    chosen = _spread(range(len(stack.z)) if layers is None else layers, CELLS)
+    images = list(Slicer(stack, work or Work()).map(thumbnail, chosen))
     _sheet(stack, chosen, images, math.ceil(math.sqrt(1.5 * max(len(images), 1)))).save(file, "PNG")
 
 
@@ -74,9 +90,8 @@ def _sheet(stack: Stack, layers: Sequence[int], images: Sequence[Image], across:
 
 def animation(stack: Stack, file: BinaryIO, work: Work | None = None) -> None:
     """Write an endless animated WebP that climbs through up to 60 layers in three seconds."""
-    frames = list(
-        Slicer(stack, work or Work()).map(lambda layer: thumbnail(layer.coverage), _spread(stack, FRAMES))
-    )
+    chosen = _spread(range(len(stack.z)), FRAMES)
+    frames = list(Slicer(stack, work or Work()).map(thumbnail, chosen))
     frames[0].save(file, "WEBP", save_all=True, append_images=frames[1:], duration=50, loop=0, lossless=True)
 
 
@@ -97,7 +112,8 @@ def worst_layers(stack: Stack, layers: Sequence[int], file: BinaryIO, work: Work
     for k in layers:
         bare = solid[k] & ~solid[k - 1] if k else np.zeros_like(solid[k])
         colours = np.array([INK[0], INK[1], ALARM], np.uint8)
-        pictures.append(Image.fromarray(colours[solid[k] + 1 * bare][::-1]))
+        picture = Image.fromarray(colours[solid[k] + 1 * bare][::-1])
+        pictures.append(picture.resize(_square(stack), Image.Resampling.NEAREST))
     _sheet(stack, layers, pictures, min(len(layers), ABREAST)).save(file, "PNG")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -58,13 +59,13 @@ class Screen:
         if not abs(self.compensation) <= 1:
             raise SliceError(f"compensation {self.compensation:g} mm: expected at most 1 mm")
         if self.printer:
-            check_fits(self.stack, self.printer)
+            check_fits(self.stack, self.printer, max(self.compensation, 0.0))
 
     @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns of a picture."""
         if not self.printer:
-            return self.stack.shape
+            return self._grown
         across, along = self.printer.pixels
         return (across, along) if self.printer.portrait else (along, across)
 
@@ -83,19 +84,23 @@ class Screen:
         """
         image = np.zeros(self.shape, np.uint8)
         bed, mine = self._bed(image), self._place
+        bed[mine.on_bed] = self._levels[self._changed(layer)[mine.of_layer]]
+        return image
+
+    def _changed(self, layer: Layer) -> np.ndarray:
+        """Coverage after compensation and blur, uint8, in the shape of `_grown`."""
+        coverage = layer.coverage
+        if any(self._margin):
+            coverage = np.pad(coverage, [(n, n) for n in self._margin])
         if self.compensation:
             from .compensation import compensated
 
-            bed[mine.on_bed] = compensated(layer.coverage, self.compensation, self.stack.pixel)[mine.of_layer]
-        else:
-            bed[mine.on_bed] = layer.coverage[mine.of_layer]
-        shown = tuple(slice(max(on.start - self.blur, 0), on.stop + self.blur) for on in mine.on_bed)
+            coverage = compensated(coverage, self.compensation, self.stack.pixel)
         if self.blur:
             from .blur import blurred
 
-            bed[shown] = blurred(bed[shown], self.blur)
-        bed[shown] = self._levels[bed[shown]]
-        return image
+            coverage = blurred(coverage, self.blur)
+        return coverage
 
     def encoded(self, layer: Layer, encoding: Encoding, shown: np.ndarray | None = None) -> bytes:
         """Encode the picture of a layer.
@@ -121,6 +126,18 @@ class Screen:
         return layer.encoded(view, encoding)
 
     @cached_property
+    def _margin(self) -> tuple[int, int]:
+        """Rows and columns on each side of a layer that compensation and blur reach."""
+        width, height = (math.ceil(max(self.compensation, 0.0) / side) for side in self.stack.pixel)
+        return height + self.blur, width + self.blur
+
+    @property
+    def _grown(self) -> tuple[int, int]:
+        """Rows and columns of a layer with its margin."""
+        (rows, columns), (above, beside) = self.stack.shape, self._margin
+        return rows + 2 * above, columns + 2 * beside
+
+    @cached_property
     def _view(self) -> ScreenView:
         """The screen for native code."""
         mine = self._place
@@ -137,9 +154,9 @@ class Screen:
     @cached_property
     def _place(self) -> _Window:
         """The layer centred on the bed; it may be a few empty pixels larger than the bed."""
-        bed = self.printer.pixels[::-1] if self.printer else self.stack.shape
+        bed = self.printer.pixels[::-1] if self.printer else self._grown
         on_bed, of_layer = [], []
-        for mine, available in zip(self.stack.shape, bed, strict=True):
+        for mine, available in zip(self._grown, bed, strict=True):
             first, count = (available - mine) // 2, min(mine, available)
             on_bed.append(slice(max(first, 0), max(first, 0) + count))
             of_layer.append(slice(max(-first, 0), max(-first, 0) + count))
@@ -170,7 +187,7 @@ class _Window:
     of_layer: tuple[slice, slice]
 
 
-def check_fits(stack: Stack, printer: Printer) -> None:
+def check_fits(stack: Stack, printer: Printer, grown: float = 0.0) -> None:
     """Check that the object fits a printer.
 
     Parameters
@@ -179,13 +196,17 @@ def check_fits(stack: Stack, printer: Printer) -> None:
         The planned layers.
     printer : Printer
         The printer.
+    grown : float
+        Distance by which its outlines move outwards, mm.
 
     Raises
     ------
     SliceError
         If the object is larger than the build volume.
     """
-    for axis, mine, most in zip("xyz", stack.size, printer.build_volume, strict=True):
+    x, y, z = stack.size
+    size = x + 2 * grown, y + 2 * grown, z
+    for axis, mine, most in zip("xyz", size, printer.build_volume, strict=True):
         if mine > most * (1 + 1e-6):
             raise SliceError(
                 f"the object is {mine:.4g} mm along {axis}, the {printer.title} has {most:.4g} mm"

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,7 +16,7 @@ from ..formulas.records import attribute, validate
 from ..kernel import Field
 from ..printing import printable
 from ..scene import Print
-from ..scene.lengths import Length, Pair, Percent
+from ..scene.lengths import AnyLength, AnyScale, Length, Pair, Percent
 from ..volume import Drain, plan
 from ..volume.sizing import SAME, UP, Sizing, oriented
 from ..work import Work
@@ -59,6 +61,19 @@ class SliceJob:
     printing: Print = field(default_factory=Print)
     scale: Triple = attribute(Percent, SAME, "compensation of shrinkage")
     unit: float | None = attribute(Length, None, "a scene unit")
+
+    if TYPE_CHECKING:  # what it takes is more than what it holds
+
+        def __init__(
+            self,
+            size: AnyLength,
+            layer: AnyLength = 0.05,
+            pixel: AnyLength | Sequence[AnyLength] = 0.05,
+            up: Sequence[float] = UP,
+            printing: Print = ...,
+            scale: AnyScale = 1.0,
+            unit: AnyLength | None = None,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         validate(self, SceneError)

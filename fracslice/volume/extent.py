@@ -11,6 +11,7 @@ from ..errors import EmptyError, VolumeError
 from ..formulas import Node
 from ..formulas.box import Box
 from ..kernel import Field
+from ..kernel.cells import possible_cells
 from ..work import Work
 from .climbing import SLANTS, climb
 from .evaluation import values_at
@@ -39,6 +40,9 @@ suffice.
 
 FINER = 16
 LITTLE, MOST = 1 << 14, 1 << 17
+
+CELLS = 1 << 18
+"""Maximum number of cells in the proof that nothing is inside."""
 
 EXACT = 2.5e-7
 """Last step of the outward search for tips, as a fraction of the longest side."""
@@ -178,16 +182,23 @@ class _Search:
         conservative = root.conservative()
         self.kernel, self.work, bounds = root.kernel(), work, conservative.bounds
         self.far = not bounds.exterior_only
-        self._free = conservative.kernel().entry, bounds.lipschitz, self.far
+        self.free, self.lipschitz = conservative.kernel(), bounds.lipschitz
 
     def sides(self, region: Box) -> Sides:
         """Sides of the object within a box."""
-        return Sides(self.kernel.entry, *self._free, region.lo, region.hi, self.work.threads)
+        bound = self.free.entry, self.lipschitz, self.far
+        return Sides(self.kernel.entry, *bound, region.lo, region.hi, self.work.threads)
 
     def inside(self, points: np.ndarray) -> np.ndarray:
         """Mask of the interior points, bool [...], of points [3, ...]."""
         mask: np.ndarray = values_at(self.kernel, points.reshape(3, -1), self.work) < 0
         return mask.reshape(points.shape[1:])
+
+    def why_empty(self, box: Box) -> str:
+        """Message that nothing was found inside: a proof that all is outside, or what may be the case."""
+        if possible_cells(lambda points: self.free.points(*points), self.lipschitz, box, CELLS)[0].size:
+            return "there is no surface: no point is inside; expected thicker parts or less cut away"
+        return "the scene is empty: every point is outside; expected less cut away"
 
     def climb(self, sides: Sides, first: float, exact: float) -> None:
         """Move the tips of all sides outwards."""
@@ -208,7 +219,7 @@ class _Search:
             self.climb(sides, step, exact)
             sides.prove(aim, most)
             if not np.isfinite(sides.known).all():
-                raise EmptyError("there is no surface: no point is inside; expected thicker parts")
+                raise EmptyError(self.why_empty(box))
             _learn(sides, sides.best[:, :, 0])
             if aim <= exact or (sides.spent >= LITTLE).all():
                 break

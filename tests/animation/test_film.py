@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import threading
 from pathlib import Path
 
@@ -11,12 +12,13 @@ import numpy as np
 import OpenEXR
 import pytest
 from fracslice.cli.main import run
-from PIL import Image
+from PIL import Image, ImageSequence
 
 from fracslice import read, reads
 from fracslice.animation import FilmJob, Timeline, encode, write_frames
 from fracslice.animation.encode import CODECS
-from fracslice.errors import ExportError, RenderError
+from fracslice.common.locks import locked_folder
+from fracslice.errors import Cancelled, ExportError, RenderError
 from fracslice.rendering import Renderer, develop
 from fracslice.work import Work
 
@@ -123,6 +125,17 @@ def test_frames_of_another_film_are_not_mixed_in(
     (tmp_path / "mine" / "letter.txt").write_text("dear")
     with pytest.raises(RenderError, match="expected an empty folder"):
         write_frames(job(scene()), range(1), tmp_path / "mine", False, Work(1))
+    for text in ("{}", "[]", "dear"):
+        (tmp_path / "mine" / "film.json").write_text(text)
+        with pytest.raises(RenderError, match=r"film\.json: expected the journal of a film"):
+            write_frames(job(scene()), range(1), tmp_path / "mine", False, Work(1))
+
+
+def test_two_films_at_once_do_not_mix_their_frames(tmp_path: Path) -> None:
+    (tmp_path / "frames").mkdir()
+    with locked_folder(tmp_path / "frames"), pytest.raises(ExportError, match="another process"):
+        write_frames(job(scene()), range(1), tmp_path / "frames", False, Work(1))
+    assert not list((tmp_path / "frames").iterdir())
 
 
 def test_noise_changes_with_the_frame_unless_it_is_fixed() -> None:
@@ -164,8 +177,64 @@ def test_pictures_that_move_and_contact_sheets(path: Path, tmp_path: Path) -> No
     with Image.open(tmp_path / "film.png") as sheet:
         assert sheet.size == (240, 48)
     assert len(list((tmp_path / "film.frames").iterdir())) == 9, "made once"
-    assert animate(path, "-o", tmp_path / "film.png", "--preview") == 0
-    assert Image.open(tmp_path / "film.preview.frames" / "frame00000.png").size == (10, 6)
+
+
+def test_a_contact_sheet_needs_its_frames_alone(path: Path, tmp_path: Path) -> None:
+    assert animate(path, "-o", tmp_path / "film.png", "--preview", "--fps", 40) == 0
+    made = sorted((tmp_path / "film.preview.frames").glob("*.png"))
+    assert (len(made), made[-1].name) == (24, "frame00039.png")
+    assert Image.open(made[0]).size == (10, 6)
+    assert Image.open(tmp_path / "film.png").size == (60, 24)
+
+
+@pytest.mark.parametrize("fps", [12, 24, 29.97, 50])
+def test_a_gif_is_as_long_as_its_film(fps: float, tmp_path: Path) -> None:
+    frames = []
+    for k in range(24):
+        frames.append(tmp_path / f"f{k}.png")
+        Image.new("RGB", (8, 8), (10 * k, 0, 0)).save(frames[-1])
+    encode(frames, tmp_path / "film.gif", fps, Work(1))
+    with Image.open(tmp_path / "film.gif") as film:
+        shown = [frame.info["duration"] for frame in ImageSequence.Iterator(film)]
+    assert len(shown) == 24 and min(shown) >= 20
+    assert sum(shown) == pytest.approx(24000 / fps, abs=5)
+
+
+def test_a_gif_keeps_small_vivid_colours(tmp_path: Path) -> None:
+    """Beside the noise of many pixels; a median cut is 22 levels off."""
+    random = np.random.default_rng(1)
+    pixels = np.full((90, 160, 3), 130.0) + np.linspace(-40, 40, 90)[:, None, None]
+    pixels[:, 80:] += random.normal(0, 40, (90, 80, 3))
+    pixels[:6, :6] = random.uniform((140, 0, 30), (230, 70, 100), (6, 6, 3))
+    Image.fromarray(pixels.clip(0, 255).astype(np.uint8)).save(tmp_path / "frame.png")
+    encode([tmp_path / "frame.png"], tmp_path / "film.gif", 10.0, Work(1))
+    with Image.open(tmp_path / "film.gif") as film:
+        error = abs(np.asarray(film.convert("RGB")) - pixels.clip(0, 255))
+    assert error[:6, :6].mean() < 16
+
+
+def test_encoding_is_cancelled(path: Path, tmp_path: Path) -> None:
+    pytest.importorskip("imageio_ffmpeg")
+    cancel, stages = threading.Event(), []
+
+    def progress(stage: str, done: float) -> None:
+        stages.append((stage, done))
+        cancel.set()
+
+    Image.new("RGB", (16, 16)).save(tmp_path / "frame.png")
+    with pytest.raises(Cancelled):
+        encode([tmp_path / "frame.png"] * 4, tmp_path / "film.mp4", 8.0, Work(1, progress, cancel))
+    assert stages == [("film", 0.25)] and not (tmp_path / "film.mp4").exists()
+
+
+def test_a_film_says_how_its_colours_are_stored(tmp_path: Path) -> None:
+    """Without the tags, a player takes a film of more than 576 rows for BT.709 and others for BT.601."""
+    imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    Image.new("RGB", (16, 16), (30, 200, 60)).save(tmp_path / "frame.png")
+    for ending in CODECS:
+        encode([tmp_path / "frame.png"] * 2, tmp_path / f"film{ending}", 8.0, Work(1))
+        command = [imageio_ffmpeg.get_ffmpeg_exe(), "-hide_banner", "-i", str(tmp_path / f"film{ending}")]
+        assert "bt709" in subprocess.run(command, capture_output=True, text=True).stderr
 
 
 @pytest.mark.parametrize("ending", [".mp4", ".webm", ".mov", ".mkv"])
@@ -175,16 +244,17 @@ def test_films(ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     for k in range(4):
         frames.append(tmp_path / f"f{k}.png")
         Image.new("RGB", (33, 17), (60 * k, 0, 200)).save(frames[-1])
-    encode(frames, tmp_path / f"film{ending}", 8.0)
+    encode(frames, tmp_path / f"film{ending}", 8.0, Work(1))
     count, seconds = imageio_ffmpeg.count_frames_and_secs(str(tmp_path / f"film{ending}"))
     assert (count, seconds) == (4, pytest.approx(0.5))
     film = imageio_ffmpeg.read_frames(str(tmp_path / f"film{ending}"))
     assert next(film)["size"] == (34, 18), "the codecs need pairs of pixels"
-    levels = [np.frombuffer(data, np.uint8).reshape(18, 34, 3)[8, 16, 0] for data in film]
-    assert np.allclose(levels, [0, 60, 120, 180], atol=8)
+    pixels = np.array([np.frombuffer(data, np.uint8).reshape(18, 34, 3) for data in film])
+    assert np.allclose(pixels[:, 8, 16, 0], [0, 60, 120, 180], atol=8)
+    assert np.allclose(pixels[:, -1, -1], pixels[:, 8, 16], atol=8), "no black edge"
     monkeypatch.setitem(CODECS, ending, ("none",))
     with pytest.raises(ExportError, match="ffmpeg: "):
-        encode(frames, tmp_path / f"bad{ending}", 8.0)
+        encode(frames, tmp_path / f"bad{ending}", 8.0, Work(1))
     assert not (tmp_path / f"bad{ending}").exists()
 
 
@@ -192,8 +262,8 @@ def test_films(ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 def test_shipped_films_are_what_their_scenes_show(name: str) -> None:
     imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
     film = Timeline(read(FILMS / f"{name}.xml"))
-    assert film.animation.frames == 60
     small = FilmJob(film, (80, 45), 16, film.animation.fps, device="cpu")
+    assert small.frames == 60
     shown = develop(small.light(8, Work()), film.scene.view)
     frames = imageio_ffmpeg.read_frames(str(FILMS / f"{name}.mp4"))
     size = next(frames)["size"]
@@ -222,11 +292,13 @@ def test_a_mesh_of_a_time(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        (["-o", "none/film.mp4"], "none/film.mp4: the folder"),
         (["-o", "film.avi"], "known are .mp4"),
         (["-o", "film.mp4", "--exr"], "expected a folder"),
         (["-o", "f", "--layers"], "expected --exr"),
         (["-o", "f", "--frames", "9..3"], "such as 10..20"),
         (["-o", "f", "--fps", "0"], "--fps"),
+        (["-o", "film.gif", "--fps", "60"], "expected at most 50 for .gif"),
     ],
 )
 def test_bad_options_are_one_line(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from fracslice import Camera, Light, Picture, box, render, sphere
+from fracslice import Camera, Light, Mesh, Picture, box, cylinder, make_mesh, render, slice_layers, sphere
 from fracslice.errors import Cancelled, RenderError, SceneError
 from fracslice.scene import scene
 from fracslice.scene.view import Film, View
@@ -69,3 +69,27 @@ def test_progress_is_reported_and_work_is_cancelled() -> None:
 def test_values_that_cannot_be_are_named(options: dict, error: type, message: str) -> None:
     with pytest.raises(error, match=message):
         render(box(), **{"size": (16, 16), **options})
+
+
+def shown(what: object) -> np.ndarray:
+    return np.asarray(Image.open(io.BytesIO(what._repr_png_())))  # type: ignore[attr-defined]
+
+
+def test_a_notebook_shows_a_mesh_and_layers() -> None:
+    mesh = make_mesh(box((3, 1, 1)), size=30, resolution=16)
+    picture = shown(mesh)
+    rows, columns = np.nonzero(picture[..., 3] == 255)
+    assert picture.shape == (360, 480, 4) and 400 < np.ptp(columns) < 480 and np.ptp(rows) > 250
+    faces = {tuple(colour) for colour in picture[rows, columns][::7].tolist()}
+    assert 3 <= len(faces) < 12  # three faces, each with its light
+    assert Mesh(mesh.vertices, mesh.triangles[:0])._repr_png_() is None
+    layers = slice_layers(cylinder(2, 5), layer=0.5, pixel=0.1)
+    assert shown(layers).shape[1] > shown(layers[3:5]).shape[1] > 200
+    assert layers[:0]._repr_png_() is None
+
+
+def test_the_picture_of_a_mesh_has_its_colours() -> None:
+    mesh = make_mesh(sphere().material(colour=(1, 0, 0)), resolution=16, colour="material")
+    picture = shown(mesh)
+    red, green, _ = picture[picture[..., 3] == 255][:, :3].max(0)
+    assert red > 200 and green < 40

@@ -46,7 +46,7 @@ def test_a_sheet_has_a_scene_for_each_picture_and_can_be_gone_on_from(source: Pa
     scenes = [read(path) for path in sorted(sheet.with_suffix("").iterdir())]
     assert [path.name for path in sorted(sheet.with_suffix("").iterdir())] == [f"0{k}.xml" for k in range(5)]
     assert scenes[0] == read(source) and len({scene.root["exponent"] for scene in scenes}) == 5
-    onward = explored(source, "onward", "--count", "2", "--from", str(sheet.with_suffix("") / "03.xml"))
+    onward = explored(sheet.with_suffix("") / "03.xml", "onward", "--count", "2")
     assert read(onward.with_suffix("") / "00.xml") == scenes[3]
 
 
@@ -59,7 +59,7 @@ def test_a_seed_makes_the_same_sheet_whatever_the_count(source: Path) -> None:
 def test_nothing_is_written_for_bad_input(source: Path, capsys: pytest.CaptureFixture[str]) -> None:
     before = sorted(source.parent.iterdir())
     target = str(source.parent / "sheet.png")
-    for options in (["-o", "x.jpg"], ["-o", target, "--spread", "0"], ["-o", target, "--from", "no.xml"]):
+    for options in (["-o", "x.jpg"], ["-o", target, "--spread", "0"]):
         assert run(["explore", str(source), *options]) == 2
         assert len(capsys.readouterr().err.splitlines()) == 1
     assert sorted(source.parent.iterdir()) == before

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
 import pytest
@@ -24,6 +25,34 @@ def test_values_of_ranges() -> None:
     assert result[-1][0] == ("a.p=3", "a.q=7", "b[2].r=-1")
     assert [settings for settings, _ in members(["a.p=1..3"])] == [("a.p=1",), ("a.p=2",), ("a.p=3",)]
     assert len(members(["a.p=0..1:0.1"])) == 11
+    vectors = members(["t.rotate=1 0 0 -10..10:20"])
+    assert vectors == [(("t.rotate=1 0 0 -10",), "-rotate-10"), (("t.rotate=1 0 0 10",), "-rotate10")]
+    assert members(["a.p=2 .. 3"])[1] == (("a.p=3",), "-p3")
+
+
+def test_a_table_has_a_row_for_each_mesh(scene: str, tmp_path: Path) -> None:
+    def rows() -> list[dict[str, str]]:
+        return list(csv.DictReader(table.open()))
+
+    table, stl = tmp_path / "a.csv", str(tmp_path / "a.stl")
+    given = ["mesh", scene, "-q", "--resolution", "24", "-o", stl, "--report", str(table)]
+    assert run([*given, "--set", "sphere.radius=1..3"]) == 0
+    assert [row["sphere.radius"] for row in rows()] == ["1", "2", "3"]
+    assert run([*given, "--set", "sphere.radius=3..4", "--set", "solid.size=1cm"]) == 0
+    assert [Path(row["file"]).stem for row in rows()] == [f"a-radius{k}" for k in (1, 2, 3, 4)]
+    volumes = [float(row["volume_mm3"]) for row in rows()]
+    assert volumes == pytest.approx([4189, 4189, 524, 524], rel=0.05)
+    assert {row["cavities_mm3"] for row in rows()} == {"0.0"}
+
+
+def test_a_table_of_something_else_is_not_replaced(
+    scene: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "a.csv").write_text("x,y\n1,2\n")
+    given = ["mesh", scene, "-o", str(tmp_path / "a.stl"), "--report", str(tmp_path / "a.csv")]
+    assert run(given) == 2
+    assert "expected a table of meshes" in capsys.readouterr().err
+    assert not (tmp_path / "a.stl").exists() and (tmp_path / "a.csv").read_text() == "x,y\n1,2\n"
 
 
 @pytest.mark.parametrize("command", ["mesh", "slice", "render"])

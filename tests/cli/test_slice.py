@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -76,6 +77,48 @@ def test_a_folder_that_is_not_this_job(ball: Path, tmp_path: Path, capfd: pytest
     assert sliced(ball, "-o", tmp_path / "layers", "--layer", "1mm") == 2
     assert "its files are no interrupted job" in capfd.readouterr().err
     assert (tmp_path / "layers" / "job.json").read_text() == '{"mine": 1}'
+
+
+@pytest.mark.parametrize("ending", ["sl1", "3mf", "png"])
+def test_names_that_are_no_text(ending: str, ball: Path, tmp_path: Path) -> None:
+    """Linux has names of any bytes."""
+    scene, target = (tmp_path / os.fsdecode(b"b\xff." + e) for e in (b"xml", ending.encode()))
+    ball.rename(scene)
+    how = {"sl1": ["slice", "--layer", "5mm", "--printer", "sl1s"], "3mf": ["mesh", "--resolution", "16"]}
+    command = how.get(ending, ["render", "--size", "8x8", "--samples", "1"])
+    assert run([command[0], str(scene), "-o", str(target), *command[1:]]) == 0
+    assert target.stat().st_size
+
+
+@pytest.mark.parametrize("date", ["today", "1e9", "9" * 20])
+def test_an_impossible_date(
+    date: str, ball: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", date)
+    assert sliced(ball, "-o", tmp_path / "layers", "--layer", "5mm") == 2
+    assert capfd.readouterr().err.startswith(f"fracslice: SOURCE_DATE_EPOCH={date}: expected seconds")
+
+
+def test_a_file_that_is_written_is_named_when_its_page_is_stopped(
+    ball: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def stopped(*_: object) -> None:
+        raise Cancelled
+
+    monkeypatch.setattr("fracslice.jobs.slice_checks.check_run", stopped)
+    target = tmp_path / "a.json"
+    assert sliced(ball, "-o", target, "--layer", "5mm", "--html", tmp_path / "a.html") == 130
+    assert capfd.readouterr().err == f"fracslice: stopped; {target} is written\n"
+    assert target.exists() and not (tmp_path / "a.html").exists()
+
+
+def test_an_element_without_an_end_is_named_by_its_line(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    scene = tmp_path / "a.xml"
+    scene.write_text('<scene version="1">\n<solid\nsize="4mm">\n<!-- --><gyroid/></solid></scene>')
+    assert sliced(scene, "-o", tmp_path / "a.json", "--layer", "1mm") == 2
+    assert capfd.readouterr().err.startswith(f"fracslice: {scene}:4: <gyroid> has no end")
 
 
 def test_an_edited_scene_begins_afresh_and_says_so(

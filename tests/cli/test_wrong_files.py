@@ -155,6 +155,9 @@ def test_a_file_that_cannot_be_read(wrong: Path, capfd, monkeypatch) -> None:
         ("check ball.xml --printer sl1", "--printer: only with --layer"),
         ("check ball.xml --picture out/x.png", "--picture: only with --layer"),
         *((f"check ball.xml --layer 5mm --{o} 1", f"--{o}: only for") for o in ("voxel", "dust", "chord")),
+        ("check ball.xml --layer 5mm --proved", "--proved: only for meshes"),
+        ("check whole.stl --proved", "--proved: only for scenes"),
+        ("mesh ball.xml -o out/x.3mf --implicit --proved", "--proved: only for meshes"),
         ("show whole.stl --base 1mm", "--base: only for scenes, and a model was given"),
         ("show whole.stl --set sphere.radius=1", "--set: only for scenes"),
         ("mesh ball.xml -o out/x.stl --dust 5mm3", "'5mm3' is not a valid number"),
@@ -167,7 +170,12 @@ def test_a_file_that_cannot_be_read(wrong: Path, capfd, monkeypatch) -> None:
         ("slice ball.xml -o out/x.json --up inf 0 1", "inf: expected a finite number"),
         ("slice ball.xml -o out/x.json --up 1e300 0 1", "up=(1e+300, 0.0, 1.0): expected 3 numbers"),
         ("slice ball.xml -o out/x.json --layer 5mm --exposure -1 1", "exposure=-1.0: expected"),
-        ("slice ball.xml -o out/x.json --layer 5mm --gamma 0", "gamma=0.0: expected a number > 0"),
+        ("slice ball.xml -o out/layers --layer 5mm --gamma 0", "gamma=0.0: expected a number > 0"),
+        *(
+            (f"slice ball.xml -o out/x.json --layer 5mm --{o}", f"--{o.split()[0]}: only for pictures")
+            for o in ("compensation 1mm", "gamma 2", "levels 8", "blur 1", "sections 2")
+        ),
+        ("slice ball.xml -o out/x.cli --layer 5mm --mirror", "mirror: only for pictures, and cli files"),
         (
             "slice ball.xml -o out/x.json --compensation 1ft",
             "'1ft': expected 0, or a length such as 0.05mm or",

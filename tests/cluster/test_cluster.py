@@ -17,7 +17,7 @@ from fracslice.cli.main import run as command
 from fracslice.animation import FilmJob, Timeline, write_frames
 from fracslice.cluster import ResultFolder, Workers, connected, workers
 from fracslice.cluster.identity import Identity
-from fracslice.errors import Cancelled, ClusterError
+from fracslice.errors import Cancelled, ClusterError, FracsliceWarning
 from fracslice.export.layer_files import write_slices
 from fracslice.formulas import mandelbulb, sphere
 from fracslice.jobs import mesh_sampling as meshsampling
@@ -286,15 +286,63 @@ def test_time_limits_and_cancellation(
     with connected(cluster.address, str(tmp_path / "pieces")) as pool:
         wait_until(lambda: not pool.client.scheduler_info()["workers"])
         alone = Workers(pool.client, pool.pieces, patience=0.2, limit=0.6)
-        with pytest.raises(ClusterError, match=r"no task ended within 0\.6 s; 0 workers"):
+        warned = pytest.warns(FracsliceWarning, match="no worker yet")
+        with warned, pytest.raises(ClusterError, match=r"no task ended within 0\.6 s; 0 workers"):
             sliced(Work(1, cluster=alone), tmp_path)
         work = Work(1, cluster=pool)
         threading.Timer(0.3, work.cancel.set).start()
-        with pytest.raises(Cancelled):
+        with warned, pytest.raises(Cancelled):
             sliced(work, tmp_path)
     monkeypatch.setattr(workers, "CONNECT", 0.3)
     with pytest.raises(ClusterError, match="no scheduler answers"), connected("tcp://127.0.0.1:9", "x"):
         pass
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> Iterator[Cluster]:
+    """Scheduler of one test, which may stop or kill it."""
+    started = Cluster(tmp_path)
+    yield started
+    started.end()
+
+
+@pytest.mark.parametrize("number", [signal.SIGSTOP, signal.SIGKILL])
+def test_a_scheduler_that_hangs_or_ends(
+    number: int, own: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One line each: that nobody works, and that the scheduler is silent; nothing hangs."""
+    monkeypatch.setattr(workers, "CONNECT", 3.0)
+    with connected(own.address, str(tmp_path / "pieces")) as pool:
+        quick = Workers(pool.client, pool.pieces, patience=1.0)
+        threading.Timer(0.5, own.processes[0].send_signal, [number]).start()
+        with (
+            pytest.warns(FracsliceWarning, match="no worker yet; the job waits 30 min for one"),
+            pytest.raises(ClusterError, match=f"{own.address}: the scheduler does not answer"),
+        ):
+            sliced(Work(1, cluster=quick), tmp_path)
+
+
+def test_a_task_whose_workers_end(
+    expected: dict[str, bytes],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    request: pytest.FixtureRequest,
+) -> None:
+    """As one whose memory is too small, after as many as Dask allows; then another worker comes."""
+    monkeypatch.setenv("DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES", "0")
+    own = request.getfixturevalue("own")
+    first = own.worker()
+
+    def progress(_: str, share: float) -> None:
+        if share < 1 and first.poll() is None:
+            first.kill()
+            first.wait()
+            own.worker()
+
+    with connected(own.address, str(tmp_path / "pieces")) as pool:
+        pool.client.wait_for_workers(1, timeout=SECONDS)
+        with pytest.warns(FracsliceWarning, match="layers-.*: its workers ended, one by one"):
+            assert sliced(Work(1, progress=progress, cluster=pool), tmp_path) == expected["slice"]
 
 
 @pytest.mark.parametrize("name", JOBS)

@@ -109,6 +109,9 @@ def test_a_printer_of_ones_own(tmp_path: Path) -> None:
         ("150", '"tall"', "height=.*: expected a number"),
         ("[1440", "1440", r"line \d+"),
         ('file = "ctb"', "mirror = 1", "true or false for mirror"),
+        ('"Mine"', "5", "title=5: expected text in one line"),
+        ('"ctb"', "5", "file=5: expected text in one line"),
+        ("1440", "65536", "pixels=.*: expected 2 whole numbers .* 65535"),
     ],
 )
 def test_a_wrong_printer_is_one_line(old: str, new: str, message: str, tmp_path: Path) -> None:
@@ -126,6 +129,7 @@ def test_a_resin_of_ones_own(tmp_path: Path) -> None:
     for text, message in (
         ("exposure = 2.5", "bottom_exposure is missing"),
         ("exposure = 2.5\nbottom_exposure = -1", "bottom_exposure=-1: expected a number > 0"),
+        ("name = 5\nexposure = 2.5\nbottom_exposure = 9", "name=5: expected text"),
         ("exposures = 2.5", "'exposures': unknown; expected exposure"),
     ):
         path.write_text(text)
@@ -159,4 +163,7 @@ def test_a_resin_profile_of_prusaslicer(tmp_path: Path) -> None:
     )
     path.write_text("exposure_time = fast\n")
     with pytest.raises(ExportError, match="exposure_time = fast: expected a number"):
+        resin(str(path), None, 0.05)
+    path.write_text("exposure_time = 2\ninitial_exposure_time = 9\nfaded_layers = inf\n")
+    with pytest.raises(ExportError, match="transition_layers=inf: expected a whole number"):
         resin(str(path), None, 0.05)

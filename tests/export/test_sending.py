@@ -116,6 +116,12 @@ def test_the_key_is_in_the_environment_or_a_file(
     monkeypatch.delenv("FRACSLICE_KEY", raising=False)
     with pytest.raises(ExportError, match="PrusaLink needs a key"):
         sending.printer_address("prusalink://here")
+    for key in ("two\nlines", "ключ"):
+        monkeypatch.setenv("FRACSLICE_KEY", key)
+        with pytest.raises(ExportError, match="expected ASCII in one line") as failure:
+            sending.printer_address("prusalink://here")
+        assert key not in str(failure.value)
+    monkeypatch.delenv("FRACSLICE_KEY")
     (tmp_path / "key").write_text("secret\n")
     monkeypatch.setenv("FRACSLICE_KEY_FILE", str(tmp_path / "key"))
     with printer(PrusaLink) as (port, files):
@@ -149,7 +155,14 @@ def test_no_printer_is_one_line(job: Path) -> None:
         pass
     with pytest.raises(ExportError, match=f"sdcp://127.0.0.1:{port}: Connection refused"):
         sending.send(job, f"sdcp://127.0.0.1:{port}", Work())
-    for text in ("http://here", "sdcp://", "sdcp://here/folder", "sdcp://me:key@here", "sdcp://here:port"):
+    for text in (
+        "http://here",
+        "sdcp://",
+        "sdcp://here/folder",
+        "sdcp://me:key@here",
+        "sdcp://here:port",
+        f"sdcp://{70 * 'a'}",
+    ):
         with pytest.raises(
             ExportError, match="expected prusalink://HOST, prusalink://HOST/local or sdcp://HOST"
         ):

@@ -26,7 +26,7 @@ from fracslice.export import layerformats, png, resuming
 from fracslice.export.jobs import SliceRun
 from fracslice.export.layer_files import FORMATS, slice_format, write_slices
 from fracslice.export.resins import Resin
-from fracslice.export.resuming import Journal, journal
+from fracslice.export.resuming import Journal, journal, resumable_folder
 from fracslice.formulas import Node, difference, menger, sphere
 from fracslice.jobs.stack_model import StackModel
 from fracslice.scene import scene
@@ -441,6 +441,15 @@ def test_two_at_once_do_not_spoil_each_other(tmp_path: Path) -> None:
         ):
             pass
         assert list(kept) == [b"layer"]
+
+
+def test_two_at_once_do_not_mix_their_layers(tmp_path: Path) -> None:
+    folder = tmp_path / "layers"
+    with resumable_folder(folder, "one", "{:05}.png".format, bool):
+        (folder / "00000.png").write_bytes(b"one")
+        with pytest.raises(ExportError, match="layers: another process is writing it"):
+            write_slices(run(), folder)
+        assert (folder / "00000.png").read_bytes() == b"one"
 
 
 def test_a_layer_that_is_a_link_is_not_written_through(tmp_path: Path) -> None:

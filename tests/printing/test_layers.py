@@ -7,7 +7,7 @@ import math
 import pytest
 
 from fracslice.errors import VolumeError
-from fracslice.formulas import Node, box, sphere, transform, union
+from fracslice.formulas import Node, box, cone, sphere, transform, union
 from fracslice.scene import Print
 from fracslice.slicing import SliceJob, plan_stack
 from fracslice.slicing.layer_checks import PrintReport, check_layers
@@ -67,6 +67,13 @@ def test_gaps_are_closed_up_to_their_width() -> None:
     report = checked(halves, gap=1.5 * gap)
     assert len(report.bodies) == 1
     assert report.volume == pytest.approx(8000, rel=0.01)
+
+
+def test_a_base_that_takes_the_widest_part_makes_layers_narrower() -> None:
+    """A cone's foot: the size is that of the layers, and the raft is a tenth larger on each side."""
+    cut = checked(cone(radius=1, height=2), base=10.0)
+    assert cut.size == pytest.approx((10, 10, 10), abs=0.05)
+    assert checked(cone(radius=1, height=2), base=10.0, raft=1.0).size[:2] == pytest.approx((12, 12), abs=0.1)
 
 
 def test_base_and_raft() -> None:

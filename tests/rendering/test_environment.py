@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from fracslice.errors import SceneError
 from fracslice.formulas import Node, material, plane, sphere
@@ -96,11 +97,13 @@ def test_radiance_pictures_are_read(tmp_path: Path, packed: bool) -> None:
 def test_a_picture_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     (tmp_path / "a.hdr").write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 9\n\2\2\0\t\5")
     (tmp_path / "b.exr").write_bytes(b"nothing")
+    Image.new("1", (20_000, 10_000)).save(tmp_path / "d.png")
     text = '<scene version="1"><solid size="1cm"><sphere/></solid>\n<light kind="environment" {}/></scene>'
     for name, message in (
         ("a.hdr", "it ends too early"),
         ("b.exr", ""),
         ("c.hdr", "No such file or directory"),
+        ("d.png", "exceeds limit of 178956970 pixels"),
     ):
         read = reads(text.format(f'file="{tmp_path / name}"'))
         with pytest.raises(SceneError, match=f"(?s)^scene:2: <light> .*{name}.*{message}.*; expected a .hdr"):

@@ -13,7 +13,7 @@ from fracslice.printing.limits import Limits
 from fracslice.slicing import SliceJob, Slicer, plan_stack
 from fracslice.slicing.feature_graph import Graph
 from fracslice.slicing.layer_checks import PrintReport, check_layers
-from fracslice.slicing.overhangs import unsupported
+from fracslice.slicing.overhangs import farthest, unsupported
 from fracslice.slicing.printers import PRINTERS
 from fracslice.slicing.runs import Runs, layer_components, overlaps
 from fracslice.slicing.thickness import widths
@@ -116,6 +116,27 @@ def test_islands_and_overhang() -> None:
     assert island.layers[0] in report.worst
     assert report.largest_overhang > 5
     assert any("1 island in the air" in str(p) for p in report.problems)
+
+
+def test_an_island_above_an_empty_layer_overhangs() -> None:
+    floating = union(box(size=(1, 1, 0.2)), at(box(size=(0.4, 0.4, 0.4)), 0, 0, 0.8))
+    report = checked(floating)
+    assert report.largest_overhang == pytest.approx(16 / 1.21, rel=0.05)
+
+
+@pytest.mark.parametrize("pixel", [0.1, 0.5, 1.0, 2.0])
+def test_cantilevers_are_measured_by_the_limit_with_any_pixel(pixel: float) -> None:
+    below, above = np.zeros((2, 20, 60), bool)
+    below[5:15, 10:20] = above[5:15, 10:20] = True
+
+    def reaches(count: int) -> bool:
+        above[5:15, 20 : 20 + count] = True
+        solid = runs_of(above)
+        bare = unsupported(runs_of(below), solid, 1.0)
+        return farthest(solid, bare, 1, (pixel, pixel), 10 * pixel, 100 * pixel) is not None
+
+    assert not reaches(11)  # the first pixel rests on the one below
+    assert reaches(12)
 
 
 def test_loose_bodies() -> None:

@@ -106,8 +106,8 @@ def test_too_large_for_the_printer() -> None:
 def test_deflated_pictures_are_the_pictures(
     root: Node, options: dict[str, Any], machine: Printer | None
 ) -> None:
-    """As the library zlib reads them, whatever way they are turned; at 9.9 mm the layers are cropped."""
-    for size in (6.1, 9.9):
+    """As the library zlib reads them, whatever way they are turned; larger layers are cropped."""
+    for size in (6.1, 9.9 - 2 * options.get("compensation", 0)):
         screen = Screen(stack_of(root, size), machine, **options)
         rows, columns = screen.shape
 
@@ -154,6 +154,22 @@ def test_compensation_moves_outlines(by: float) -> None:
     before, after = picture(Screen(stack)), picture(Screen(stack, compensation=by))
     radius = [math.sqrt(i.sum() / 255 * 0.01 / math.pi) for i in (before, after)]
     assert radius[1] - radius[0] == pytest.approx(by, abs=0.02)
+
+
+@pytest.mark.parametrize("machine", [None, SMALL, replace(SMALL, portrait=True)])
+def test_outlines_move_beyond_the_pixels_of_the_object(machine: Printer | None) -> None:
+    stack = stack_of(box(size=(6, 4, 3)))
+    image = picture(Screen(stack, machine, compensation=0.9, blur=2))
+    sides = [0.1 * (np.ptp(at) + 1) for at in np.nonzero(image > 127)]
+    assert sorted(sides) == pytest.approx([5.8, 7.8])
+    assert picture(Screen(stack, machine, blur=16)).sum() / 25500 == pytest.approx(24, rel=0.01)
+
+
+def test_outlines_that_move_beyond_the_bed_are_refused() -> None:
+    stack = stack_of(box(size=(11.9, 9, 1)), 11.9)
+    Screen(stack, SMALL, compensation=0.05)
+    with pytest.raises(SliceError, match=r"is 12\.1 mm along x"):
+        Screen(stack, SMALL, compensation=0.1)
 
 
 def test_compensation_of_a_straight_edge_is_exact() -> None:

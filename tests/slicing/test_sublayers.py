@@ -83,3 +83,5 @@ def test_other_numbers_are_refused(stack: Stack) -> None:
 def test_contours_have_one_section(stack: Stack, tmp_path: Path) -> None:
     with pytest.raises(ExportError, match="contours are of one section per layer"):
         write_slices(SliceRun(stack, Screen(stack), sections=2), tmp_path / "a.cli")
+    with pytest.raises(ExportError, match="without compensation"):
+        write_slices(SliceRun(stack, Screen(stack, compensation=0.1)), tmp_path / "a.cli")

@@ -157,8 +157,11 @@ def test_hollow_shells_keep_their_cavity() -> None:
         (intersection(sphere(), transform(sphere(), translate=(5, 0, 0))), "no point in common"),
         (
             intersection(sphere(), transform(sphere(), translate=(1.99, 1, 0))),
-            "no point is inside",
+            "the scene is empty: every point is outside; expected less cut away",
         ),
+        (difference(sphere(radius=0.5), box(size=(2, 2, 2))), "every point is outside"),
+        (difference(mandelbulb(), sphere(radius=2)), "every point is outside"),
+        (difference(sphere(), sphere()), "no point is inside; expected thicker parts or less cut away"),
     ],
 )
 def test_scenes_without_a_solid(root: Node, message: str) -> None:
