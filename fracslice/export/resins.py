@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..common.tables import read_table, read_text
 from ..errors import ExportError
-from ..formulas.parameters import REQUIRED, Count, Number, Text
+from ..formulas.parameters import REQUIRED, Count, Line, Number
 from ..formulas.records import attribute, from_table, validate
 from ..slicing.printers import Printer
 
@@ -53,7 +53,7 @@ class Resin:
 
     exposure: float = attribute(Number, REQUIRED, "seconds of each layer", above=0, most=1000)
     bottom_exposure: float = attribute(Number, REQUIRED, "seconds of each bottom layer", above=0, most=1000)
-    name: str = attribute(Text, "unknown", "name of the resin")
+    name: str = attribute(Line, "unknown", "name of the resin")
     bottom_layers: int = attribute(Count, 5, "bottom layers", most=200)
     transition_layers: int = attribute(Count, 5, "transition layers", most=200)
     lift: float = attribute(Number, 5.0, "mm after each layer", above=0, most=100)

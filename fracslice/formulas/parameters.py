@@ -241,8 +241,8 @@ class Axis(Choice):
 
 
 @dataclass(frozen=True)
-class Text(Parameter):
-    """Text that is shown to a person."""
+class Line(Parameter):
+    """Text in one line."""
 
     @property
     def expects(self) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 
 from ..common.tables import read_table
 from ..errors import SliceError
-from ..formulas.parameters import REQUIRED, Count, Number, Text, Vector
+from ..formulas.parameters import REQUIRED, Count, Line, Number, Vector
 from ..formulas.records import attribute, from_table, validate
 
 
@@ -47,8 +47,8 @@ class Printer:
         For an invalid value.
     """
 
-    name: str = attribute(Text, REQUIRED, "name in commands")
-    title: str = attribute(Text, REQUIRED, "name in messages")
+    name: str = attribute(Line, REQUIRED, "name in commands")
+    title: str = attribute(Line, REQUIRED, "name in messages")
     pixels: tuple[int, int] = attribute(
         Vector, REQUIRED, "pixels along x and y", sizes=(2,), least=1, most=65_535, whole=True
     )
@@ -58,7 +58,7 @@ class Printer:
     height: float = attribute(Number, REQUIRED, "highest print, mm", above=0, most=10_000)
     mirror: bool = True
     portrait: bool = False
-    file: str = attribute(Text, "", "extension of the files that it prints")
+    file: str = attribute(Line, "", "extension of the files that it prints")
     version: int = attribute(Count, 1, "version of the format", most=65_536)
     motion: tuple[float, float, float, float] = attribute(
         Vector, (5.0, 65.0, 150.0, 0.5), "mm, mm/min, mm/min and s", sizes=(4,), least=0, most=10_000
