@@ -184,7 +184,7 @@ def of_layers(of: Scene | Field, size: Sizing, how: Print, given: CheckOptions, 
         return numbers, lines, problems
     flags = " ".join(f"--{name} {value}" for name, value in settings.items())
     if smaller := settings.pop("size", None):
-        size = replace(size, side=float(smaller[:-2]) / max(size.factors), unit=None)
+        size = replace(size, side=float(smaller[:-2]), unit=None)
     values = {name: Print.kinds()[name].read(text) for name, text in settings.items()}
     after, again, left = examined(f"with {flags}", of, size, replace(how, **values), given, work)
     return {"before": numbers, "flags": flags, "after": after}, [*lines, *again], left

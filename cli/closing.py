@@ -43,6 +43,8 @@ class Closing:
         Name of the material.
     density : float
         g/ml.
+    about : str
+        Stands before a volume that is an estimate.
     layers : int or None
         Number of layers; None for a mesh.
     seconds, cost : float or None
@@ -66,6 +68,7 @@ class Closing:
     height: float
     material: str
     density: float
+    about: str = ""
     layers: int | None = None
     seconds: float | None = None
     cost: float | None = None
@@ -80,7 +83,7 @@ class Closing:
         """Iterate over the lines, each with the option that mends what it names."""
         ml = self.volume / 1000
         amount = [
-            millilitres(self.volume),
+            f"{self.about}{millilitres(self.volume)}",
             f"{significant(ml * self.density)} g of {self.material} ({self.density:g} g/ml)",
         ]
         if self.layers is not None:
@@ -152,7 +155,7 @@ def of_mesh(result: MeshResult, material: str, price: float | None) -> Closing:
 
 
 def of_layers(run: SliceRun, price: float | None) -> Closing:
-    """Closing figures of layers. Layers that were not sampled are interpolated.
+    """Closing figures of layers. Areas of layers that another process made are interpolated.
 
     Parameters
     ----------
@@ -177,6 +180,7 @@ def of_layers(run: SliceRun, price: float | None) -> Closing:
         height=float(stack.tops[-1]),
         material=resin.name if resin and named else "resin",
         density=resin.density if resin else DENSITIES["resin"],
+        about="about " if len(known) < run.layers else "",
         layers=run.layers,
         seconds=resin.seconds(run.layers) if resin else None,
         cost=None if of is None else volume / 1e6 * of,

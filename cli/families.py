@@ -18,12 +18,14 @@ from fracslice.errors import SharedError
 
 from .inputs import load_scene
 from .options import SceneOptions
-from .tables import is_table
 
 R = TypeVar("R", bound=SceneOptions)
 
 MOST = 10_000
 """Greatest number of members."""
+
+TABLE = ".csv"
+"""Ending of a table, which is one file for a whole family."""
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _RANGE = re.compile(rf"(?<!\S)({_NUMBER})\s*\.\.\s*({_NUMBER})(?:\s*:\s*({_NUMBER}))?(?!\S)")
@@ -35,6 +37,11 @@ def suffixed(path: str, suffix: str) -> str:
     if not suffix or is_table(path):
         return path
     return str(file.with_name(file.stem + suffix + file.suffix))
+
+
+def is_table(path: str) -> bool:
+    """True if a file is named as a table."""
+    return path.lower().endswith(TABLE)
 
 
 def members(settings: Sequence[str]) -> list[tuple[tuple[str, ...], str]]:

@@ -11,11 +11,10 @@ import click
 
 from .closing import DENSITIES, of_mesh
 from .cluster import ClusterOptions
-from .families import MOST, families, going_on, suffixed
+from .families import MOST, TABLE, families, going_on, is_table, suffixed
 from .inputs import check_folder, check_targets, load_scene, refuse_options
 from .options import MeshOptions, argument, command, flag, option, output
 from .summary import summary
-from .tables import TABLE, is_table, table_rows, write_row
 from .value_types import AMOUNT, SECONDS, Name
 
 if TYPE_CHECKING:
@@ -116,6 +115,8 @@ def write_mesh(scene: Scene, given: MeshFileOptions, work: Work) -> bool:
     result = made(scene, given, work)
     if given.report is not None:
         if is_table(given.report):
+            from .tables import write_row
+
             write_row(given.report, given.output, given.settings, result.report)
         else:
             write_report(result.report, given.report)
@@ -210,6 +211,8 @@ def check_outputs(given: MeshFileOptions) -> None:
         raise click.UsageError(f"{given.output}: unknown kind of file; known are {known}")
     check_targets(given.source, given.output, given.report, given.picture)
     if given.report is not None and is_table(given.report):
+        from .tables import table_rows
+
         table_rows(given.report)
     if given.picture is not None:
         from fracslice.viewer import need_pyvista

@@ -162,7 +162,7 @@ class SceneOptions(RunOptions):
     settings: tuple[str, ...] = option(
         str,
         "Change a value of the scene, such as mandelbulb.power=6; repeatable. mesh, slice and render take a "
-        "range, such as mandelbulb.power=2..9:0.5, and make a file for each value.",
+        "range, such as mandelbulb.power=2..9:0.5 or box.size=1 1 1..3, and make a file for each value.",
         "--set",
         metavar="NAME.ATTRIBUTE=VALUE",
         multiple=True,

@@ -101,7 +101,7 @@ class SliceOptions(ClusterOptions, LayerOptions):
 
 
 @command(SliceOptions, "slice")
-@families("output", "preview")
+@families("output", "preview", "html")
 def slice_(given: SliceOptions) -> int:
     """Cut SCENE into the layers of a print, straight from its field.
 
@@ -114,6 +114,7 @@ def slice_(given: SliceOptions) -> int:
     fracslice slice my.xml -o layers --pixel 0.05mm --preview sheet.png
     """
     from fracslice.export.layer_files import PICTURES, PRINTS, slice_format, write_slices
+    from fracslice.export.resuming import KEPT
     from fracslice.jobs.completeness import layers_amount
 
     output = given.output
@@ -128,8 +129,7 @@ def slice_(given: SliceOptions) -> int:
     scene = load_scene(given.source, given.settings)
     notes: tuple[str, ...] = ()
     last: list[str] = []
-    kept = "the same command goes on from the finished layers"
-    with given.working(kept) as work:
+    with given.working(KEPT) as work:
         run = recipe(given, scene, kind, resin, work).run(work, scene)
         write_slices(run, output, given.form)
         with keeping(f"{output} is written"):

@@ -5,23 +5,18 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .inputs import BadInput
 
 if TYPE_CHECKING:
     from fracslice.jobs.report import Report
 
-TABLE, KEY = ".csv", "file"
-"""Ending of a table, and its first column: the output of the row."""
+KEY = "file"
+"""First column: the output of the row."""
 
 
-def is_table(path: str) -> bool:
-    """True if a file is named as a table."""
-    return path.lower().endswith(TABLE)
-
-
-def table_rows(path: str) -> dict[str, dict[str, object]]:
+def table_rows(path: str) -> dict[str, dict[str, Any]]:
     """Rows of a table by their output; none if there is no file.
 
     Raises `BadInput` for a file that is no table of meshes.
@@ -47,8 +42,8 @@ def write_row(path: str, output: str, settings: Sequence[str], report: Report) -
 
     numbers = {name: value for name, value in report.as_dict().items() if isinstance(value, int | float)}
     values = dict(setting.split("=", 1) for setting in settings)
-    own: dict[str, object] = {KEY: output, **values, **numbers, "problems": "; ".join(report.problems)}
-    rows: dict[str, dict[str, object]] = {**table_rows(path), output: own}
+    own = {KEY: output, **values, **numbers, "problems": "; ".join(report.problems)}
+    rows = {**table_rows(path), output: own}
     text = io.StringIO()
     table = csv.DictWriter(text, list(dict.fromkeys(name for row in rows.values() for name in row)))
     table.writeheader()

@@ -28,6 +28,18 @@ class TooLargeError(VolumeError):
     """Job that needs more memory than is available."""
 
 
+class GridError(VolumeError):
+    """Grid of more bricks than can be numbered.
+
+    Attributes
+    ----------
+    most : float
+        Voxels along the longest side that fit.
+    """
+
+    most: float
+
+
 class EmptyError(VolumeError):
     """Scene of which no sample is inside."""
 

@@ -157,7 +157,7 @@ def test_impossible_jobs_are_refused(values, message):
     [
         (plane(), "no end along"),
         (intersection(sphere(), moved(sphere(), 5, 0, 0)), "empty"),
-        (difference(sphere(), sphere(radius=2)), "no surface"),
+        (difference(sphere(), sphere(radius=2)), "every point is outside"),
     ],
 )
 def test_scenes_without_a_finite_surface_are_refused(node, message):

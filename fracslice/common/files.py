@@ -24,6 +24,10 @@ LARGE = 1 << 26
 """Bytes of a replaced file that another thread releases."""
 
 
+FULL = errno.ENOSPC, errno.EDQUOT
+"""Errors of a full disk."""
+
+
 @contextmanager
 def reported(path: str | Path) -> Iterator[None]:
     """Raise errors of the file system as `ExportError`, with the path and the reason in one line.
@@ -42,7 +46,7 @@ def reported(path: str | Path) -> Iterator[None]:
         yield
     except OSError as error:
         reason = error.strerror or str(error)
-        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        if error.errno in FULL:
             reason = "the disk is full; the file was not written"
         elif error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
             reason = "not allowed to write there"
@@ -65,13 +69,15 @@ def check_target(path: str | Path) -> Path:
     Raises
     ------
     ExportError
-        If the folder is missing or not writable, or if `path` is itself a folder.
+        If the folder is missing or not writable, or if `path` is itself a folder, a device or a pipe.
     """
     target = Path(os.path.realpath(path))
     if not target.parent.is_dir():
         raise ExportError(f"{path}: the folder {target.parent} does not exist")
     if target.is_dir():
         raise ExportError(f"{path}: is a folder")
+    if target.exists() and not target.is_file():
+        raise ExportError(f"{path}: is a device or a pipe; expected a file, which is replaced")
     if not os.access(target.parent, os.W_OK | os.X_OK):
         raise ExportError(f"{path}: the folder {target.parent} is not writable")
     return target

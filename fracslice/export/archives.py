@@ -48,7 +48,7 @@ def _assemble_sl1(job: PrintData, file: BinaryIO) -> None:
     """Write config.ini, prusaslicer.ini, previews and pictures; PrusaSlicer opens the archive."""
     about = {
         "config.ini": _ini(_config(job)),
-        "fracslice.json": job.run.describe(),
+        "fracslice.json": job.run.describe(job.name),
         "prusaslicer.ini": _ini(_settings(job)),
     }
     previews = {

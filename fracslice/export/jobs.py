@@ -104,8 +104,18 @@ class SliceRun:
             *(self.resin, self.sections, sorted(self.metadata.items())),
         )
 
-    def describe(self) -> bytes:
-        """Manifest of the layers, as JSON."""
+    def describe(self, name: str = "") -> bytes:
+        """Manifest of the layers, as JSON.
+
+        Parameters
+        ----------
+        name : str
+            Begin of the names of their files.
+
+        Returns
+        -------
+        bytes
+        """
         stack, screen = self.stack, self.screen
         manifest = {
             "application": "fracslice",
@@ -120,7 +130,7 @@ class SliceRun:
             "compensation_mm": screen.compensation,
             "mirror": screen.mirror,
             "layers": [
-                {"file": f"{i:05d}.png", "top_mm": round(float(z), 6)} for i, z in enumerate(stack.tops)
+                {"file": f"{name}{i:05d}.png", "top_mm": round(float(z), 6)} for i, z in enumerate(stack.tops)
             ],
         }
         return json.dumps(manifest, indent=1).encode()

@@ -185,7 +185,11 @@ class PrintFormat(LayerFormat):
         ):
             assert run.screen.printer and run.resin
             name = printable(path.stem)
-            self.assemble(PrintData(run, name, run.screen.printer, run.resin, journal, picture), file)
+            job = PrintData(run, name, run.screen.printer, run.resin, journal, picture)
+            self.assemble(job, file)
+            run.slicer.areas.update(
+                enumerate(job.areas.tolist())
+            )  # those of an earlier or another process, too
 
 
 def by_pixels(encoding: Encoding) -> Callable[[SliceRun, Layer], bytes]:

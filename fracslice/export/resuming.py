@@ -15,7 +15,7 @@ from typing import BinaryIO
 
 from isal.isal_zlib import crc32
 
-from ..common.files import check_target, replacing, reported
+from ..common.files import FULL, check_target, replacing, reported
 from ..common.locks import lock, locked_folder
 from ..common.private import OWNER_ONLY, opened
 from ..common.seals import seal
@@ -30,6 +30,9 @@ LAYER = re.compile(r"\d{5,}\.(png|svg)")
 """Names of layer files in a folder."""
 
 UNREADABLE = "the finished layers cannot be read back"
+
+KEPT = "the same command goes on from the finished layers"
+"""What is left of a job that stops."""
 
 GROUP = 1 << 22
 """Bytes that are read while those before are written."""
@@ -156,7 +159,7 @@ def journal(path: str | Path, job: str) -> Iterator[Journal]:
     """
     target = check_target(path)
     part, manifest = (target.with_name(f".{target.name}.{end}") for end in ("part", "job"))
-    with reported(path):
+    with _resumed(path):
         _remove_foreign(part)
         with opened(part, "r+b", os.O_CREAT) as file:
             lock(file.fileno(), path)
@@ -206,9 +209,9 @@ def resumable_folder(
     ExportError
         For a folder with other files, an error of the file system, or if another process is writing there.
     """
-    with reported(folder):
+    with _resumed(folder):
         folder.mkdir(exist_ok=True)
-    with reported(folder), locked_folder(folder):
+    with _resumed(folder), locked_folder(folder):
         names = set(os.listdir(folder))
         manifest = _read(folder / JOB)
         if names and not (manifest.startswith(OURS) and all(n == JOB or LAYER.fullmatch(n) for n in names)):
@@ -225,6 +228,18 @@ def resumable_folder(
             index += 1
         yield index
         (folder / JOB).unlink()
+
+
+@contextmanager
+def _resumed(path: str | Path) -> Iterator[None]:
+    """`reported`, which says of a full disk that finished layers are kept."""
+    try:
+        with reported(path):
+            yield
+    except ExportError as error:
+        if isinstance(error.__cause__, OSError) and error.__cause__.errno in FULL:
+            raise ExportError(f"{path}: the disk is full; {KEPT}") from error.__cause__
+        raise
 
 
 def _read(manifest: Path) -> bytes:

@@ -23,7 +23,7 @@ from .clock import Clock
 from .finishing import Finish
 from .mesh_result import MeshResult
 from .mesh_writing import STL, Writing
-from .planning import Sized, edited, planned
+from .planning import Sized, edited, in_mm, planned
 from .report import Report, SurfaceError, SurfaceToMesh
 
 if TYPE_CHECKING:
@@ -137,7 +137,8 @@ class _Job:
         Samples of walls thinner than a voxel do not tell bodies from crumbs: the field then chooses.
         """
         sized, how = planned(self.scene, self.what, self.size, self.clock), self.what.how(self.scene)
-        signs = self.signs(sized.planned, False)
+        with in_mm(self.size):
+            signs = self.signs(sized.planned, False)
         thin = how.sorts and surfaces.has_thin_walls(signs)
         if again := thin and how.whole:
             sized = edited(sized.planned, self.scene, self.what, self.size, self.clock)

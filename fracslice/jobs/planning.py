@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from ..common.digits import significant
+from ..errors import GridError, VolumeError
 from ..meshjob import MeshJob
 from ..scene import Print, Scene
 from .clock import Clock
@@ -66,6 +70,26 @@ def planned(scene: Scene, what: MeshJob, size: Sizing, clock: Clock) -> Sized:
     if not how.whole:
         return edited(made, scene, what, size, clock)
     return Sized(made.strict if what.proved else made, None, how)
+
+
+@contextmanager
+def in_mm(size: Sizing) -> Iterator[None]:
+    """Add the voxel in mm to the error of too large a grid.
+
+    Parameters
+    ----------
+    size : Sizing
+        Size of the object.
+
+    Raises
+    ------
+    VolumeError
+        If the managed block raises `GridError`.
+    """
+    try:
+        yield
+    except GridError as error:
+        raise VolumeError(f"{error}, {significant(size.longest / error.most)} mm") from None
 
 
 def edited(made: Plan, scene: Scene, what: MeshJob, size: Sizing, clock: Clock) -> Sized:

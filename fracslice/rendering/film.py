@@ -62,7 +62,7 @@ def develop(mean: np.ndarray, view: View, work: Work | None = None) -> np.ndarra
     film, mode, work = view.film, view.shading.mode, work or Work(1)
     alpha, light = mean[..., 3:], mean[..., :3]
     if mode != "light":
-        return layered(displayed(picture(mean, mode), mode), alpha, film)
+        return layered(displayed(picture(mean, mode), mode, alpha[..., 0] > 0), alpha, film)
     behind = np.array(linear(film.background if shows_background(view) else (0, 0, 0)), np.float32)
     exposure, bands = np.float32(2.0**film.exposure), chunks(len(mean), BAND)
     shown = np.empty(light.shape, np.float32)
@@ -104,7 +104,7 @@ def shows_background(view: View) -> bool:
     return not (view.film.transparent or (lit and (view.fog or any(x.surrounds for x in view.lights))))
 
 
-def displayed(values: np.ndarray, mode: str) -> np.ndarray:
+def displayed(values: np.ndarray, mode: str, hit: np.ndarray) -> np.ndarray:
     """Map the values of a mode other than "light" to display values.
 
     Parameters
@@ -113,6 +113,8 @@ def displayed(values: np.ndarray, mode: str) -> np.ndarray:
         Result of `picture`.
     mode : str
         `Shading.mode`.
+    hit : ndarray of bool, shape (height, width)
+        True where a ray hit.
 
     Returns
     -------
@@ -127,7 +129,8 @@ def displayed(values: np.ndarray, mode: str) -> np.ndarray:
     elif mode == "steps":
         values = np.exp(-0.02 * values)
     elif mode == "position":
-        low, high = values.min((0, 1)), values.max((0, 1))
+        seen = values[hit] if hit.any() else values.reshape(-1, 3)
+        low, high = seen.min(0), seen.max(0)
         values = (values - low) / np.maximum(high - low, LEAST)
     else:
         values = encoded(values)

@@ -44,7 +44,7 @@ def misfit(stack: Stack, printer: Printer | None) -> Problem | None:
         return None
     mine, most = (" x ".join(significant(s, 4) for s in size) for size in (stack.size, nearest.build_volume))
     which = f"the {nearest.title}" if printer else f"any known printer, not even the {nearest.title}"
-    size = math.floor(10 * share[nearest] * max(stack.size)) / 10
+    size = math.floor(10 * share[nearest] * stack.side) / 10
     text = f"does not fit {which}: {mine} mm, and it has {most} mm"
     return Problem("fit", text, mend=(("size", f"{size:g}mm"),))
 

@@ -141,9 +141,12 @@ class Layer:
         return self.slab.paint(self.place, np.zeros(self.stack.shape, np.uint8))
 
     @property
-    def is_painted(self) -> bool:
-        """True if the area is known without further work."""
-        return "_painted" in vars(self)
+    def known_area(self) -> float | None:
+        """Area in mm^2, of the coverage or else of the contours; None if neither was made."""
+        made = vars(self)
+        if "_painted" in made:
+            return self.area
+        return self.contours.area if "contours" in made else None
 
     @property
     def area(self) -> float:
@@ -174,7 +177,7 @@ class Slicer:
     work : Work
         Threads, progress and cancellation.
     areas : dict of int to float
-        Area of each layer that has been sampled and painted, mm^2.
+        Area of each layer whose picture or contours were made, mm^2.
     """
 
     stack: Stack
@@ -223,8 +226,8 @@ class Slicer:
                 spent = result.evaluations - before
                 layer = Layer(self.stack, index, spent, result, index - first, exact)
                 made.append(make(layer))
-                if layer.is_painted:
-                    self.areas[index] = layer.area
+                if (area := layer.known_area) is not None:
+                    self.areas[index] = area
             return made
 
         groups = [list(g) for _, g in groupby(chosen, lambda index: index // SLAB)]

@@ -209,5 +209,5 @@ def check_fits(stack: Stack, printer: Printer, grown: float = 0.0) -> None:
     for axis, mine, most in zip("xyz", size, printer.build_volume, strict=True):
         if mine > most * (1 + 1e-6):
             raise SliceError(
-                f"the object is {mine:.4g} mm along {axis}, the {printer.title} has {most:.4g} mm"
+                f"the object is {mine:.6g} mm along {axis}, the {printer.title} has {most:.6g} mm"
             )

@@ -24,6 +24,9 @@ from ..work import Work
 MOST_LAYERS = 100_000
 MOST_PIXELS = 65_536
 
+FLOAT_STEPS = 8
+"""Minimum number of float32 numbers between two samples."""
+
 
 @dataclass(frozen=True)
 class SliceJob:
@@ -119,6 +122,8 @@ class Stack:
         What a pixel or a layer is too large for.
     drains : tuple of Drain
         Drain holes.
+    side : float
+        Size of the job: longest side before compensation and print preparation, mm.
     """
 
     root: Field
@@ -132,6 +137,7 @@ class Stack:
     outer: Box
     notes: tuple[str, ...] = ()
     drains: tuple[Drain, ...] = ()
+    side: float = field(kw_only=True)
 
     @property
     def heights(self) -> np.ndarray:
@@ -172,7 +178,7 @@ def plan_stack(root: Field, job: SliceJob, work: Work | None = None) -> Stack:
     Raises
     ------
     SliceError
-        For too many layers or pixels.
+        For too many layers or pixels, or an object too far from the origin.
     VolumeError
         For a scene without a solid, or if it cannot be made printable.
     Cancelled
@@ -195,10 +201,24 @@ def plan_stack(root: Field, job: SliceJob, work: Work | None = None) -> Stack:
     tops = _tops(mm[2], job.layer)
     if max(shape) > MOST_PIXELS:
         raise SliceError(f"{shape[1]} x {shape[0]} pixels: at most {MOST_PIXELS} along a side")
+    _check_precision(outer, scale, min(*job.pixel, job.layer))
     z = box.lo[2] + (tops - np.diff(tops, prepend=0.0) / 2) / scale
     size, at = (mm[0], mm[1], mm[2]), (corner[0], corner[1])
     pixels, notes = (shape[0], shape[1]), (*planned.notes, *_rounded(mm[2], float(tops[-1])))
-    return Stack(planned.root, scale, at, job.pixel, pixels, z, tops, size, outer, notes, planned.drains)
+    where = at, job.pixel, pixels, z, tops
+    return Stack(planned.root, scale, *where, size, outer, notes, planned.drains, side=job.size)
+
+
+def _check_precision(outer: Box, scale: float, finest: float) -> None:
+    """Refuse an object so far from the origin that float32 coordinates do not tell its samples, `finest` mm
+    apart, from each other; meshes have the same limit.
+    """
+    far = max(map(abs, (*outer.lo, *outer.hi)))
+    if FLOAT_STEPS * float(np.spacing(np.float32(far))) * scale > finest:
+        raise SliceError(
+            f"samples {finest:g} mm apart are too fine for float32 coordinates at a distance of {far:.4g} "
+            "scene units from the origin; expected the object nearer to it"
+        )
 
 
 def _tops(height: float, layer: float) -> np.ndarray:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ..common.digits import significant
 from ..common.memory import available_bytes
-from ..errors import TooLargeError, VolumeError
+from ..errors import GridError, TooLargeError, VolumeError
 from ..formulas.box import Box, Triple
 
 BRICK = 8
@@ -80,10 +80,12 @@ class Lattice:
         if math.prod(counts) > MOST_BRICKS:
             voxels = max(box.size) / voxel
             most = voxels * (MOST_BRICKS / math.prod(counts)) ** (1 / 3) - 2 * BRICK
-            raise VolumeError(
+            error = GridError(
                 f"{voxels:.0f} voxels along the longest side make a grid of {_shape(counts)} bricks: "
                 f"expected at most {most:.0f} voxels, or a voxel {significant(voxels / most)} times as large"
             )
+            error.most = most
+            raise error
         if (needed := math.prod(counts) * BYTES_A_BRICK) > LARGE and needed > (free := available_bytes()):
             raise TooLargeError(
                 f"{max(box.size) / voxel:.0f} voxels along the longest side make a grid of {_shape(counts)} "

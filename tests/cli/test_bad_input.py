@@ -62,7 +62,7 @@ def refused(capfd: pytest.CaptureFixture[str], folder: Path, *arguments: str) ->
             "empty",
         ),
         (scene_of("<bounds min='1 1 1' max='2 2 2'><sphere radius='.5'/></bounds>"), "empty"),
-        (scene_of("<difference><sphere/><sphere radius='2'/></difference>"), "no surface"),
+        (scene_of("<difference><sphere/><sphere radius='2'/></difference>"), "is outside"),
         (
             f'<!DOCTYPE a [<!ENTITY l0 "lol">{LAUGHS}]>{scene_of("&l11;")}',
             "bad.xml:1: <!DOCTYPE>: document types and",
@@ -119,7 +119,7 @@ def test_scenes(text, message, folder, capfd):
         ("slice ball.xml -o - --layer 1mm", "-: expected the name of a file; standard input and output"),
         ("slice ball.xml -o /dev/null --layer 1mm", "/dev/null: expected a folder for png files"),
         ("slice ball.xml -o out/x.sl1 --printer ball.toml", "ball.toml: expected text in UTF-8"),
-        ("mesh empty.xml -o out/x.stl", "empty.xml: there is no surface"),
+        ("mesh empty.xml -o out/x.stl", "empty.xml: the scene is empty"),
         ("slice ball.xml -o out/x --layer 2cm", "as high as the object: 20 mm; expected a lower layer or"),
         ("mesh ball.xml -o out/x.stl --resolution 0", "0 is not in the range 8<=x<=16384"),
         ("mesh ball.xml -o out/x.stl --cluster foo", "'foo': expected local, local:N or the address of"),
@@ -160,6 +160,11 @@ def test_a_voxel_count_that_does_not_fit_in_memory(folder, capfd, monkeypatch):
     line = refused(capfd, folder, "mesh", "ball.xml", "-o", "out/x.3mf", "--resolution", "800")
     assert "GB of memory" in line
     assert line.endswith("mm fits, and an .stl file is written piece after piece")
+
+
+def test_a_grid_that_is_too_large_is_told_in_voxels_and_mm(folder, capfd):
+    error = refused(capfd, folder, "mesh", "ball.xml", "-o", "x.stl", "--resolution", "16384")
+    assert "expected at most 8172 voxels, or a voxel 2 times as large, 0.00245 mm" in error
 
 
 def test_a_full_disk(folder, capfd, monkeypatch):

@@ -75,6 +75,15 @@ def test_a_file_for_each_value(command: str, scene: str, tmp_path: Path) -> None
         assert (tmp_path / f"a-radius1.{ending}").read_bytes() == alone.read_bytes()
 
 
+def test_pages_and_previews_for_each_value(scene: str, tmp_path: Path) -> None:
+    given = ["slice", scene, "-q", "--layer", "1mm", "--pixel", "1mm", "--set", "sphere.radius=1..2"]
+    endings = {"-o": "cli", "--html": "html", "--preview": "png"}
+    files = [text for option, ending in endings.items() for text in (option, str(tmp_path / f"a.{ending}"))]
+    assert run([*given, *files]) == 0
+    made = sorted(path.name for path in tmp_path.glob("a*"))
+    assert made == [f"a-radius{k}.{ending}" for k in (1, 2) for ending in sorted(endings.values())]
+
+
 def test_a_family_of_shards(scene: str, tmp_path: Path) -> None:
     given = ["slice", scene, "-o", str(tmp_path / "a.cli"), "--layer", "1mm", "--pixel", "1mm", "-q"]
     family = [*given, "--set", "sphere.radius=1..2"]

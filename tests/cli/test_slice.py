@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 from pathlib import Path
@@ -119,6 +120,64 @@ def test_an_element_without_an_end_is_named_by_its_line(
     scene.write_text('<scene version="1">\n<solid\nsize="4mm">\n<!-- --><gyroid/></solid></scene>')
     assert sliced(scene, "-o", tmp_path / "a.json", "--layer", "1mm") == 2
     assert capfd.readouterr().err.startswith(f"fracslice: {scene}:4: <gyroid> has no end")
+
+
+def test_the_volume_is_the_same_in_all_formats_and_after_an_interruption(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Of a comb, whose layers cannot be interpolated."""
+    scene, add = tmp_path / "comb.xml", Journal.append
+    scene.write_text(
+        '<scene version="1"><solid unit="1mm"><box size="2 2 24"/>'
+        '<repeat period="9 9 3" count="1 1 8"><box size="8 8 1"/></repeat></solid></scene>'
+    )
+
+    def volume(target: str, *options: object) -> str:
+        assert (
+            run(["slice", str(scene), "-o", str(tmp_path / target), "--layer", "0.1mm", *map(str, options)])
+            == 0
+        )
+        return capfd.readouterr().out.splitlines()[1].split(" ml")[0]
+
+    def stopped(self: Journal, data: bytes) -> None:
+        if self.count == 99:
+            raise Cancelled
+        add(self, data)
+
+    layers = volume("layers", "--pixel", "0.05mm")
+    assert float(layers) == pytest.approx((8 * 64 + 16 * 4) / 1000, rel=0.01)
+    assert volume("a.cli", "--pixel", "0.05mm") == layers
+    printer = ("--printer", "sl1s")
+    with monkeypatch.context() as patch:
+        patch.setattr(Journal, "append", stopped)
+        assert run(["slice", str(scene), "-o", str(tmp_path / "a.sl1"), "--layer", "0.1mm", *printer]) == 130
+    assert volume("a.sl1", *printer) == layers
+    with monkeypatch.context() as patch:
+        patch.setattr(Journal, "append", stopped)
+        target = ["-o", str(tmp_path / "b.cli"), "--layer", "0.1mm"]
+        assert run(["slice", str(scene), *target, "--pixel", "0.05mm"]) == 130
+    assert volume("b.cli", "--pixel", "0.05mm").startswith("about ")
+
+
+@pytest.mark.parametrize(("name", "pixels"), [("a.sl1", "--printer=sl1s"), ("layers", "--pixel=1mm")])
+def test_a_full_disk_keeps_the_finished_layers_and_says_so(
+    name: str,
+    pixels: str,
+    ball: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    given = ["slice", str(ball), "-o", str(tmp_path / name), "--layer=1mm", pixels]
+    with monkeypatch.context() as patch:
+        patch.setattr("os.fsync", full)
+        assert run(given) == 2
+    assert "the disk is full; the same command goes on from the finished layers" in capfd.readouterr().err
+    assert run(given) == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(["ball.xml", name])
 
 
 def test_an_edited_scene_begins_afresh_and_says_so(

@@ -156,6 +156,16 @@ def test_folders_that_cannot_be_written_to(tmp_path: Path) -> None:
         check_target(tmp_path / "missing" / "cube.stl")
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes here")
+def test_a_pipe_or_a_device_is_not_replaced(tmp_path: Path) -> None:
+    """As root, a link to /dev/null would cost the machine its /dev/null."""
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "cube.stl").symlink_to(tmp_path / "pipe")
+    with pytest.raises(ExportError, match="is a device or a pipe"):
+        write(cube(), tmp_path / "cube.stl")
+    assert (tmp_path / "pipe").is_fifo() and len(list(tmp_path.iterdir())) == 2
+
+
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
 def test_a_folder_that_is_not_writable(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)

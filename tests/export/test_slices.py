@@ -98,6 +98,7 @@ def test_sl1(tmp_path: Path) -> None:
         assert settings["display_pixels_x"] == "96"
         assert settings["display_orientation"] == "portrait"
         assert pictures == [f"part{k:05d}.png" for k in range(24)]
+        assert [x["file"] for x in json.loads(archive.read("fracslice.json"))["layers"]] == pictures
         with Image.open(io.BytesIO(archive.read(pictures[3]))) as image:
             assert image.size == (80, 96)
             assert image.mode == "L"

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from fracslice.errors import RenderError, SceneError
-from fracslice.formulas import Node, box, difference, material, plane, repeat, sphere, union
+from fracslice.formulas import Node, box, difference, material, plane, repeat, sphere, transform, union
 from fracslice.rendering import Pass, Renderer, develop, progressive
 from fracslice.rendering.units.fog import height_fog
 from fracslice.rendering.units.lights import sky
@@ -125,6 +125,14 @@ def test_depth_and_distance_are_in_scene_units() -> None:
     place = rendered(ball, replace(view, shading=Shading(mode="position")), 1, (25, 19)).image
     assert np.allclose(np.linalg.norm(place[hit], axis=1), 1, atol=1e-3)
     assert np.allclose(np.linalg.norm(place[hit] - CAMERA.eye, axis=1), far[hit], atol=1e-3)
+
+
+def test_positions_are_shown_by_their_range_wherever_the_object_is() -> None:
+    for x in (0.0, 100.0):
+        ball = transform(sphere(radius=1), translate=(x, 0, 0))
+        done = rendered(ball, View(shading=Shading(mode="position")), 1, (25, 19))
+        hit = done.alpha == 1
+        assert np.ptp(done.developed[hit], axis=0) == pytest.approx([1, 1, 1], abs=1e-3)
 
 
 def test_a_scene_without_end_is_lit_from_the_camera() -> None:

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import time
 import tracemalloc
+from typing import Any
 
 import numpy as np
 import pytest
 
 from fracslice.formulas import Node, box, cylinder, difference, menger, sphere, transform, union
 from fracslice.printing.limits import Limits
+from fracslice.scene import Print
 from fracslice.slicing import SliceJob, Slicer, plan_stack
 from fracslice.slicing.feature_graph import Graph
 from fracslice.slicing.layer_checks import PrintReport, check_layers
+from fracslice.slicing.layer_problems import misfit
 from fracslice.slicing.overhangs import farthest, unsupported
 from fracslice.slicing.printers import PRINTERS
 from fracslice.slicing.runs import Runs, layer_components, overlaps
@@ -163,6 +166,26 @@ def test_menger_walls_and_gaps_are_known() -> None:
     assert report.walls.smallest == pytest.approx(10 / 9, abs=0.11)
     assert report.gaps.smallest == pytest.approx(10 / 9, abs=0.11)
     assert sum(report.gaps.counts) > 100
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {},
+        {"scale": 1.1},
+        {"printing": Print(raft=2)},
+        {"printing": Print(base=20), "scale": (1.1, 1.2, 1.05)},
+        {"up": (1, 0, 2)},
+    ],
+)
+def test_an_object_of_the_size_that_is_advised_fits(given: dict[str, Any]) -> None:
+    machine = PRINTERS["sl1s"]
+    bar = box(size=(2, 1, 0.5))
+    unfit = misfit(plan_stack(bar, SliceJob(size=400, layer=1, pixel=1, **given)), machine)
+    assert unfit is not None
+    ((name, size),) = unfit.mend
+    assert name == "size"
+    assert misfit(plan_stack(bar, SliceJob(size=size, layer=1, pixel=1, **given)), machine) is None
 
 
 def test_fit() -> None:

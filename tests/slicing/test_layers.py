@@ -74,6 +74,17 @@ def open_edges(inside: np.ndarray, known: np.ndarray) -> int:
     return int(across.sum() + along.sum())
 
 
+def test_an_object_far_from_the_origin_is_exact_or_refused() -> None:
+    def made(x: float) -> float:
+        ball = transform(sphere(), translate=(x, -x, x))
+        layers = Slicer(plan_stack(ball, SliceJob(size=20, layer=1, pixel=0.1)))
+        return sum(layers.map(lambda layer: layer.area))
+
+    assert made(1000) == pytest.approx(made(0), rel=1e-3)
+    with pytest.raises(SliceError, match=r"too fine for float32 .* 1e\+05 scene units"):
+        made(1e5)
+
+
 @pytest.mark.parametrize("name", FINITE)
 def test_closed_and_equal_to_dense_sampling(name: str) -> None:
     stack = stack_of(EXAMPLES[name])

@@ -86,6 +86,8 @@ def test_an_object_as_large_as_the_bed_fits() -> None:
 
 
 def test_too_large_for_the_printer() -> None:
+    with pytest.raises(SliceError, match=r"12\.002 mm along x, the Small has 12 mm"):
+        Screen(stack_of(box(size=(12.002, 1, 1)), 12.002), SMALL)
     with pytest.raises(SliceError, match="13 mm along x, the Small has 12 mm"):
         Screen(stack_of(box(size=(13, 1, 1)), 13.0), SMALL)
 

@@ -32,7 +32,9 @@ def stack(side: int, layers: int) -> Stack:
     z = -REACH + height * (np.arange(layers) + 0.5)
     corner, size = (-REACH, -REACH), (2 * REACH, 2 * REACH, 2 * REACH)
     root, tops = mandelbulb(iterations=10), height * np.arange(1, layers + 1)
-    return Stack(root, 1.0, corner, (width, width), (side, side), z, tops, size, Box.centred(REACH))
+    return Stack(
+        root, 1.0, corner, (width, width), (side, side), z, tops, size, Box.centred(REACH), side=size[0]
+    )
 
 
 def ours(job: Stack, folder: Path, work: Work) -> Figures:
