@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Sequence
 from pathlib import Path
@@ -22,6 +21,8 @@ def table_rows(path: str) -> dict[str, dict[str, Any]]:
 
     Raises `BadInput` for a file that is no table of meshes.
     """
+    import csv
+
     try:
         table = csv.DictReader(Path(path).read_text("utf-8").splitlines())
     except FileNotFoundError:
@@ -35,6 +36,8 @@ def table_rows(path: str) -> dict[str, dict[str, Any]]:
 
 def write_row(path: str, output: str, settings: Sequence[str], report: Report) -> None:
     """Write the settings and numbers of a mesh to its row of a table; the rows of other outputs stay."""
+    import csv
+
     from fracslice.export import replacing
 
     numbers = {name: value for name, value in report.as_dict().items() if isinstance(value, int | float)}

@@ -44,11 +44,6 @@ def lock(handle: int, path: str | Path) -> None:
 def locked_folder(folder: Path) -> Iterator[None]:
     """Lock a folder during a block, where the system can open folders.
 
-    Parameters
-    ----------
-    folder : Path
-        The folder.
-
     Yields
     ------
     None

@@ -111,10 +111,6 @@ class SliceRun:
         ----------
         name : str
             Begin of the names of their files.
-
-        Returns
-        -------
-        bytes
         """
         stack, screen = self.stack, self.screen
         manifest = {

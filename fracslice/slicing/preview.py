@@ -26,11 +26,6 @@ ALARM = (214, 60, 60)
 def thumbnail(layer: Layer) -> Image:
     """Shrink a layer's coverage by box averaging, in colour.
 
-    Parameters
-    ----------
-    layer : Layer
-        The layer.
-
     Returns
     -------
     PIL.Image.Image

@@ -26,10 +26,8 @@ void require_labels(const MeshView& mesh, const Vector<int32_t>& labels, size_t 
     if (labels.size() != mesh.vertices) throw std::invalid_argument("vertices and labels differ in length");
     require_below(span_of(labels), components, "a label names a component that does not exist", -1);
     std::atomic<bool> unknown = false;
-    for_each_block(mesh.count, [&](size_t, size_t first, size_t last) {
-        for (size_t t = first; t < last; ++t) {
-            if (labels.data()[mesh[t][0]] < 0) unknown.store(true, std::memory_order_relaxed);
-        }
+    for_each_number(mesh.count, [&](size_t t) {
+        if (labels.data()[mesh[t][0]] < 0) unknown.store(true, std::memory_order_relaxed);
     });
     if (unknown) throw std::invalid_argument("a triangle has no label");
 }

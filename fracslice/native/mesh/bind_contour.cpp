@@ -34,7 +34,7 @@ class SurfaceCells {
     nb::object edges(size_t begin, size_t end) const {
         check(begin, end);
         Array<int16_t> rows(end - begin, 4);
-        unlocked(threads_, [&] { return grid_.edges(begin, end, rows.data.get()), 0; });
+        unlocked(threads_, [&] { grid_.edges(begin, end, rows.data.get()); });
         return to_numpy(std::move(rows), {end - begin, 4});
     }
 
@@ -44,8 +44,7 @@ class SurfaceCells {
         if (t.shape(0) != end - begin || normals.shape(1) != end - begin) throw nb::value_error("as many rows as crossings");
         unlocked(threads_, [&] {
             mesh::find_crossings(grid_, loops, begin, end, origin, voxel, t.data(), normals.data(),
-                                      size_t(normals.stride(0)));
-            return 0;
+                                 size_t(normals.stride(0)));
         });
     }
 
@@ -82,7 +81,7 @@ class Surfacing {
         if (t.shape(0) != normals.shape(1)) throw nb::value_error("t and normals differ in length");
         if (normals.stride(1) != 1) throw nb::value_error("each row of normals contiguous");
         Hermite data{first, t.shape(0), size_t(normals.stride(0)), t.data(), normals.data(), margin_};
-        unlocked(threads_, [&] { return made_.advance(end, data), 0; });
+        unlocked(threads_, [&] { made_.advance(end, data); });
     }
 
     nb::tuple finish() {
@@ -124,7 +123,7 @@ void bind_project(const nb::ndarray<double, nb::shape<-1, 3>, nb::c_contig, nb::
                   const ProjectionLoops& loops, nb::object regions, double voxel, int threads) {
     if (first > last || last > points.shape(0)) throw nb::value_error("no such points");
     const TrustRegions within = trust_regions_by(regions);
-    unlocked(threads, [&] { return project(points.data(), first, last, loops, within, voxel), 0; });
+    unlocked(threads, [&] { project(points.data(), first, last, loops, within, voxel); });
 }
 
 }  // namespace

@@ -22,6 +22,14 @@ void for_each_block(size_t count, const Do& act) {
     tbb::parallel_for(size_t(0), blocks_of(count), [&](size_t k) { act(k, k * kBlock, std::min(count, (k + 1) * kBlock)); });
 }
 
+// Calls act(number) for each number below `count`.
+template <class Do>
+void for_each_number(size_t count, const Do& act) {
+    for_each_block(count, [&](size_t, size_t first, size_t last) {
+        for (size_t i = first; i < last; ++i) act(i);
+    });
+}
+
 // What act(first, last) returns for each block of `count` things.
 template <class Part, class Do>
 std::vector<Part> in_blocks(size_t count, const Do& act) {

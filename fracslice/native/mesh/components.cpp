@@ -16,9 +16,7 @@ int32_t get(const std::atomic<int32_t>& number) { return number.load(std::memory
 class Forest {
   public:
     explicit Forest(size_t count) : parent_(count) {
-        for_each_block(count, [&](size_t, size_t first, size_t last) {
-            for (size_t v = first; v < last; ++v) parent_[v].store(int32_t(v), std::memory_order_relaxed);
-        });
+        for_each_number(count, [&](size_t v) { parent_[v].store(int32_t(v), std::memory_order_relaxed); });
     }
 
     // Halves the path (Tarjan and van Leeuwen, 1984): what another thread has put there is an ancestor, too.
@@ -88,18 +86,14 @@ std::vector<Reach> reaches(const MeshView& mesh, std::span<const int32_t> labels
 
 Components connected_components(const Triangles& triangles) {
     Forest forest(triangles.vertices);
-    for_each_block(triangles.count, [&](size_t, size_t first, size_t last) {
-        for (size_t t = first; t < last; ++t) {
-            forest.unite(triangles[t][0], triangles[t][1]);
-            forest.unite(triangles[t][0], triangles[t][2]);
-        }
+    for_each_number(triangles.count, [&](size_t t) {
+        forest.unite(triangles[t][0], triangles[t][1]);
+        forest.unite(triangles[t][0], triangles[t][2]);
     });
     std::vector<std::atomic<bool>> used(triangles.vertices);  // roots
-    for_each_block(triangles.count, [&](size_t, size_t first, size_t last) {
-        for (size_t t = first; t < last; ++t) {
-            std::atomic<bool>& mark = used[size_t(forest.root(triangles[t][0]))];
-            if (!mark.load(std::memory_order_relaxed)) mark.store(true, std::memory_order_relaxed);
-        }
+    for_each_number(triangles.count, [&](size_t t) {
+        std::atomic<bool>& mark = used[size_t(forest.root(triangles[t][0]))];
+        if (!mark.load(std::memory_order_relaxed)) mark.store(true, std::memory_order_relaxed);
     });
     auto is_root = [&](size_t v) { return used[v].load(std::memory_order_relaxed); };
     std::vector<size_t> before = counted(triangles.vertices, is_root);
@@ -108,10 +102,8 @@ Components connected_components(const Triangles& triangles) {
     for_each_block(triangles.vertices, [&](size_t block, size_t first, size_t last) {
         for (size_t v = first, next = before[block]; v < last; ++v) labels[v] = is_root(v) ? int32_t(next++) : -1;
     });
-    for_each_block(triangles.vertices, [&](size_t, size_t first, size_t last) {
-        for (size_t v = first; v < last; ++v) {
-            if (!is_root(v)) labels[v] = labels[forest.root(int32_t(v))];
-        }
+    for_each_number(triangles.vertices, [&](size_t v) {
+        if (!is_root(v)) labels[v] = labels[forest.root(int32_t(v))];
     });
     return result;
 }

@@ -32,9 +32,7 @@ size_t mixed(uint64_t cube) {
 class FirstPoints {
   public:
     FirstPoints(const double* points, const Lattice& lattice, size_t most) : points_(points), lattice_(lattice), slots_(slots(most)) {
-        for_each_block(slots_.size(), [&](size_t, size_t first, size_t last) {
-            for (size_t i = first; i < last; ++i) slots_[i].store(-1, std::memory_order_relaxed);
-        });
+        for_each_number(slots_.size(), [&](size_t i) { slots_[i].store(-1, std::memory_order_relaxed); });
     }
 
     // The first point of the cube of a point: the point itself if there was none.
@@ -88,18 +86,14 @@ std::vector<int64_t> near_bodies(const LabelledPoints& all, size_t count, int32_
         return FirstPoints(all.points, {origin, 1 / cubes.edge}, small);
     };
     std::array<FirstPoints, 2> lattices{seen_by(0), seen_by(0.5)};
-    for_each_block(all.labels.size(), [&](size_t, size_t first, size_t last) {
-        for (size_t v = first; v < last; ++v) {
-            if (!is_small(v)) continue;
-            for (FirstPoints& seen : lattices) meet(body(v), body(size_t(seen.enter(int32_t(v)))));
-        }
+    for_each_number(all.labels.size(), [&](size_t v) {
+        if (!is_small(v)) return;
+        for (FirstPoints& seen : lattices) meet(body(v), body(size_t(seen.enter(int32_t(v)))));
     });
-    for_each_block(all.labels.size(), [&](size_t, size_t first, size_t last) {
-        for (size_t v = first; v < last; ++v) {
-            if (body(v) != largest) continue;
-            for (FirstPoints& seen : lattices) {
-                if (int32_t other = seen.find(all.points + 3 * v); other >= 0) meet(largest, body(size_t(other)));
-            }
+    for_each_number(all.labels.size(), [&](size_t v) {
+        if (body(v) != largest) return;
+        for (FirstPoints& seen : lattices) {
+            if (int32_t other = seen.find(all.points + 3 * v); other >= 0) meet(largest, body(size_t(other)));
         }
     });
     return chosen(count, [&](size_t b) { return near[b].load(std::memory_order_relaxed); });

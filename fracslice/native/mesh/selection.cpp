@@ -16,12 +16,10 @@ class CoarseGrid {
         double size = 0;
         for (size_t k = 0; k < 3; ++k) size = std::max(size, box.high[k] - box.low[k]);
         double scale = size > 0 ? kSide / size : 0;
-        for_each_block(mesh.vertices, [&](size_t, size_t first, size_t last) {
-            for (size_t v = first; v < last; ++v) {
-                const double* p = mesh.point(int32_t(v));
-                for (size_t k = 0; k < 3; ++k) cells_.data[v][k] = uint8_t(std::min((p[k] - box.low[k]) * scale, kSide - 1.0));
-                cells_.data[v][3] = 0;
-            }
+        for_each_number(mesh.vertices, [&](size_t v) {
+            const double* p = mesh.point(int32_t(v));
+            for (size_t k = 0; k < 3; ++k) cells_.data[v][k] = uint8_t(std::min((p[k] - box.low[k]) * scale, kSide - 1.0));
+            cells_.data[v][3] = 0;
         });
     }
 
@@ -59,10 +57,8 @@ class CoarseGrid {
 Selection selected(const MeshView& mesh, std::span<const bool> keep) {
     assert(keep.size() == mesh.count);
     std::vector<std::atomic<bool>> used(mesh.vertices);
-    for_each_block(mesh.count, [&](size_t, size_t first, size_t last) {
-        for (size_t t = first; t < last; ++t) {
-            for (int k = 0; keep[t] && k < 3; ++k) used[size_t(mesh[t][k])].store(true, std::memory_order_relaxed);
-        }
+    for_each_number(mesh.count, [&](size_t t) {
+        for (int k = 0; keep[t] && k < 3; ++k) used[size_t(mesh[t][k])].store(true, std::memory_order_relaxed);
     });
     auto is_used = [&](size_t v) { return used[v].load(std::memory_order_relaxed); };
     std::vector<size_t> vertices = counted(mesh.vertices, is_used);
@@ -107,11 +103,9 @@ std::vector<int64_t> near(const MeshView& mesh, std::span<const double> points, 
         for (size_t k = 0; k < 27; ++k) marked[((x + k / 9 - 1) * side + y + k / 3 % 3 - 1) * side + z + k % 3 - 1] = true;
     }
     Array<bool> seen(mesh.vertices, 1);
-    for_each_block(mesh.vertices, [&](size_t, size_t first, size_t last) {
-        for (size_t v = first; v < last; ++v) {
-            const double* p = mesh.point(int32_t(v));
-            seen.data[v] = marked[(place(p, 0) * side + place(p, 1)) * side + place(p, 2)];
-        }
+    for_each_number(mesh.vertices, [&](size_t v) {
+        const double* p = mesh.point(int32_t(v));
+        seen.data[v] = marked[(place(p, 0) * side + place(p, 1)) * side + place(p, 2)];
     });
     return touching(mesh, {seen.data.get(), mesh.vertices});
 }

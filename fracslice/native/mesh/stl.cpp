@@ -28,9 +28,7 @@ void write(const MeshView& mesh, size_t t, uint8_t* out) {
 }  // namespace
 
 void write_stl(const MeshView& mesh, uint8_t* out) {
-    for_each_block(mesh.count, [&](size_t, size_t first, size_t last) {
-        for (size_t t = first; t < last; ++t) write(mesh, t, out + kStlBytes * t);
-    });
+    for_each_number(mesh.count, [&](size_t t) { write(mesh, t, out + kStlBytes * t); });
 }
 
 }  // namespace fracslice::mesh

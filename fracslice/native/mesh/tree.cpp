@@ -94,8 +94,8 @@ Tree build_tree(const MeshView& mesh) {
     if (mesh.count >> kNumberBits) throw std::invalid_argument("more than 2^31 triangles");
     Array<uint64_t> order = sorted(keys(mesh));
     tree.order = {mesh.count, 1};
-    for_each_block(mesh.count, [&](size_t, size_t first, size_t last) {
-        for (size_t i = first; i < last; ++i) tree.order.data[i] = int64_t(order.data[i] & ((uint64_t(1) << kNumberBits) - 1));
+    for_each_number(mesh.count, [&](size_t i) {
+        tree.order.data[i] = int64_t(order.data[i] & ((uint64_t(1) << kNumberBits) - 1));
     });
     size_t leaves = 1;
     while (leaves * kLeaf < mesh.count) leaves *= 2;

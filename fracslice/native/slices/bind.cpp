@@ -67,6 +67,13 @@ nb::object owned(std::vector<Row>&& rows, std::initializer_list<size_t> shape) {
 
 using Bytes = nb::ndarray<uint8_t, nb::ndim<2>, nb::device::cpu>;
 
+// What act() returns; other threads of Python run meanwhile.
+template <class Do>
+auto unlocked(const Do& act) {
+    nb::gil_scoped_release released;
+    return act();
+}
+
 // Layers are read one at a time.
 void held(const Slab& slab, int layer) {
     if (layer != slab.layer()) throw nb::value_error("another layer of the slab was sampled since");
@@ -75,21 +82,13 @@ void held(const Slab& slab, int layer) {
 nb::tuple bind_paint(const Slab& slab, int layer, const Bytes& image) {
     held(slab, layer);
     Canvas canvas{image.data(), int(image.shape(0)), int(image.shape(1)), image.stride(0), image.stride(1)};
-    Painted painted;
-    {
-        nb::gil_scoped_release released;
-        painted = paint(slab, canvas);
-    }
+    Painted painted = unlocked([&] { return paint(slab, canvas); });
     return nb::make_tuple(painted.area, painted.partly);
 }
 
 nb::tuple bind_runs(const Slab& slab, int layer, std::array<int, 2> shape) {
     held(slab, layer);
-    SolidRuns result;
-    {
-        nb::gil_scoped_release released;
-        result = solid_runs(slab, shape[0], shape[1]);
-    }
+    SolidRuns result = unlocked([&] { return solid_runs(slab, shape[0], shape[1]); });
     const size_t rows = result.rows.size(), n = result.runs.size();
     return nb::make_tuple(owned<int32_t>(std::move(result.rows), {rows}), owned<int32_t>(std::move(result.runs), {n, 2}),
                           result.painted.area, result.painted.partly);
@@ -103,42 +102,27 @@ nb::tuple bind_picture(const Slab& slab, int layer, std::array<int, 2> rows_colu
     View view{rows_columns[0], rows_columns[1], transposed, backwards, at, shape, {}};
     if (levels.size() != view.levels.size()) throw nb::value_error("256 levels were expected");
     std::copy_n(reinterpret_cast<const uint8_t*>(levels.c_str()), view.levels.size(), view.levels.begin());
-    Picture shown;
-    {
-        nb::gil_scoped_release released;
-        shown = picture(slab, view, encoding);
-    }
+    Picture shown = unlocked([&] { return picture(slab, view, encoding); });
     return nb::make_tuple(bytes(*shown.data), shown.painted.area, shown.painted.partly);
 }
 
 nb::bytes bind_encoded(const nb::ndarray<const uint8_t, nb::ndim<2>, nb::device::cpu>& image, Encoding encoding) {
-    const Rows<uint8_t>* data;
-    {
-        nb::gil_scoped_release released;
-        auto* first = const_cast<uint8_t*>(image.data());
-        data = &encoded({first, int(image.shape(0)), int(image.shape(1)), image.stride(0), image.stride(1)}, encoding);
-    }
-    return bytes(*data);
+    auto* first = const_cast<uint8_t*>(image.data());
+    const Canvas canvas{first, int(image.shape(0)), int(image.shape(1)), image.stride(0), image.stride(1)};
+    return bytes(*unlocked([&] { return &encoded(canvas, encoding); }));
 }
 
 nb::bytes bind_filtered(const nb::ndarray<const uint8_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>& rows, size_t pixel) {
     if (rows.shape(0) < 1 || pixel < 1) throw nb::value_error("a row above and a pixel of at least a byte were expected");
     const size_t count = rows.shape(0) - 1, width = rows.shape(1);
     Rows<uint8_t> result(count * (width + 1));
-    {
-        nb::gil_scoped_release released;
-        filter_rows(rows.data(), count, width, pixel, result.data());
-    }
+    unlocked([&] { filter_rows(rows.data(), count, width, pixel, result.data()); });
     return bytes(result);
 }
 
 nb::tuple bind_crossings(const Slab& slab, int layer) {
     held(slab, layer);
-    Crossings result;
-    {
-        nb::gil_scoped_release released;
-        result = crossings(slab);
-    }
+    Crossings result = unlocked([&] { return crossings(slab); });
     size_t n = result.edges.size();
     return nb::make_tuple(owned<int32_t>(std::move(result.edges), {n, 4}), owned<double>(std::move(result.ends), {n, 2}));
 }

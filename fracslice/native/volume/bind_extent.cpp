@@ -65,7 +65,6 @@ class Sides {
     void each(const Do& act) {
         unlocked(threads_, [&] {
             tbb::parallel_for(size_t(0), sides_.size(), [&](size_t k) { act(sides_[k]); });
-            return 0;
         });
     }
     template <class Value>
@@ -94,7 +93,6 @@ nb::object climbed(nb::object entry, const Rows3& starts, const Rows3& steps, co
     const double* w = steps.data();
     unlocked(threads, [&] {
         climb(field, {p, p + row, p + 2 * row}, n, each, {w, w + all, w + 2 * all, gain.data(), count}, first, exact);
-        return 0;
     });
     return to_numpy(std::move(points), {3, n, each});
 }
@@ -108,7 +106,6 @@ nb::object measured(nb::object entry, const nb::ndarray<const double, nb::shape<
     const PlacedPoints placed{points.data(), points.stride(0), points.stride(1), scale, offset};
     unlocked(threads, [&] {
         surface_error(field, placed, {steps.data(), step}, voxel, {errors.data.get(), n});
-        return 0;
     });
     return to_numpy(std::move(errors), {n});
 }
