@@ -44,6 +44,9 @@ LITTLE, MOST = 1 << 14, 1 << 17
 CELLS = 1 << 18
 """Maximum number of cells in the proof that nothing is inside."""
 
+PROVEN = 1e-6
+"""Finest accuracy of the proven sides, as a fraction of the longest side: float32 proves nothing finer."""
+
 EXACT = 2.5e-7
 """Last step of the outward search for tips, as a fraction of the longest side."""
 
@@ -211,7 +214,8 @@ class _Search:
         cells = (np.indices((FIRST,) * 3).reshape(3, -1) + SHIFT) / FIRST
         points = np.array(box.lo)[:, None] + cells * np.array(box.size)[:, None]
         _learn(sides, points[:, self.inside(points)])
-        step, aim, exact, most = longest / FIRST, SHARE * longest / resolution, EXACT * longest, MOST
+        step, exact = longest / FIRST, EXACT * longest
+        aim, finest, most = SHARE * longest / resolution, PROVEN * longest, MOST
         for share in () if self.far else BOLD:
             self.climb(sides, step, exact)
             sides.guess(share, exact, LITTLE)
@@ -221,9 +225,9 @@ class _Search:
             if not np.isfinite(sides.known).all():
                 raise EmptyError(self.why_empty(box))
             _learn(sides, sides.best[:, :, 0])
-            if aim <= exact or (sides.spent >= LITTLE).all():
+            if aim <= finest or (sides.spent >= LITTLE).all():
                 break
-            step, aim, most = aim, max(aim / FINER, exact), LITTLE
+            step, aim, most = aim, max(aim / FINER, finest), LITTLE
         self.climb(sides, aim, exact)
         limits, longest_out = np.array([box.lo, box.hi]), MARGIN / 2 * longest
         reach, above = ((SIGNS * heights).reshape(2, 3) for heights in (sides.known, sides.above))

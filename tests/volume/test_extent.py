@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pytest
 
 from fracslice import MeshJob, make_mesh
+from fracslice._native import Sides
 from fracslice.errors import Cancelled, SceneError
 from fracslice.formulas import (
     Node,
@@ -21,6 +24,7 @@ from fracslice.formulas import (
     offset,
     plane,
     sphere,
+    torus,
     transform,
     union,
 )
@@ -31,6 +35,7 @@ from fracslice.kernel.arrays import ArrayField
 from fracslice.scene import Print, scene
 from fracslice.slicing import SliceJob, plan_stack
 from fracslice.volume import extent, plan
+from fracslice.volume.extent import LITTLE, PROVEN
 from fracslice.work import Work
 
 PLATE = box(size=(60, 40, 2))
@@ -203,3 +208,17 @@ def test_planning_stops_when_it_is_cancelled() -> None:
     work.cancel.set()
     with pytest.raises(Cancelled):
         extent(thing(0), 48, work)
+
+
+@pytest.mark.parametrize("root", [sphere(), torus()], ids=["sphere", "torus"])
+def test_a_smooth_tip_is_proven_by_few_columns(root: Node, monkeypatch: pytest.MonkeyPatch) -> None:
+    searched: list[Sides] = []
+
+    def kept(*given: Any) -> Sides:
+        searched.append(Sides(*given))
+        return searched[-1]
+
+    monkeypatch.setattr(sys.modules["fracslice.volume.extent"], "Sides", kept)
+    found = extent(root, 64, Work(1))
+    assert max(sides.spent.max() for sides in searched) < LITTLE
+    assert max(found.outer.hi) - max(found.box.hi) < 2 * PROVEN * max(found.box.size)
