@@ -13,8 +13,8 @@ from ..mesh.model import Mesh
 HEADER, TRIANGLE = 84, 50
 """Bytes before the first triangle, and of a triangle."""
 
-BLOCK = 1 << 18
-"""Triangles that are encoded together."""
+BLOCK = 1 << 16
+"""Triangles that are encoded together: so few that their memory is used again, see `keep_freed_memory`."""
 
 
 def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
