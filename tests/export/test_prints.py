@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import math
 import shutil
 import subprocess
+import zipfile
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -15,6 +17,7 @@ import numpy as np
 import pytest
 
 from fracslice.errors import ExportError
+from fracslice.export import archives
 from fracslice.export.jobs import SliceRun
 from fracslice.export.layer_files import ENDINGS, PRINTS, printers_file, slice_format, write_slices
 from fracslice.export.resins import Resin
@@ -198,3 +201,13 @@ def test_photon_by_pyphotonfile(tmp_path: Path) -> None:
     expected = [image >= 224 for image in Slicer(stack).map(job.screen.picture)]
     assert len(pictures) == 4 and expected[1].any()
     assert all((one == other).all() for one, other in zip(pictures, expected, strict=True))
+
+
+def test_archives_are_those_of_zipfile() -> None:
+    members = [("config.ini", b"a = 1\n"), ("thumbnail/a.png", bytes(range(256))), ("empty", b"")]
+    ours, expected = io.BytesIO(), io.BytesIO()
+    archives._archive(ours, iter(members))
+    with zipfile.ZipFile(expected, "w") as archive:
+        for name, data in members:
+            archive.writestr(zipfile.ZipInfo(name), data)
+    assert ours.getvalue() == expected.getvalue()
