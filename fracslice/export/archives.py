@@ -69,8 +69,9 @@ def _assemble_nanodlp(job: PrintData, file: BinaryIO) -> None:
 
 
 def _archive(file: BinaryIO, members: Iterator[tuple[str, bytes]]) -> None:
-    """Write members that are not compressed and carry no time: the bytes of `writestr`, whose checksum is ten
-    times slower, and which goes back to each header.
+    """Write members that are not compressed and carry no time.
+
+    ZipFile.writestr gives the same bytes; its checksum is slower, and it goes back to each header.
     """
     with zipfile.ZipFile(file, "w") as archive:
         for name, data in members:
