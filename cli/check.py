@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 SHARED = {"cluster", "shard", "store"}
 OF_LAYERS = {*SHARED, "pixel", "machine", "picture", "html", "fix"}
 OF_MESHES = {"voxel", "resolution", "dust", "chord", "simplify", "proved"}
-OF_SCENES = {*OF_MESHES, *SHARED, "settings", "size"}
+OF_SCENES = {*OF_MESHES, *SHARED, "settings"}
 
 ACROSS = 256
 """Layers of a model's longest side, if --layer is not given, unless they would be thinner than `LAYER`."""
@@ -135,9 +135,13 @@ def of_model(given: CheckOptions, work: Work) -> Checked:
     from fracslice.mesh.check import check_mesh
     from fracslice.mesh.field import MeshField
     from fracslice.scene import Print
-    from fracslice.volume.sizing import UP, Sizing
+    from fracslice.volume.sizing import SAME, UP, Sizing
 
-    mesh = placed(load_model(given.source), given.up, given.scale)
+    turned = placed(load_model(given.source), given.up, SAME)
+    length = longest(turned) or 1.0
+    side = given.size or length
+    x, y, z = (factor * side / length for factor in given.scale)
+    mesh = placed(turned, UP, (x, y, z))
     report = check_mesh(mesh, threads=work.threads)
     line, numbers = f"{given.source}: {figures(report)}", report.as_dict()
     if not report.watertight:
@@ -151,9 +155,9 @@ def of_model(given: CheckOptions, work: Work) -> Checked:
         pixel=given.pixel or (None if given.machine else max(height, PIXEL_MM)),
         up=UP,
     )
-    layers, lines, problems = of_layers(
-        MeshField(mesh), Sizing(size, 1.0), given.printing(Print()), layered, work
-    )
+    factor = size / side  # the mesh is compensated already: a size that is advised is before that
+    sides = Sizing(side, 1 / factor, (factor,) * 3)
+    layers, lines, problems = of_layers(MeshField(mesh), sides, given.printing(Print()), layered, work)
     return numbers | {"layers": layers}, [line, *lines], (*report.problems, *problems)
 
 

@@ -105,8 +105,10 @@ class Closing:
         if self.bodies > 1:
             yield f"{self.bodies} loose bodies: --bridge {max(self.bridge, 1):.2g}mm, or --keep largest"
         if self.contact * FLAT < self.volume / self.height:
-            base = max(self.height / 50, 0.5)
-            yield f"does not stand flat, {significant(self.contact, 2)} mm2 on the plate: --base {base:.2g}mm"
+            from fracslice.printing.problems import flat_base
+
+            plate = f"{significant(self.contact, 2)} mm2 on the plate"
+            yield f"does not stand flat, {plate}: --base {flat_base(self.height)}"
 
 
 def millilitres(volume: float) -> str:

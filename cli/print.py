@@ -7,11 +7,12 @@ from pathlib import Path
 
 import click
 
+from fracslice.errors import keeping
+
 from .closing import duration
 from .inputs import check_targets, load_scene
 from .options import MeshOptions, argument, command, option, output
 from .value_types import Name
-from .working import keeping
 
 TOLERANCE = 0.02
 """Default tolerance of the simplified mesh, mm."""

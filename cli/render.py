@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fracslice.errors import Cancelled, SharedError
+from fracslice.errors import Cancelled, KeptError, SharedError
 
 from .bands import announced, check_options, light_of, render_to
 from .cluster import ClusterOptions
@@ -20,7 +20,6 @@ from .inputs import check_folder, check_targets, load_scene
 from .options import DEVICE, SAMPLES, SceneOptions, argument, command, flag, option, output
 from .sizes import DURATION, PART, PIXELS
 from .value_types import Name, Whole
-from .working import KeptError
 
 if TYPE_CHECKING:
     import numpy as np

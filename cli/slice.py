@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from fracslice.common.digits import counted
+from fracslice.errors import keeping
 
 from .closing import of_layers
 from .cluster import ClusterOptions
@@ -20,7 +21,6 @@ from .inputs import check_targets, load_scene, refuse_options
 from .layers import LAYER, LayerOptions, layer_option, printer_option, read_shift, write_page
 from .options import argument, command, option, output
 from .value_types import AMOUNT, NUMBER, Name, Parsed, Whole
-from .working import keeping
 
 if TYPE_CHECKING:
     from fracslice.export.jobs import SliceRun

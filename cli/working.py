@@ -11,7 +11,7 @@ from dataclasses import replace
 from types import FrameType
 from typing import TYPE_CHECKING
 
-from fracslice.errors import Cancelled, FracsliceError
+from fracslice.errors import Cancelled, FracsliceError, KeptError
 
 if TYPE_CHECKING:
     from fracslice.work import Work
@@ -20,25 +20,6 @@ Progress = Callable[[str, float], None]
 
 NOTHING = "nothing was written"
 """What most commands leave when they are stopped."""
-
-
-class KeptError(Cancelled):
-    """Cancelled work whose partial result was written; the message names it."""
-
-
-@contextmanager
-def keeping(text: str) -> Iterator[None]:
-    """Let the message of work that is cancelled in a block name what was written before.
-
-    Raises
-    ------
-    KeptError
-        When the work is cancelled.
-    """
-    try:
-        yield
-    except Cancelled:
-        raise KeptError(text) from None
 
 
 class StoppedError(FracsliceError):

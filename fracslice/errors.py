@@ -3,6 +3,9 @@
 Each message is one line that the user can act on.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 
 class FracsliceError(Exception):
     """Base class of every error that the library raises on purpose."""
@@ -74,6 +77,35 @@ class BenchError(FracsliceError):
 
 class Cancelled(FracsliceError):  # noqa: N818  cancellation is no error
     """Cancellation requested by the caller."""
+
+
+class KeptError(Cancelled):
+    """Cancelled work whose partial result was written; the message names it."""
+
+
+@contextmanager
+def keeping(text: str) -> Iterator[None]:
+    """Let the message of work that is cancelled in a block name what was written before.
+
+    Parameters
+    ----------
+    text : str
+        What was written.
+
+    Returns
+    -------
+    context manager
+        Of the block.
+
+    Raises
+    ------
+    KeptError
+        When the work is cancelled.
+    """
+    try:
+        yield
+    except Cancelled:
+        raise KeptError(text) from None
 
 
 class FracsliceWarning(UserWarning):

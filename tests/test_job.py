@@ -11,7 +11,7 @@ import pytest
 
 from fracslice import MeshJob, Work, make_mesh
 from fracslice.common import memory
-from fracslice.errors import Cancelled, SceneError, VolumeError
+from fracslice.errors import Cancelled, KeptError, SceneError, VolumeError
 from fracslice.formulas import (
     box,
     cone,
@@ -199,6 +199,19 @@ def test_cancelling_stops_it():
     with pytest.raises(Cancelled):
         make_mesh(BALL, MeshJob(resolution=64), Work(progress=progress, cancel=cancel))
     assert "checking" not in stages
+
+
+def test_a_file_is_named_that_is_written_when_its_last_check_is_cancelled(monkeypatch, tmp_path):
+    def stopped(*_):
+        raise Cancelled("cancelled")
+
+    monkeypatch.setattr("fracslice.jobs.completeness.mesh_amount", stopped)
+    target = tmp_path / "ball.stl"
+    with pytest.raises(KeptError, match=r"^.*ball\.stl is written$"):
+        make_mesh(BALL, MeshJob(resolution=16), path=target)
+    assert target.exists()
+    with pytest.raises(Cancelled, match="cancelled"):
+        make_mesh(BALL, MeshJob(resolution=16))
 
 
 def test_the_result_does_not_depend_on_threads_or_run():

@@ -15,6 +15,7 @@ from ..export.images import encoded_image
 from ..formulas.parameters import Number
 from ..formulas.records import validated
 from ..formulas.registry import Node
+from ..kernel.devices import chosen
 from ..rendering import Renderer, develop, picture
 from ..rendering.picture_layers import layers
 from ..rendering.sequence import SampleRange
@@ -68,12 +69,15 @@ class FilmJob:
 
     @property
     def key(self) -> str:
-        """Hash of everything that determines the frames, the pictures that the scene names included."""
+        """Hash of everything that determines the frames, the pictures that the scene names included.
+
+        The device is one of them: pictures of a GPU may differ in the last place.
+        """
         scene = self.timeline.scene
         names = [light.file for light in scene.view.lights]
         names += [node.values.get("texture") for node in scene.root.walk()]
         pictures = [path.read_bytes() for path in map(Path, filter(None, names)) if path.is_file()]
-        about = self.size, self.samples, self.fps, self.ending, self.layers
+        about = self.size, self.samples, self.fps, self.ending, self.layers, chosen(self.device)
         return key(program(), scene.hash, *about, *pictures)
 
     def path(self, folder: Path, number: int) -> Path:

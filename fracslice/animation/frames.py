@@ -121,6 +121,8 @@ def write_frames(job: FilmJob, numbers: Sequence[int], folder: Path, resume: boo
     SharedError
         For a shard that does not write the frames, when its own are made.
     """
+    if work.cluster is not None:
+        job = replace(job, device="cpu")  # that of the tasks
     if isinstance(work.cluster, Shard) and not work.cluster.first:
         count = work.cluster.share(FrameTask.all(job, numbers), work)
         raise SharedError(f"this shard made {counted(count, 'frame')}; shard 1 writes them")
@@ -175,7 +177,9 @@ def _claim(job: FilmJob, folder: Path, resume: bool) -> None:
         if known == job.key:
             return
         if resume:
-            raise RenderError(f"{folder}: has frames of another film: expected those of this one, to resume")
+            raise RenderError(
+                f"{folder}: has frames of another film or device: expected those of this one, to resume"
+            )
         for path in folder.glob("frame?????.*"):
             path.unlink()
     elif any(folder.iterdir()):

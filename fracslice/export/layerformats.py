@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import BinaryIO
@@ -28,10 +28,13 @@ class LayerFormat(ABC):
         Name of the format.
     encode : callable
         Encodes a layer of a run.
+    most : int or None
+        Maximum size of the encoded layers, bytes; None for no limit.
     """
 
     name: str
     encode: Callable[[SliceRun, Layer], bytes]
+    most: int | None = field(default=None, kw_only=True)
 
     def encoder(self, run: SliceRun) -> Encode:
         """Return the function that encodes the layers of a run.
@@ -93,13 +96,21 @@ class LayerFormat(ABC):
         Raises
         ------
         ExportError
-            As for `write`.
+            As for `write`, and as soon as the layers are larger than `most`.
         """
         encode = self.encoder_for(run, path)
         with journal(path, run.key(self.name)) as layers:
             for data in encoded_layers(run, self.name, encode, layers.count):
+                if self.most is not None and layers.size + len(data) > self.most:
+                    break  # the journal is removed: the job cannot be resumed
                 layers.append(data)
-            yield layers
+            else:
+                yield layers
+                return
+        raise ExportError(
+            f"{path}: {layers.count + 1} of {run.layers} layers are larger than {self.most / 2**30:.2f} GiB: "
+            f"expected less, for a {self.name} file; thicker layers or a smaller object"
+        )
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,9 @@ from .ranges import Encode
 from .resins import Resin
 from .resuming import Journal
 
+ADDRESSED = 2**32 - 2**25
+"""Maximum size of the pictures in a file with offsets of 32 bits, bytes, beside headers and tables."""
+
 _AREA = struct.Struct("<d")
 """Area before the picture in a record, mm^2."""
 

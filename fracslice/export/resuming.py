@@ -67,6 +67,11 @@ class Journal:
         self.file.write(_HEAD.pack(len(layer), crc32(layer)) + layer)
         self.count += 1
 
+    @property
+    def size(self) -> int:
+        """Size of the layers that are appended, bytes."""
+        return self.file.tell()
+
     def __iter__(self) -> Iterator[bytes]:
         """Iterate over all layers in order. Raises `ExportError` if a record cannot be read back."""
         return chain.from_iterable(self.groups())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from importlib import import_module
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from ..background import in_background
 from ..common.memory import peak_rss_mb
-from ..errors import SceneError, SharedError, TooLargeError
+from ..errors import SceneError, SharedError, TooLargeError, keeping
 from ..meshjob import MeshJob
 from ..scene import Scene
 from ..version import __version__
@@ -63,6 +63,7 @@ def make_mesh(
     SceneError, VolumeError, MeshError, ExportError, Cancelled
         For a scene or job that cannot be meshed, or a file that cannot be written; no incomplete file is
         left. `TooLargeError`, a `VolumeError`, for a mesh that needs more memory than is available.
+        `KeptError`, a `Cancelled`, if the file is written when the work is cancelled.
     """
     job = _Job(scene, what or MeshJob(), Clock(work or Work()), None if path is None else Path(path))
     job.refuse()
@@ -205,7 +206,8 @@ class _Job:
         measure = partial(mesh_amount, planned, finish.volume, scale, clock.work)
         with in_background(measure, clock.work.threads) as measured:
             made = Writing(self.scene, what, clock, self.path).made(surface, finish)
-            with clock("checking"):
+            written = nullcontext() if self.path is None else keeping(f"{self.path} is written")
+            with clock("checking"), written:
                 amount, off = measured()
         fell = f"{thin}; expected a smaller voxel, or a thickness of {2 * scale * planned.voxel:.2g} mm"
         near = finish.near.count

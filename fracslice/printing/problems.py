@@ -48,6 +48,22 @@ class Problem:
         )
 
 
+def flat_base(height: float) -> str:
+    """Setting "base" by which an object stands flat: a fiftieth of it, 0.5 mm or more, but at most a quarter.
+
+    Parameters
+    ----------
+    height : float
+        Height of the object, mm.
+
+    Returns
+    -------
+    str
+        The length.
+    """
+    return f"{min(max(height / 50, 0.5), height / 4):.2g}mm"
+
+
 def mended(problems: Sequence[Problem]) -> dict[str, str]:
     """Print settings that mend as many problems as they can.
 

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from ..common.digits import counted, significant
-from ..printing.problems import Problem
+from ..printing.problems import Problem, flat_base
 from ..printing.solid_checks import BRIDGE, FILL, loose
 from .feature_graph import Feature
 from .printers import PRINTERS, Printer
@@ -102,8 +102,8 @@ def _narrow_neck(neck: Neck, stack: Stack, limits: Limits) -> Problem:
     at = (*neck.at, _bottom(stack, neck.layer))
     if neck.layer == 0:
         text = f"it stands on {significant(neck.area, 2)} mm2 and is {significant(neck.carried)} mm2 wide"
-        base = max(stack.size[2] / 50, 0.5)
-        return Problem("necks", text, 0, at, mend=(("base", f"{base:.2g}mm"),), advice="--raft 1mm")
+        base = flat_base(stack.size[2])
+        return Problem("necks", text, 0, at, mend=(("base", base),), advice="--raft 1mm")
     text = f"{significant(neck.carried)} mm2 hang on {significant(neck.area, 2)} mm2"
     width = 1.2 * math.sqrt(4 / math.pi * neck.carried / limits.neck)
     return Problem("necks", text, neck.layer, at, mend=(("thickness", f"{width:.2g}mm"),), advice=SUPPORTS)

@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -139,6 +140,17 @@ def test_frames_below_another_sky_are_another_film(tmp_path: Path) -> None:
         Image.new("RGB", (8, 4), colour).save(sky)
         keys.append(job(text).key)
     assert keys[0] == keys[2] != keys[1]
+
+
+def test_frames_of_another_device_are_another_film(monkeypatch: pytest.MonkeyPatch) -> None:
+    def keys() -> list[str]:
+        return [replace(job(scene()), device=device).key for device in ("cpu", "auto")]
+
+    monkeypatch.setattr("fracslice.kernel.cuda_driver.missing", lambda: "no GPU")
+    cpu, auto = keys()
+    assert cpu == auto
+    monkeypatch.setattr("fracslice.kernel.cuda_driver.missing", lambda: "")
+    assert keys()[0] == cpu != keys()[1]
 
 
 def test_two_films_at_once_do_not_mix_their_frames(tmp_path: Path) -> None:

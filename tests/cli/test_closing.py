@@ -50,6 +50,16 @@ def test_everything_that_a_maker_asks() -> None:
     assert [duration(s) for s in (0.1, 60, 3599, 7260)] == ["1 s", "1 min", "1 h 0 min", "2 h 1 min"]
 
 
+def test_the_base_that_is_advised_leaves_most_of_a_tiny_object(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], ball: Path
+) -> None:
+    tiny = "mesh", ball, "-o", tmp_path / "m.stl", "--resolution", 32, "--size", "0.4mm"
+    advice = printed(capfd, *tiny)[-1]
+    assert advice.endswith("on the plate: --base 0.1mm")
+    lines = printed(capfd, *tiny, *advice.split(": ")[1].split())
+    assert "0.30 mm, " in lines[0] and "stand flat" not in lines[-1]
+
+
 def test_a_mesh_ends_with_them(tmp_path: Path, capfd: pytest.CaptureFixture[str], ball: Path) -> None:
     shell, model = tmp_path / "shell.xml", tmp_path / "m.stl"
     shell.write_text(SHELL)

@@ -66,6 +66,21 @@ def test_a_bad_model_would_not_print(
     assert problem in capfd.readouterr().out
 
 
+@pytest.mark.parametrize("scale", ["100%", "150%", "100%,120%,80%"])
+def test_a_model_of_the_size_that_is_advised_fits(
+    scale: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    box((400, 20, 20)).export(tmp_path / "bar.stl")
+    command = ["check", str(tmp_path / "bar.stl"), "--layer", "5mm", "--pixel", "5mm", "--scale", scale, "-q"]
+    assert run([*command, "--fix"]) == 0
+    before, after = capfd.readouterr().out.split("with --size ")
+    size = after.split(":")[0]
+    assert f"; --size {size}" in before
+    assert run([*command, "--size", size]) == 0
+    figures = after.split(": ")[1].splitlines()[0]
+    assert figures in capfd.readouterr().out
+
+
 def test_a_good_model_would_print_and_an_open_one_has_no_layers(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -19,7 +19,7 @@ import pytest
 from fracslice.errors import ExportError
 from fracslice.export import archives
 from fracslice.export.jobs import SliceRun
-from fracslice.export.layer_files import ENDINGS, PRINTS, printers_file, slice_format, write_slices
+from fracslice.export.layer_files import ENDINGS, FORMATS, PRINTS, printers_file, slice_format, write_slices
 from fracslice.export.resins import Resin
 from fracslice.formulas import difference, menger, sphere
 from fracslice.jobs.stack_model import StackModel
@@ -165,6 +165,20 @@ def test_print_files_need_printer_and_resin(tmp_path: Path) -> None:
         for lacking in (replace(job, resin=None), replace(job, screen=Screen(job.stack))):
             with pytest.raises(ExportError, match="needs"):
                 write_slices(lacking, tmp_path / f"part.{name}")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["ctb", "cbddlp", "pwmx"])
+def test_pictures_beyond_offsets_of_32_bits(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A small limit stands for 4 GiB; `most` of these formats leaves room for 100,000 layers of tables."""
+    form = PRINTS[name]
+    assert form.most is not None and form.most + 100_000 * 300 < 2**32
+    monkeypatch.setitem(FORMATS, name, replace(form, most=5000))
+    with pytest.raises(ExportError, match=r"of 24 layers are larger than .* GiB: expected less") as error:
+        write_slices(run(), tmp_path / f"part.{name}")
+    assert len(str(error.value).splitlines()) == 1
     assert not list(tmp_path.iterdir())
 
 
