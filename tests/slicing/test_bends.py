@@ -60,6 +60,22 @@ def test_pixels_of_the_smallest_circles(radius: float, off: float) -> None:
     assert covered == pytest.approx(400 * np.pi * (radius * PIXEL) ** 2, rel=off)
 
 
+@pytest.mark.parametrize("moved", [(0.53, 0.53), (0.9, 0.4), (1.3, 0.2)])
+def test_thin_crescents(moved: tuple[float, float]) -> None:
+    """Around one sample in a strip thinner than a pixel, sides turn like a circle's: as arcs they would give
+    the pixel up to 0.21 of its area too much. The areas are those of 32 by 32 points in each pixel.
+    """
+    hole = transform(cylinder(radius=10.1, height=2), translate=(*moved, 0))
+    stack = stack_of(difference(cylinder(radius=11.3, height=2), hole), 22.6, 0.1)
+    coverage = next(Slicer(stack).map(lambda layer: layer.coverage, [len(stack.z) // 2]))
+    (x0, y0, side, _), (rows, columns) = stack.frame, stack.shape
+    x = x0 + side * (np.arange(32 * columns) + 0.5) / 32
+    y = y0 + side * (np.arange(32 * rows)[:, None] + 0.5) / 32
+    inside = (np.hypot(x, y) < 11.3) & (np.hypot(x - moved[0], y - moved[1]) > 10.1)
+    areas = inside.reshape(rows, 32, columns, 32).mean((1, 3))
+    assert (coverage / 255 - areas).max() < 0.05
+
+
 @pytest.mark.parametrize(("pixels", "layer"), [(24, 0.2), (100, 0.2), (256, 0.8)])
 def test_small_layers_of_a_ball(pixels: int, layer: float) -> None:
     """Of a radius of three pixels and more."""

@@ -85,24 +85,32 @@ double share_beyond(Vector a, Vector b, Vector tip, const Place& own, const Plac
 struct Bend {
     int32_t edge;
     double arc, corner;
+    bool sharp;  // around one sample in a strip thinner than a pixel, sides turn like a circle's: the field decides
     Vector tip{0, 0}, away{0, 0};  // where they meet, and as far from there as the field must change its sign
+    Vector crest{0, 0};  // halfway between the side and the arc
 
-    Bend(const Outline& outline, int32_t i) : edge(i), arc(0), corner(0) {
+    Bend(const Outline& outline, int32_t i) : edge(i), arc(0), corner(0), sharp(false) {
         const auto [before, after] = outline.sides(i);
         const double turn = det(before, after), most = dot(before, before) * dot(after, after);
         if (!(turn * turn > kStraight * kStraight * most)) return;
         const Vector a = outline.places[i], b = outline.places[outline.edges[i].following];
-        arc = bulge(before, b - a, after);
-        if (!(turn * turn > kSine * kSine * most)) return;
+        const Vector side = b - a;
+        arc = bulge(before, side, after);
+        sharp = turn * turn > kSine * kSine * most;
+        if (!sharp) return;
+        // An arc's height is 3/2 of its area over its side; outwards is to the right.
+        crest = 0.5 * (a + b) + 0.75 * arc / dot(side, side) * Vector{side.y, -side.x};
         const Place own = outline.pixel(i);
-        tip = a + det(b - a, after) / turn * before, away = unit(unit(before) - unit(after));
+        tip = a + det(side, after) / turn * before, away = unit(unit(before) - unit(after));
         if (std::abs(int(std::floor(tip.y)) - own.y) + std::abs(int(std::floor(tip.x)) - own.x) > 1) return;
-        corner = det(tip - a, b - a) / 2;
+        corner = det(tip - a, side) / 2;
         if (std::fabs(corner) < kLeast) corner = 0;
         // An arc is half as far from its chord as its tangents' corner is.
-        away = std::clamp(std::fabs(corner) / std::sqrt(dot(b - a, b - a)) / 2, kExact, kNear) * away;
+        away = std::clamp(std::fabs(corner) / std::sqrt(dot(side, side)) / 2, kExact, kNear) * away;
     }
-    bool matters() const { return corner != 0 || std::fabs(arc) >= kLeast; }
+    bool may_be_arc() const { return std::fabs(arc) >= kLeast; }
+    bool is_doubtful() const { return sharp && may_be_arc(); }
+    bool matters() const { return corner != 0 || may_be_arc(); }
 };
 
 }  // namespace
@@ -165,7 +173,7 @@ void Slab::project(const std::vector<Edge>& edges) {
 }
 
 // Corners within pixels: where the sides before and after meet, if the field changes its sign there. In the pixel that both
-// crossings belong to, or in one beside it. Other sides are arcs.
+// crossings belong to, or in one beside it. Other sides are arcs, where they turn sharply only if the field agrees.
 void Slab::sharpen() {
     const Outline outline(*this);
     std::vector<Bend> turns;
@@ -173,8 +181,9 @@ void Slab::sharpen() {
     for (int32_t i = 0; i < int32_t(outline.edges.size()); ++i) {
         const Bend turn(outline, i);
         if (turn.matters()) turns.push_back(turn);
-        if (turn.corner == 0) continue;
-        for (const Vector& spot : {turn.tip + turn.away, turn.tip - turn.away}) spots.push_back({spot.x, spot.y});
+        if (turn.corner != 0)
+            for (const Vector& spot : {turn.tip + turn.away, turn.tip - turn.away}) spots.push_back({spot.x, spot.y});
+        if (turn.is_doubtful()) spots.push_back({turn.crest.x, turn.crest.y});
     }
     const std::vector<float> f = values_at(spots);
     tips.resize(count());
@@ -183,8 +192,9 @@ void Slab::sharpen() {
         const Place own = outline.pixel(turn.edge), beside{int(std::floor(turn.tip.y)), int(std::floor(turn.tip.x)), kEmpty};
         const bool maybe = turn.corner != 0, is_corner = maybe && (f[n] < 0) != (f[n + 1] < 0);
         if (maybe) n += 2;
+        const bool is_arc = turn.is_doubtful() ? (f[n++] < 0) == (turn.arc > 0) : turn.may_be_arc();
         if (!is_corner) {
-            if (std::fabs(turn.arc) >= kLeast) put_tip(own.y, own.x, float(turn.arc));
+            if (is_arc) put_tip(own.y, own.x, float(turn.arc));
             continue;
         }
         const Vector a = outline.places[turn.edge], b = outline.places[outline.edges[turn.edge].following];
