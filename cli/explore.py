@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -47,7 +48,8 @@ def explore(given: ExploreOptions) -> None:
 
     The first picture is SCENE itself. In the others the numbers of its elements are changed at random within
     their ranges; materials, transforms, boxes and the view stay. Picture 7 of sheet.png is sheet/07.xml,
-    which is a SCENE to go on from. Nothing is written before all pictures are done.
+    which is a SCENE to go on from. Nothing is written before all pictures are done; the scenes of an earlier
+    sheet of the same name are then replaced.
 
     Examples
     --------
@@ -59,6 +61,8 @@ def explore(given: ExploreOptions) -> None:
     target, count = Path(given.output), given.count
     check_targets(given.source, given.output)
     check_folder(target.with_suffix(""))
+    if Path(given.source).resolve().parent == target.with_suffix("").resolve():
+        raise click.UsageError(f"{given.output}: its scenes replace {given.source}: expected another name")
     scene = load_scene(given.source, given.settings)
     scenes = [scene, *(varied(scene, (given.seed, k), given.spread) for k in range(1, count))]
     with given.working() as work:
@@ -90,6 +94,8 @@ def write(target: Path, scenes: Sequence[Scene], pictures: Sequence[np.ndarray])
     sheet = Image.new("RGB", (across * width, -(-len(pictures) // across) * height))
     draw, folder = ImageDraw.Draw(sheet), target.with_suffix("")
     folder.mkdir(exist_ok=True)
+    if target.exists():
+        remove_scenes(folder, len(scenes))
     for k, (scene, picture) in enumerate(zip(scenes, pictures, strict=True)):
         corner = k % across * width, k // across * height
         sheet.paste(Image.fromarray(picture), corner)
@@ -100,3 +106,12 @@ def write(target: Path, scenes: Sequence[Scene], pictures: Sequence[np.ndarray])
             file.write(to_xml(scene).encode())
     with replacing(target) as file:
         sheet.save(file, "PNG")
+
+
+def remove_scenes(folder: Path, first: int) -> None:
+    """Remove the scenes of an earlier, larger sheet, from a number on."""
+    for k in itertools.count(first):
+        path = folder / f"{k:02}.xml"
+        if not path.is_file():
+            return
+        path.unlink()

@@ -100,6 +100,17 @@ def commands(context: click.Context) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run one command and exit with its status."""
+    try:
+        prepare()
+        status = run(arguments)
+    except KeyboardInterrupt:
+        status = say(f"stopped; {NOTHING}", INTERRUPTED)
+    gc.freeze()
+    sys.exit(status)
+
+
+def prepare() -> None:
+    """Set threads, garbage collection and memory of this process."""
     from fracslice.common.memory import keep_freed_memory
 
     # The products of matrices here are small: threads of OpenBLAS would only take time to start.
@@ -107,9 +118,6 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     # Modules are no garbage: looking for it among them, at last at the exit, takes a fifth of a small job.
     gc.set_threshold(FEWEST)
     keep_freed_memory()
-    status = run(arguments)
-    gc.freeze()
-    sys.exit(status)
 
 
 def run(arguments: Sequence[str] | None = None) -> int:

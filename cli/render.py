@@ -39,7 +39,9 @@ class RenderOptions(ClusterOptions, SceneOptions):
         PIXELS, "Pixels across and down; the scene's by default, or 1280x720."
     )
     crop: tuple[int, int, int, int] | None = option(
-        PART, "Render only this part: left, top, width and height in pixels."
+        PART,
+        "Render only this part: left, top, width and height in pixels. Its pixels are those of the whole "
+        "picture, except in modes depth, distance and position, which show the range of the part.",
     )
     seed: int = option(Whole(0, 2**31 - 1), "Seed of the random samples; 0 by default.", default=0)
     layers: bool = flag("Add depth, normal, position, albedo and samples to the .exr file.")

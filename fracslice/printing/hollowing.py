@@ -73,13 +73,16 @@ def _drains(
 
 
 def _middle(points: np.ndarray, low: np.ndarray, voxel: float) -> tuple[list[float], float]:
-    """Of the lowest points, within half a voxel, the one nearest their middle, and the lowest value.
+    """Middle of the lowest points, within half a voxel, and the lowest value.
 
-    The floor of a box has no lowest point. A hole in its corner would cut the box's edge.
+    The floor of a box has no lowest point. A hole in its corner would cut the box's edge. A middle that is
+    farther than a voxel from all of them, as of a ring, is not over the floor: the nearest point then is.
     """
     floor = points[low <= low.min() + voxel / 2]
-    nearest = np.square(floor - floor.mean(axis=0)).sum(axis=1).argmin()
-    return floor[nearest].tolist(), float(low.min())
+    middle = floor.mean(axis=0)
+    away = np.square(floor - middle).sum(axis=1)
+    at = middle if away.min() <= voxel**2 else floor[away.argmin()]
+    return at.tolist(), float(low.min())
 
 
 def _cylinder(drain: Drain) -> Node:

@@ -87,5 +87,5 @@ def test_layers_end_with_them(tmp_path: Path, capfd: pytest.CaptureFixture[str])
     coarse = "--layer", "1mm", "--pixel", "0.5mm"
     assert printed(capfd, "slice", shell, "-o", tmp_path / "layers", *coarse, *hollow)[-2:] == [
         "3.86 ml, 4.24 g of resin (1.1 g/ml), 20 layers",
-        "drain holes of 4 mm leave the hollow at -0.1 -0.1 4.0 and -0.1 -0.1 16.0 mm",
+        "drain holes of 4 mm leave the hollow at 0.0 0.0 4.0 and 0.0 0.0 16.0 mm",
     ]

@@ -294,7 +294,9 @@ def listens(pid: int) -> bool:
     return bool(int(status["SigCgt"], 16) >> (signal.SIGTERM - 1) & 1)
 
 
-@pytest.mark.parametrize("module", ["click", "fracslice.cli.mesh", "fracslice.scene"])
+@pytest.mark.parametrize(
+    "module", ["click", "fracslice.common.memory", "fracslice.cli.mesh", "fracslice.scene"]
+)
 def test_a_signal_during_an_import_is_one_line(ball, tmp_path, module):
     code = f"""if True:
         import os, signal, sys

@@ -56,6 +56,23 @@ def test_a_seed_makes_the_same_sheet_whatever_the_count(source: Path) -> None:
     assert first == same != other
 
 
+def test_a_smaller_sheet_leaves_no_scene_of_a_larger_one(source: Path) -> None:
+    folder = explored(source, "sheet", "--count", "4").with_suffix("")
+    for name in ("mine.xml", "09.xml"):
+        (folder / name).write_text("mine")
+    explored(source, "sheet", "--count", "2")
+    assert sorted(path.name for path in folder.iterdir()) == ["00.xml", "01.xml", "09.xml", "mine.xml"]
+
+
+def test_a_sheet_does_not_replace_its_own_scene(source: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    sheet = explored(source, "sheet", "--count", "2")
+    scene = sheet.with_suffix("") / "01.xml"
+    before = scene.read_text()
+    assert run(["explore", str(scene), "-o", str(sheet)]) == 2
+    assert f"sheet.png: its scenes replace {scene}: expected another name" in capsys.readouterr().err
+    assert scene.read_text() == before
+
+
 def test_nothing_is_written_for_bad_input(source: Path, capsys: pytest.CaptureFixture[str]) -> None:
     before = sorted(source.parent.iterdir())
     target = str(source.parent / "sheet.png")

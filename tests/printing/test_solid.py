@@ -366,6 +366,14 @@ def test_each_large_part_of_a_hollow_is_drained() -> None:
         assert not solid(1.8 * x, 0, -1 + 3.5 * mm)
 
 
+def test_a_ball_is_drained_along_its_axis() -> None:
+    for resolution in (40, 41, 64):
+        drains = printable(plan(sphere(), resolution), Sizing(SIZE), Print(hollow=2, drain=3))[0].drains
+        assert len(drains) == 2
+        for drain in drains:
+            assert np.hypot(*drain.start[:2]) < 0.1 * 2 / resolution
+
+
 def test_a_flat_floor_is_drained_in_its_middle() -> None:
     solid, mm = holes(box(size=(2, 2, 2)))
     assert not solid(0, 0, 1 - mm) and not (solid(1 - mm, 0, 3.5 * mm - 1) and solid(mm - 1, 0, 3.5 * mm - 1))
