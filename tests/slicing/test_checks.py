@@ -216,7 +216,7 @@ def test_thin_walls_beside_thick_bodies(thin: Node) -> None:
 
 
 def test_memory_follows_the_outline_not_the_area() -> None:
-    """Of 36 million solid pixels each would take dozens of bytes; on one thread, the peak is always the same."""
+    """Of 36 million solid pixels each would take dozens of bytes. One thread has the same peak each time."""
     stack = plan_stack(CUBE, SliceJob(size=60, layer=30, pixel=(0.01, 0.01)))
     check_layers(plan_stack(CUBE, SliceJob(size=10, layer=5)))  # what is loaded once
     tracemalloc.start()
