@@ -16,7 +16,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 BLOCK = re.compile(r"^(?:<!-- not run: (?P<reason>[^\n]+) -->\n+)?```python\n(?P<code>.*?)^```$", re.M | re.S)
-REASONS = {"needs a GPU", "needs a window", "needs a cluster", "needs SLURM"}
+REASONS = {"needs a GPU", "needs a window", "needs a cluster", "needs SLURM", "needs Kubernetes"}
 SMALL = [
     (r"\bresolution=\d+", "resolution=16"),
     (r"\bsamples=\d+", "samples=1"),

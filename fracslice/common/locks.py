@@ -54,10 +54,11 @@ def locked_folder(folder: Path) -> Iterator[None]:
     ExportError
         If another process has locked it.
     """
-    if os.name != "posix":
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError:  # Windows opens no folders
         yield
         return
-    handle = os.open(folder, os.O_RDONLY)
     try:
         lock(handle, folder)
         yield
