@@ -38,7 +38,7 @@ def connected(where: str, store: str, threads: int = 1) -> Iterator[workers.Work
     where : str
         Address of a scheduler, such as "tcp://host:8786"; or "local" or "local:4" for processes here.
     store : str
-        Folder of the results, see `Pieces`.
+        Folder of the results, see `ResultFolder`.
     threads : int
         Threads of all local workers together.
 

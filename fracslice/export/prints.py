@@ -189,9 +189,8 @@ class PrintFormat(LayerFormat):
             name = printable(path.stem)
             job = PrintData(run, name, run.screen.printer, run.resin, journal, picture)
             self.assemble(job, file)
-            run.slicer.areas.update(
-                enumerate(job.areas.tolist())
-            )  # those of an earlier or another process, too
+            # Those of an earlier or another process, too.
+            run.slicer.areas.update(enumerate(job.areas.tolist()))
 
 
 def by_pixels(encoding: Encoding) -> Callable[[SliceRun, Layer], bytes]:

@@ -125,14 +125,6 @@ def finished(surface: SharedSurface, finish: Finish) -> tuple[SharedCheck, Itera
     return check, _files(surface, check)
 
 
-def finish_tasks(surface: SharedSurface) -> list[FinishTask]:
-    """Tasks that finish the pieces."""
-    return [
-        FinishTask(surface.recipe, surface.pool.pieces, surface.job, number)
-        for number in range(len(surface.pieces))
-    ]
-
-
 def _files(surface: SharedSurface, check: SharedCheck) -> Iterator[str]:
     late: list[tuple[int, NDArray[np.float64]]] = []
     for number, files in enumerate(surface.results(FinishTask, range(len(surface.pieces)), "finishing")):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -23,6 +24,8 @@ from .mesh_recipe import SAMPLES, MeshRecipe, samples_key
 from .mesh_summary import Summary, joined_summary
 from .mesh_tasks import HALO, ContourTask, JoinTask, MeshTask, NestTask, cuts
 from .surfaces import Surface
+
+T = TypeVar("T", bound=MeshTask)
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +48,10 @@ class SharedSurface(Surface):
     pool: Pool
     job: str
     clock: Clock
+
+    def tasks(self, kind: type[T], numbers: Iterable[int]) -> list[T]:
+        """Tasks of a kind for some pieces."""
+        return [kind(self.recipe, self.pool.pieces, self.job, number) for number in numbers]
 
     def results(self, kind: type[MeshTask], numbers: Iterable[int], stage: str) -> Iterator[Files]:
         """Results of tasks, in order.

@@ -17,8 +17,8 @@ from ..mesh.model import Mesh
 from ..work import Work
 from .finished_pieces import joined_pieces, piece_rows, read_finished
 from .finishing import Finish
-from .mesh_tasks import MeshTask, finished_file
-from .shared_finishing import SharedCheck, finish_tasks, finished
+from .mesh_tasks import FinishTask, MeshTask, finished_file
+from .shared_finishing import SharedCheck, finished
 from .shared_mesh import SharedSurface, leave_to_the_first
 from .shared_packing import model_rows
 
@@ -87,7 +87,7 @@ def placed(surface: SharedSurface, rows: list[int], about: dict[str, str]) -> st
     head = np.frombuffer(stl.header(total, about), np.uint8)
     pool.pieces.write(job, PLACES, packed(starts=np.cumsum([0, *rows]), header=head))
     count = max(-(-(total - FIRST) // ROWS), 1)
-    tasks = [PlaceTask(surface.recipe, pool.pieces, job, number) for number in range(count)]
+    tasks = surface.tasks(PlaceTask, range(count))
     leave_to_the_first(surface, tasks)
     for _ in pool.make(tasks, surface.clock.work, "writing"):
         pass
@@ -134,7 +134,7 @@ def write_shared(
             pass
         linked(placed(surface, check.rows, about), path)
     else:
-        leave_to_the_first(surface, finish_tasks(surface))
+        leave_to_the_first(surface, surface.tasks(FinishTask, range(len(surface.pieces))))
         if ending != ".stl":
             mesh = joined_pieces(meshes)
         if path:

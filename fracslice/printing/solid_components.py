@@ -225,7 +225,7 @@ class SolidComponents:
 
 
 def thin_share(signs: SignBricks) -> float:
-    """Share of the material in bodies whose mean thickness is below a voxel; see `Components.thin_share`.
+    """Share of the material in bodies whose mean thickness is below a voxel: `SolidComponents.thin_share`.
 
     Parameters
     ----------
