@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -193,20 +193,13 @@ def check_solid(
     if fine is not bricks:
         result = _volumes(fine, speck)
     bodies, cavities = ([v * scale**3 for v in volumes] for volumes in result)
-    middle = np.array(origin or (*Samples(bricks).bounds.box.centre[:2], bricks.origin[2]))
-    problems = []
-    if len(bodies) > 1:
-        problems.append(loose(len(bodies)))
-    if cavities:
-        sealed = counted(len(cavities), "sealed cavity", "sealed cavities")
-        problems.append(Problem("cavities", f"{sealed} of {significant(sum(cavities))} mm3", mend=FILL))
-    for kind, under, limit in (("walls", narrow, limits.wall), ("floors", bare, limits.floor)):
-        if (area := float(under.area.sum()) * scale**2) >= limits.thin:
-            text = f"{significant(area)} mm2 of {kind} are thinner than {limit:g} mm"
-            x, y, z = (scale * (under.middle[under.width.argmin()] - middle)).tolist()
-            thickness = max(limit, THICKEN * scale * max(Samples(bricks).bounds.box.size))
-            mend = (("thickness", f"{thickness:.2g}mm"),)
-            problems.append(Problem(kind, text, at=(x, y, z), mend=mend))
+    middle = np.array(origin or (*solid.bounds.box.centre[:2], bricks.origin[2]))
+    thickening = THICKEN * scale * max(solid.bounds.box.size)
+    problems = [
+        *_problems_of_components(bodies, cavities),
+        *_too_thin("walls", narrow, limits.wall, limits.thin, thickening, scale, middle),
+        *_too_thin("floors", bare, limits.floor, limits.thin, thickening, scale, middle),
+    ]
     unseen = _unseen(thick, finest or bricks.voxel * scale, limits.thin, scale)
     return SolidReport(
         voxel=bricks.voxel * scale,
@@ -220,6 +213,31 @@ def check_solid(
         unseen=unseen,
         problems=problems,
     )
+
+
+def _problems_of_components(bodies: Sequence[float], cavities: Sequence[float]) -> Iterator[Problem]:
+    """Problems of the bodies and cavities of these volumes, mm3."""
+    if len(bodies) > 1:
+        yield loose(len(bodies))
+    if cavities:
+        sealed = counted(len(cavities), "sealed cavity", "sealed cavities")
+        yield Problem("cavities", f"{sealed} of {significant(sum(cavities))} mm3", mend=FILL)
+
+
+def _too_thin(
+    kind: str, under: Walls, limit: float, least: float, thickening: float, scale: float, middle: np.ndarray
+) -> Iterator[Problem]:
+    """Problem of walls or floors below a limit in mm, if their area is at least `least` mm2.
+
+    thickening: minimum thickness that mends them, mm; middle: point from which the place is measured.
+    """
+    area = float(under.area.sum()) * scale**2
+    if area < least:
+        return
+    text = f"{significant(area)} mm2 of {kind} are thinner than {limit:g} mm"
+    x, y, z = (scale * (under.middle[under.width.argmin()] - middle)).tolist()
+    mend = (("thickness", f"{max(limit, thickening):.2g}mm"),)
+    yield Problem(kind, text, at=(x, y, z), mend=mend)
 
 
 def _widths(walls: Walls, scale: float) -> Widths | None:
