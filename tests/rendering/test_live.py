@@ -83,7 +83,8 @@ def test_it_sharpens_and_follows_the_pilot(live: Live) -> None:
 
 
 def test_a_moving_picture_is_a_draft_without_noise(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path.write_text(SCENE.format('<box size="9 9 1"/>').replace("3 -2 1", "3 -2 4"))
+    scene = SCENE.format('<box size="9 9 1"/>').replace("3 -2 1", "3 -2 4")
+    path.write_text(scene.replace('samples="4"', 'samples="1000000"'))
     monkeypatch.setattr("fracslice.rendering.live.READABLE", 1e9)  # nothing but drafts
     live = Live(path, size=(48, 32), work=Work(threads=1), device="cpu")
     try:
