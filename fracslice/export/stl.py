@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from typing import BinaryIO
@@ -9,6 +10,7 @@ from typing import BinaryIO
 from ..background import ahead
 from ..errors import ExportError
 from ..mesh.model import Mesh
+from ..work import Work
 
 HEADER, TRIANGLE = 84, 50
 """Bytes before the first triangle, and of a triangle."""
@@ -36,11 +38,29 @@ def write_pieces(meshes: Iterable[Mesh], file: BinaryIO, metadata: Mapping[str, 
     for mesh in meshes:
         count += len(mesh.triangles)
         head = header(count, metadata)
-        for block in ahead(blocks(mesh)):
-            file.write(block)
+        _append(mesh, file)
     file.seek(start)
     file.write(head)
     file.seek(0, os.SEEK_END)
+
+
+def _append(mesh: Mesh, file: BinaryIO) -> None:
+    """Write triangles; each thread puts the blocks that it encodes in their places, if the system can."""
+    if not (isinstance(file, io.BufferedWriter) and hasattr(os, "pwrite")):
+        for block in ahead(blocks(mesh)):
+            file.write(block)
+        return
+    file.flush()
+    start = file.tell()
+
+    def put(begin: int) -> None:
+        block, place = _encoded(mesh, begin, 1), start + TRIANGLE * begin
+        while block:
+            written = os.pwrite(file.fileno(), block, place)
+            block, place = block[written:], place + written
+
+    Work().map(put, range(0, len(mesh.triangles), BLOCK))
+    file.seek(start + TRIANGLE * len(mesh.triangles))
 
 
 def header(count: int, metadata: Mapping[str, str]) -> bytes:
@@ -84,7 +104,13 @@ def blocks(mesh: Mesh, threads: int = 0) -> Iterator[memoryview]:
     memoryview
         Triangles of 50 bytes.
     """
+    for begin in range(0, len(mesh.triangles), BLOCK):
+        yield _encoded(mesh, begin, threads)
+
+
+def _encoded(mesh: Mesh, begin: int, threads: int) -> memoryview:
+    """Encode the block of triangles from number `begin` on."""
     from .._native import stl
 
-    for begin in range(0, len(mesh.triangles), BLOCK):
-        yield stl(mesh.vertices, mesh.triangles[begin : begin + BLOCK], threads).data
+    encoded: memoryview = stl(mesh.vertices, mesh.triangles[begin : begin + BLOCK], threads).data
+    return encoded.cast("B")
