@@ -1,7 +1,10 @@
 #include "components.h"
 
+#include <tbb/enumerable_thread_specific.h>
+
 #include <cassert>
 #include <cmath>
+#include <utility>
 
 #include "blocks.h"
 #include "vec3.h"
@@ -42,15 +45,15 @@ class Forest {
 
 Vec3 at(const double* p) { return {p[0], p[1], p[2]}; }
 
-// Of consecutive triangles of a component.
-struct Run {
+// Of the triangles of a component in a block.
+struct Sum {
     int32_t label;
     double volume = 0, area = 0;
     Vec3 vector{0, 0, 0};
     int64_t flat = 0;
 };
 
-// Of consecutive vertices of a component: those farthest out.
+// Of the vertices of a component in a block: those farthest out.
 struct Reach {
     int32_t label;
     std::array<int32_t, 6> vertex{-1, -1, -1, -1, -1, -1};
@@ -62,21 +65,56 @@ struct Reach {
     }
 };
 
+// The parts of one block after another, one for each of its components.
+template <class Part>
+class ByComponent {
+  public:
+    explicit ByComponent(size_t count) : place_(count, kNone) {}
+
+    Part& of(int32_t label) {
+        size_t& place = place_[size_t(label)];
+        if (place == kNone) {
+            place = parts_.size();
+            parts_.push_back({label});
+        }
+        return parts_[place];
+    }
+
+    std::vector<Part> taken() {
+        for (const Part& part : parts_) place_[size_t(part.label)] = kNone;
+        return std::exchange(parts_, {});
+    }
+
+  private:
+    static constexpr size_t kNone = size_t(-1);
+    std::vector<size_t> place_;
+    std::vector<Part> parts_;
+};
+
+// The parts of all blocks of `size` things; add(parts, first, last) adds a block's.
+template <class Part, class Do>
+std::vector<std::vector<Part>> by_component(size_t size, size_t count, const Do& add) {
+    tbb::enumerable_thread_specific<ByComponent<Part>> parts(count);
+    return in_blocks<std::vector<Part>>(size, [&](size_t first, size_t last) {
+        add(parts.local(), first, last);
+        return parts.local().taken();
+    });
+}
+
 std::vector<Reach> reaches(const MeshView& mesh, std::span<const int32_t> labels, size_t count) {
     std::vector<Reach> all(count);
-    for (const auto& part : in_blocks<std::vector<Reach>>(mesh.vertices, [&](size_t first, size_t last) {
-             std::vector<Reach> result;
-             for (size_t v = first; v < last; ++v) {
-                 if (labels[v] < 0) continue;
-                 if (result.empty() || result.back().label != labels[v]) result.push_back({labels[v]});
-                 const double* p = mesh.point(int32_t(v));
-                 for (size_t k = 0; k < 3; ++k) result.back().add(k, p[k], int32_t(v), p[k], int32_t(v));
-             }
-             return result;
-         })) {
-        for (const Reach& result : part) {
-            Reach& to = all[size_t(result.label)];
-            for (size_t k = 0; k < 3; ++k) to.add(k, result.low[k], result.vertex[k], result.high[k], result.vertex[k + 3]);
+    auto add = [&](ByComponent<Reach>& parts, size_t first, size_t last) {
+        for (size_t v = first; v < last; ++v) {
+            if (labels[v] < 0) continue;
+            Reach& reach = parts.of(labels[v]);
+            const double* p = mesh.point(int32_t(v));
+            for (size_t k = 0; k < 3; ++k) reach.add(k, p[k], int32_t(v), p[k], int32_t(v));
+        }
+    };
+    for (const auto& block : by_component<Reach>(mesh.vertices, count, add)) {
+        for (const Reach& part : block) {
+            Reach& to = all[size_t(part.label)];
+            for (size_t k = 0; k < 3; ++k) to.add(k, part.low[k], part.vertex[k], part.high[k], part.vertex[k + 3]);
         }
     }
     return all;
@@ -111,31 +149,24 @@ Components connected_components(const Triangles& triangles) {
 Sizes component_sizes(const MeshView& mesh, std::span<const int32_t> labels, size_t count) {
     assert(labels.size() == mesh.vertices);
     std::vector<Reach> reach = reaches(mesh, labels, count);
-    auto parts = in_blocks<std::vector<Run>>(mesh.count, [&](size_t first, size_t last) {
-        std::vector<Run> runs;
-        Vec3 o{};
+    auto add = [&](ByComponent<Sum>& parts, size_t first, size_t last) {
         for (size_t t = first; t < last; ++t) {
-            int32_t label = labels[size_t(mesh[t][0])];
-            if (runs.empty() || label != runs.back().label) {
-                runs.push_back({label});
-                o = at(mesh.point(reach[size_t(label)].vertex[0]));
-            }
+            Sum& sum = parts.of(labels[size_t(mesh[t][0])]);
             Vec3 a = at(mesh.corner(t, 0)), b = at(mesh.corner(t, 1)), c = at(mesh.corner(t, 2));
             Vec3 normal = cross(b - a, c - a);
-            runs.back().volume += dot(normal, a - o);
+            sum.volume += dot(normal, a - at(mesh.point(reach[size_t(sum.label)].vertex[0])));
             double size = std::sqrt(dot(normal, normal));
-            runs.back().area += size;
-            runs.back().flat += size == 0;
-            runs.back().vector = runs.back().vector + normal;
+            sum.area += size;
+            sum.flat += size == 0;
+            sum.vector = sum.vector + normal;
         }
-        return runs;
-    });
-    std::vector<Run> sums(count);
-    for (const std::vector<Run>& runs : parts) {
-        for (const Run& run : runs) {
-            Run& sum = sums[size_t(run.label)];
-            sum.volume += run.volume, sum.area += run.area, sum.vector = sum.vector + run.vector;
-            sum.flat += run.flat;
+    };
+    std::vector<Sum> sums(count);
+    for (const auto& block : by_component<Sum>(mesh.count, count, add)) {
+        for (const Sum& part : block) {
+            Sum& sum = sums[size_t(part.label)];
+            sum.volume += part.volume, sum.area += part.area, sum.vector = sum.vector + part.vector;
+            sum.flat += part.flat;
         }
     }
     Sizes sizes{{count, 1}, {count, 1}, {count, 3}, {count, 6}, {count, 1}};
