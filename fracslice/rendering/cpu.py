@@ -19,9 +19,7 @@ from .sequence import SampleRange
 TILE = 2048
 """Maximum rays per tile; their workspace stays in the cache."""
 LEAST, TILES, RAYS = 128, 8, 1 << 14
-"""Minimum pixels per tile, tiles per thread in a pass over few pixels, and maximum rays per tile."""
-CONES = 512
-"""Maximum cones per task; the workspace holds `TILE` of them."""
+"""Minimum pixels or cones per tile, tiles per thread for few of them, and maximum rays per tile."""
 STEPS = {"float32": 1600, "float64": 10_000}
 """Maximum steps of a ray, which then hits. At the magnification that needs float64, one in ten takes more
 than 1600; in float32 those that do creep along a surface, and a packet waits for them.
@@ -95,7 +93,7 @@ class CpuTracer:
             arrays = self._parameters, starts, self._starts, own, *self._workspace
             cones(*arrays, len(own), m, shift, blocks, *coarser, self.steps)
 
-        work.map(task, chunks(len(ids), min(CONES, TILE)))
+        work.map(task, chunks(len(ids), _tile(len(ids), work.threads)))
         self._shift, self._blocks, self._starts = shift, blocks, starts
 
     def add(self, sums: np.ndarray, plan: PassPlan, work: Work) -> None:
@@ -120,8 +118,7 @@ class CpuTracer:
             arrays = self._parameters, self._points, self._starts, *self._workspace, pixels, sums
             self._tile(*arrays, len(pixels), self.width, self.steps, self._shift, self._blocks)
 
-        share = -(-len(plan.pixels) // (TILES * work.threads)) if work.threads > 1 else TILE
-        tile = min(max(min(share, RAYS // plan.last), LEAST), TILE)
+        tile = min(_tile(len(plan.pixels), work.threads), max(RAYS // plan.last, LEAST))
         work.map(task, chunks(len(plan.pixels), tile))
 
     @property
@@ -133,3 +130,9 @@ class CpuTracer:
             self._own.space = rows, lanes, np.zeros(self.lanes, np.int32)
         space: tuple[np.ndarray, ...] = self._own.space
         return space
+
+
+def _tile(count: int, threads: int) -> int:
+    """Pixels or cones per tile, of `count`."""
+    share = -(-count // (TILES * threads)) if threads > 1 else TILE
+    return min(max(share, LEAST), TILE)
