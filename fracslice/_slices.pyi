@@ -4,7 +4,7 @@ images. Call `fracslice.slicing` instead.
 Long calls release the GIL.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from enum import Enum
 
 from numpy import float32, float64, int32, uint8
@@ -150,7 +150,7 @@ class Slab:
         levels: bytes,
         encoding: Encoding,
     ) -> tuple[bytes, float, int]:
-        """Coverage of a layer as shown on a screen, encoded; see `fracslice.slicing.layers.ScreenView`.
+        """Coverage of a layer as shown on a screen, encoded; see `fracslice.slicing.slab.ScreenView`.
 
         Parameters
         ----------
@@ -171,6 +171,33 @@ class Slab:
             Encoded picture.
         area, cut
             As from `paint`.
+        """
+
+    def pictures(
+        self,
+        layers: Sequence[int],
+        pixels: tuple[int, int],
+        transposed: bool,
+        backwards: bool,
+        at: tuple[int, int],
+        shape: tuple[int, int],
+        levels: bytes,
+        encoding: Encoding,
+    ) -> list[tuple[int, tuple[bytes, float, int]]]:
+        """Sample layers and encode their pictures, without the interpreter between them.
+
+        Parameters
+        ----------
+        layers : sequence of int
+            Layers of the slab.
+        pixels, transposed, backwards, at, shape, levels, encoding
+            As for `picture`.
+
+        Returns
+        -------
+        list of tuple
+            Evaluations of the field for a layer, and what `picture` returns, of the first layers: as many as
+            take 20 ms, at least one. Raises BorderError.
         """
 
     def crossings(self, layer: int) -> tuple[NDArray[int32], NDArray[float64]]:

@@ -11,7 +11,7 @@ from itertools import accumulate
 from typing import BinaryIO
 
 from .._slices import Encoding
-from .prints import ADDRESSED, PrintData, PrintFormat, by_pixels, rgb565
+from .prints import ADDRESSED, PrintData, pixel_format, rgb565
 
 PREVIEW = 224, 168
 """Width and height of the preview, pixels."""
@@ -97,4 +97,4 @@ def _machine(job: PrintData) -> bytes:
     return _section("MACHINE", contents, 16)
 
 
-FORMAT = PrintFormat("pwmx", by_pixels(Encoding.RLE4), _assemble, most=ADDRESSED)
+FORMAT = pixel_format("pwmx", Encoding.RLE4, _assemble, ADDRESSED)

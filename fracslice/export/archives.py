@@ -12,6 +12,7 @@ from typing import BinaryIO
 
 from isal.isal_zlib import crc32
 
+from .._slices import Encoding
 from ..errors import ExportError
 from ..version import __version__
 from . import png
@@ -241,6 +242,6 @@ def _profile(job: PrintData) -> dict[str, object]:
 
 
 FORMATS = (
-    Sl1Format("sl1", png.encode_layer, _assemble_sl1),
-    ArchiveFormat("nanodlp", png.encode_layer, _assemble_nanodlp),
+    Sl1Format("sl1", png.encode_layer, _assemble_sl1, encoding=Encoding.PNG),
+    ArchiveFormat("nanodlp", png.encode_layer, _assemble_nanodlp, encoding=Encoding.PNG),
 )

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from .._slices import Encoding
 from ..slicing import Layer
 from .jobs import SliceRun
-from .prints import ADDRESSED, PrintData, PrintFormat, by_pixels, rgb565
+from .prints import ADDRESSED, PrintData, PrintFormat, pixel_format, rgb565
 
 CTB, CBDDLP = 0x12FD0086, 0x12FD0019
 LEVELS = 4
@@ -140,6 +140,6 @@ def _preview(picture: NDArray[np.uint8]) -> bytes:
 
 
 FORMATS = (
-    PrintFormat("ctb", by_pixels(Encoding.RLE7), _assemble_ctb, most=ADDRESSED),
+    pixel_format("ctb", Encoding.RLE7, _assemble_ctb, ADDRESSED),
     PrintFormat("cbddlp", _level_sets, _assemble_cbddlp, most=ADDRESSED),
 )

@@ -10,7 +10,7 @@ from typing import BinaryIO
 
 from .._slices import Encoding
 from ..version import __version__
-from .prints import PrintData, PrintFormat, by_pixels, rgb565
+from .prints import PrintData, pixel_format, rgb565
 
 MAGIC = b"\x07\0\0\0DLP\0"
 DELIMITER = b"\r\n"
@@ -71,4 +71,4 @@ def _layer(job: PrintData, index: int, size: int) -> bytes:
     )
 
 
-FORMAT = PrintFormat("goo", by_pixels(Encoding.GOO), _assemble)
+FORMAT = pixel_format("goo", Encoding.GOO, _assemble)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from .._slices import Encoding
 from ..common.files import check_target
 from ..errors import ExportError
 from ..slicing.printers import Printer
@@ -14,7 +15,13 @@ from .layerformats import FolderFormat, LayerFormat
 PRINTS = {form.name: form for form in (*archives.FORMATS, goo.FORMAT, *chitu.FORMATS, anycubic.FORMAT)}
 """Formats of printers; they need a printer and a resin."""
 
-PNG = FolderFormat("png", png.encode_layer, png.is_whole, lambda run: {"manifest.json": run.describe()})
+PNG = FolderFormat(
+    "png",
+    png.encode_layer,
+    png.is_whole,
+    lambda run: {"manifest.json": run.describe()},
+    encoding=Encoding.PNG,
+)
 FORMATS: dict[str, LayerFormat] = {
     "png": PNG,
     **PRINTS,

@@ -10,9 +10,11 @@ from functools import partial
 from pathlib import Path
 from typing import BinaryIO
 
+from .._slices import Encoding
 from ..common.files import put, replacing
 from ..errors import ExportError
 from ..slicing import Layer
+from ..slicing.slab import Pictures
 from .jobs import SliceRun
 from .ranges import Encode, begin, encoded_layers
 from .resuming import Journal, journal, resumable_folder
@@ -28,13 +30,20 @@ class LayerFormat(ABC):
         Name of the format.
     encode : callable
         Encodes a layer of a run.
+    encoding : Encoding or None
+        Encoding of the picture that `encode` asks for; None if it reads a layer in another way.
     most : int or None
         Maximum size of the encoded layers, bytes; None for no limit.
     """
 
     name: str
     encode: Callable[[SliceRun, Layer], bytes]
+    encoding: Encoding | None = field(default=None, kw_only=True)
     most: int | None = field(default=None, kw_only=True)
+
+    def pictures(self, run: SliceRun) -> Pictures | None:
+        """Pictures of a run for `Slicer.map` to make; None if it cannot."""
+        return None if self.encoding is None else run.screen.pictures(self.encoding)
 
     def encoder(self, run: SliceRun) -> Encode:
         """Return the function that encodes the layers of a run.
@@ -100,7 +109,7 @@ class LayerFormat(ABC):
         """
         encode = self.encoder_for(run, path)
         with journal(path, run.key(self.name)) as layers:
-            for data in encoded_layers(run, self.name, encode, layers.count):
+            for data in encoded_layers(run, self.name, encode, layers.count, self.pictures(run)):
                 if self.most is not None and layers.size + len(data) > self.most:
                     break  # the journal is removed: the job cannot be resumed
                 layers.append(data)
@@ -156,7 +165,7 @@ class FolderFormat(LayerFormat):
                 put(f"{path}/{name(layer.index)}", encode(layer))
 
             if run.work.cluster is None:
-                for _ in run.slicer.map(make, range(start, run.layers)):
+                for _ in run.slicer.map(make, range(start, run.layers), self.pictures(run)):
                     pass
             else:
                 for index, data in enumerate(encoded_layers(run, self.name, encode, start), start):

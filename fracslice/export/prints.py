@@ -193,15 +193,23 @@ class PrintFormat(LayerFormat):
             run.slicer.areas.update(enumerate(job.areas.tolist()))
 
 
-def by_pixels(encoding: Encoding) -> Callable[[SliceRun, Layer], bytes]:
-    """Return the function that encodes the picture of a layer of a run.
+def pixel_format(
+    name: str, encoding: Encoding, assemble: Callable[[PrintData, BinaryIO], None], most: int | None = None
+) -> PrintFormat:
+    """Return the format of a printer's file whose layers are encoded pictures.
 
-    Returns
-    -------
-    callable
-        `PrintFormat.encode`.
+    Parameters
+    ----------
+    name, assemble, most
+        As for `PrintFormat`.
+    encoding : Encoding
+        Encoding of the pictures.
     """
-    return lambda run, layer: run.screen.encoded(layer, encoding)
+
+    def encode(run: SliceRun, layer: Layer) -> bytes:
+        return run.screen.encoded(layer, encoding)
+
+    return PrintFormat(name, encode, assemble, encoding=encoding, most=most)
 
 
 def rgb565(picture: NDArray[np.uint8]) -> NDArray[np.uint16]:

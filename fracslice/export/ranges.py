@@ -13,6 +13,7 @@ from ..common.digits import counted
 from ..errors import ClusterError, ExportError, SharedError
 from ..slicing import Layer
 from ..slicing.layers import SLAB
+from ..slicing.slab import Pictures
 from ..work import Work
 from .resuming import Journal
 
@@ -162,7 +163,9 @@ def begin(run: SliceRun, form: str) -> None:
         raise SharedError(f"this shard made {counted(count, 'range')} of layers; shard 1 writes the file")
 
 
-def encoded_layers(run: SliceRun, form: str, encode: Encode, start: int) -> Iterator[bytes]:
+def encoded_layers(
+    run: SliceRun, form: str, encode: Encode, start: int, pictures: Pictures | None = None
+) -> Iterator[bytes]:
     """Encoded layers of a run in order, made by threads here or by the pool of its work.
 
     Parameters
@@ -175,10 +178,12 @@ def encoded_layers(run: SliceRun, form: str, encode: Encode, start: int) -> Iter
         Encodes a layer.
     start : int
         First layer.
+    pictures : Pictures, optional
+        As for `Slicer.map`.
     """
     pool = run.work.cluster
     if pool is None:
-        yield from run.slicer.map(encode, range(start, run.layers))
+        yield from run.slicer.map(encode, range(start, run.layers), pictures)
         return
     job = run.key(form)
     tasks = RangeTask.all(run, job, start)

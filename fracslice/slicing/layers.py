@@ -14,7 +14,7 @@ from .._slices import Encoding, Slab
 from ..kernel import Kernel
 from ..work import Work
 from .contours import Contours, contours
-from .slab import Sampler
+from .slab import Encoded, Pictures, Sampler, ScreenView
 from .stack import Stack
 
 if TYPE_CHECKING:
@@ -25,31 +25,6 @@ SLAB = 8
 
 
 T = TypeVar("T")
-
-
-@dataclass(frozen=True)
-class ScreenView:
-    """How a screen shows a layer, its back up.
-
-    Attributes
-    ----------
-    shape : tuple of int
-        Rows and columns of the picture.
-    transposed : bool
-        Rows of the picture run along y of the layer.
-    backwards : bool
-        Columns run from right to left.
-    at : tuple of int
-        Row and column of the layer's first pixel on the screen, seen from above, the first row in front.
-    levels : bytes
-        Grey level for each coverage, 256 bytes, the first 0, the last 255.
-    """
-
-    shape: tuple[int, int]
-    transposed: bool
-    backwards: bool
-    at: tuple[int, int]
-    levels: bytes
 
 
 @dataclass(eq=False)
@@ -72,6 +47,8 @@ class Layer:
         float64 kernel of the field.
     mean : (uint8 [ny, nx], float) or None
         Mean coverage and area of several sections, in place of those of the one sampled, pixels and mm^2.
+    picture : Encoded or None
+        Picture that was made when the layer was sampled; nothing else can be read then.
     """
 
     stack: Stack
@@ -81,6 +58,7 @@ class Layer:
     place: int
     exact: Kernel
     mean: tuple[np.ndarray, float] | None = None
+    picture: Encoded | None = None
 
     @property
     def top(self) -> float:
@@ -107,8 +85,7 @@ class Layer:
         bytes
             Encoded picture.
         """
-        how = view.shape, view.transposed, view.backwards, view.at, self.stack.shape, view.levels
-        data, area, cut = self.slab.picture(self.place, *how, encoding)
+        data, area, cut = self.picture or self.slab.picture(self.place, *view, encoding)
         self._painted = area, cut
         return data
 
@@ -184,7 +161,12 @@ class Slicer:
     work: Work = field(default_factory=Work)
     areas: dict[int, float] = field(default_factory=dict, init=False)
 
-    def map(self, make: Callable[[Layer], T], layers: Sequence[int] | None = None) -> Iterator[T]:
+    def map(
+        self,
+        make: Callable[[Layer], T],
+        layers: Sequence[int] | None = None,
+        pictures: Pictures | None = None,
+    ) -> Iterator[T]:
         """Yield ``make(layer)`` for every layer, or for chosen ones.
 
         At most a few slabs are in memory at a time. Results do not depend on the number of threads.
@@ -196,6 +178,9 @@ class Slicer:
             Runs in worker threads, and reads the layer before it returns.
         layers : sequence of int, optional
             Numbers of the layers, ascending; all if not given.
+        pictures : Pictures, optional
+            The pictures that `make` reads, if it reads nothing else. They are made several at a time, because
+            threads that need the interpreter after each layer wait for each other.
 
         Returns
         -------
@@ -216,21 +201,32 @@ class Slicer:
         chosen = range(len(self.stack.z)) if layers is None else layers
 
         def slab(group: list[int]) -> list[T]:
-            self.work.check()
-            first = group[0] // SLAB * SLAB
-            result, made = sampler.slab(self.stack.z[first : first + SLAB]), []
-            for index in group:
-                self.work.check()
-                before = result.evaluations
-                sampler.sample(result, index - first)
-                spent = result.evaluations - before
-                layer = Layer(self.stack, index, spent, result, index - first, exact)
+            made = []
+            for layer in self._sampled(sampler, group, exact, pictures):
                 made.append(make(layer))
                 if (area := layer.known_area) is not None:
-                    self.areas[index] = area
+                    self.areas[layer.index] = area
             return made
 
         groups = [list(g) for _, g in groupby(chosen, lambda index: index // SLAB)]
         for done, made in enumerate(self.work.ordered(slab, groups), 1):
             yield from made
             self.work.progress("slicing", done / len(groups))
+
+    def _sampled(
+        self, sampler: Sampler, group: list[int], exact: Kernel, pictures: Pictures | None
+    ) -> Iterator[Layer]:
+        """Layers of one slab; each is to be read before the next."""
+        first = group[0] // SLAB * SLAB
+        slab = sampler.slab(self.stack.z[first : first + SLAB])
+        while group:
+            self.work.check()
+            places = [index - first for index in group]
+            sampled: Sequence[tuple[int, Encoded | None]]
+            if pictures is None:
+                sampled = [(sampler.sample(slab, places[0]), None)]
+            else:
+                sampled = sampler.pictures(slab, places, pictures)
+            for index, (spent, picture) in zip(group, sampled, strict=False):
+                yield Layer(self.stack, index, spent, slab, index - first, exact, picture=picture)
+            group = group[len(sampled) :]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -13,8 +13,9 @@ from ..errors import SliceError
 from ..formulas.parameters import Count, Number
 from ..formulas.records import attribute, validate
 from ..scene.lengths import Shift
-from .layers import Layer, ScreenView
+from .layers import Layer
 from .printers import Printer
+from .slab import Pictures, ScreenView
 from .stack import Stack
 
 
@@ -117,13 +118,22 @@ class Screen:
         shown : uint8 [256], optional
             Level for each grey level of the picture, the first 0, the last 255.
         """
-        if self.compensation or self.blur or layer.mean is not None:
+        if not self._is_direct or layer.mean is not None:
             image = self.picture(layer)
             return encoded(image if shown is None else shown[image], encoding)
         view = self._view
         if shown is not None:
-            view = replace(view, levels=shown[self._levels].tobytes())
+            view = view._replace(levels=shown[self._levels].tobytes())
         return layer.encoded(view, encoding)
+
+    def pictures(self, encoding: Encoding) -> Pictures | None:
+        """Pictures for `Slicer.map` to make; None if they are not made of the samples alone."""
+        return (self._view, encoding) if self._is_direct else None
+
+    @property
+    def _is_direct(self) -> bool:
+        """True if a pixel depends on the coverage of one pixel."""
+        return not (self.compensation or self.blur)
 
     @cached_property
     def _margin(self) -> tuple[int, int]:
@@ -143,7 +153,9 @@ class Screen:
         mine = self._place
         at = [on.start - of.start for on, of in zip(mine.on_bed, mine.of_layer, strict=True)]
         backwards = self.mirrored != self._portrait
-        return ScreenView(self.shape, self._portrait, backwards, (at[0], at[1]), self._levels.tobytes())
+        place = at[0], at[1]
+        levels = self._levels.tobytes()
+        return ScreenView(self.shape, self._portrait, backwards, place, self.stack.shape, levels)
 
     @cached_property
     def _levels(self) -> np.ndarray:

@@ -21,9 +21,13 @@ dropped by `MIXED` of the bound.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import NamedTuple
+
 import numpy as np
 
-from .._slices import BorderError, Memory, ProbeBounds, Slab
+from .._slices import BorderError, Encoding, Memory, ProbeBounds, Slab
 from ..errors import SliceError
 from ..formulas.field import Bounds
 from ..kernel import Field, Kernel
@@ -33,6 +37,40 @@ LIKELY = 0.06, 0.015
 
 MIXED = 0.25
 """Fraction of the bound for small blocks of scenes with other shapes or linear growth."""
+
+
+class ScreenView(NamedTuple):
+    """How a screen shows a layer, its back up.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        Rows and columns of the picture.
+    transposed : bool
+        Rows of the picture run along y of the layer.
+    backwards : bool
+        Columns run from right to left.
+    at : tuple of int
+        Row and column of the layer's first pixel on the screen, seen from above, the first row in front.
+    layer : tuple of int
+        Rows and columns of the layer.
+    levels : bytes
+        Grey level for each coverage, 256 bytes, the first 0, the last 255.
+    """
+
+    shape: tuple[int, int]
+    transposed: bool
+    backwards: bool
+    at: tuple[int, int]
+    layer: tuple[int, int]
+    levels: bytes
+
+
+Pictures = tuple[ScreenView, Encoding]
+"""Pictures to make of layers: the screen that shows them, and their encoding."""
+
+Encoded = tuple[bytes, float, int]
+"""Encoded picture of a layer, its area in pixels, and the number of pixels that the contour cuts."""
 
 
 class Sampler:
@@ -75,18 +113,48 @@ class Sampler:
         x0, y0, dx, dy = self.frame.tolist()
         return Slab(self._memory, self._entry, self._probe_bounds, (x0, y0, dx, dy), z.tolist(), *self.shape)
 
-    def sample(self, slab: Slab, layer: int) -> None:
+    def sample(self, slab: Slab, layer: int) -> int:
         """Sample a layer of a slab.
+
+        Returns
+        -------
+        int
+            Evaluations.
 
         Raises
         ------
         SliceError
             If the solid reaches the rim of the lattice.
         """
-        try:
+        before = slab.evaluations
+        with _within_the_rim():
             slab.sample(layer)
-        except BorderError as error:
-            raise SliceError(f"{error}; give it finite <bounds>") from None
+        return slab.evaluations - before
+
+    def pictures(self, slab: Slab, layers: list[int], pictures: Pictures) -> list[tuple[int, Encoded]]:
+        """Sample the first layers of some, as many as take 20 ms, and make their pictures.
+
+        Returns
+        -------
+        list of tuple
+            Evaluations and picture of a layer, at least one. The slab holds the last of these layers.
+
+        Raises
+        ------
+        SliceError
+            If the solid reaches the rim of the lattice.
+        """
+        view, encoding = pictures
+        with _within_the_rim():
+            return slab.pictures(layers, *view, encoding)
+
+
+@contextmanager
+def _within_the_rim() -> Iterator[None]:
+    try:
+        yield
+    except BorderError as error:
+        raise SliceError(f"{error}; give it finite <bounds>") from None
 
 
 def _probe_bounds(root: Field, bounds: Bounds) -> ProbeBounds:

@@ -13,6 +13,7 @@ from typing import TypeVar
 import numpy as np
 
 from .layers import SLAB, Layer, Slicer
+from .slab import Pictures
 from .stack import Stack
 
 T = TypeVar("T")
@@ -33,8 +34,15 @@ class MeanSlicer(Slicer):
 
     sections: int = 1
 
-    def map(self, make: Callable[[Layer], T], layers: Sequence[int] | None = None) -> Iterator[T]:
-        """As `Slicer.map`; contours of a layer are those of its highest section."""
+    def map(
+        self,
+        make: Callable[[Layer], T],
+        layers: Sequence[int] | None = None,
+        pictures: Pictures | None = None,
+    ) -> Iterator[T]:
+        """As `Slicer.map`; contours of a layer are those of its highest section. Pictures show all sections,
+        so that none is made when one section is sampled.
+        """
         n, sums = self.sections, dict[int, tuple[np.ndarray, float]]()
         chosen = range(len(self.stack.z)) if layers is None else layers
 

@@ -263,9 +263,9 @@ def test_an_interrupted_job_goes_on(form: str, tmp_path: Path, monkeypatch: pyte
     made: list[int] = []
     real = Slicer.map
 
-    def watched(self: Slicer, make: Any, layers: Any = None) -> Any:
+    def watched(self: Slicer, make: Any, layers: Any, pictures: Any) -> Any:
         made.extend(layers)
-        return real(self, make, layers)
+        return real(self, make, layers, pictures)
 
     with monkeypatch.context() as patch:
         patch.setattr(Slicer, "map", watched)

@@ -6,6 +6,7 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <chrono>
 #include <memory>
 
 #include "../machine.h"
@@ -65,6 +66,9 @@ nb::object owned(std::vector<Row>&& rows, std::initializer_list<size_t> shape) {
     return nb::cast(nb::ndarray<nb::numpy, T>(reinterpret_cast<T*>(kept->data()), shape, owner));
 }
 
+// After so long, a call that makes several pictures returns those that it has: the work may be cancelled.
+constexpr std::chrono::milliseconds kUnlocked(20);
+
 using Bytes = nb::ndarray<uint8_t, nb::ndim<2>, nb::device::cpu>;
 
 // What act() returns; other threads of Python run meanwhile.
@@ -96,14 +100,47 @@ nb::tuple bind_runs(const Slab& slab, int layer, std::array<int, 2> shape) {
 
 nb::bytes bytes(const Rows<uint8_t>& data) { return nb::bytes(data.data(), data.size()); }
 
-nb::tuple bind_picture(const Slab& slab, int layer, std::array<int, 2> rows_columns, bool transposed, bool backwards,
-                       std::array<int, 2> at, std::array<int, 2> shape, const nb::bytes& levels, Encoding encoding) {
-    held(slab, layer);
+View view_of(std::array<int, 2> rows_columns, bool transposed, bool backwards, std::array<int, 2> at,
+             std::array<int, 2> shape, const nb::bytes& levels) {
     View view{rows_columns[0], rows_columns[1], transposed, backwards, at, shape, {}};
     if (levels.size() != view.levels.size()) throw nb::value_error("256 levels were expected");
     std::copy_n(reinterpret_cast<const uint8_t*>(levels.c_str()), view.levels.size(), view.levels.begin());
+    return view;
+}
+
+nb::tuple bind_picture(const Slab& slab, int layer, std::array<int, 2> rows_columns, bool transposed, bool backwards,
+                       std::array<int, 2> at, std::array<int, 2> shape, const nb::bytes& levels, Encoding encoding) {
+    held(slab, layer);
+    const View view = view_of(rows_columns, transposed, backwards, at, shape, levels);
     Picture shown = unlocked([&] { return picture(slab, view, encoding); });
     return nb::make_tuple(bytes(*shown.data), shown.painted.area, shown.painted.partly);
+}
+
+nb::list bind_pictures(Slab& slab, const std::vector<int>& layers, std::array<int, 2> rows_columns, bool transposed,
+                       bool backwards, std::array<int, 2> at, std::array<int, 2> shape, const nb::bytes& levels,
+                       Encoding encoding) {
+    struct Made {
+        Rows<uint8_t> data;
+        Painted painted;
+        int64_t evaluations;
+    };
+    const View view = view_of(rows_columns, transposed, backwards, at, shape, levels);
+    std::vector<Made> made;
+    unlocked([&] {
+        const auto end = std::chrono::steady_clock::now() + kUnlocked;
+        for (size_t i = 0; i < layers.size() && (i == 0 || std::chrono::steady_clock::now() < end); ++i) {
+            const int64_t before = slab.evaluations();
+            slab.sample(layers[i]);
+            const Picture shown = picture(slab, view, encoding);
+            made.push_back({*shown.data, shown.painted, slab.evaluations() - before});
+        }
+    });
+    nb::list result;
+    for (const Made& m : made) {
+        nb::tuple shown = nb::make_tuple(bytes(m.data), m.painted.area, m.painted.partly);
+        result.append(nb::make_tuple(m.evaluations, std::move(shown)));
+    }
+    return result;
 }
 
 nb::bytes bind_encoded(const nb::ndarray<const uint8_t, nb::ndim<2>, nb::device::cpu>& image, Encoding encoding) {
@@ -171,6 +208,8 @@ NB_MODULE(_slices, module) {
         .def("paint", &bind_paint, "layer"_a, "image"_a)
         .def("runs", &bind_runs, "layer"_a, "shape"_a)
         .def("picture", &bind_picture, "layer"_a, "pixels"_a, "transposed"_a, "backwards"_a, "at"_a, "shape"_a, "levels"_a,
+             "encoding"_a)
+        .def("pictures", &bind_pictures, "layers"_a, "pixels"_a, "transposed"_a, "backwards"_a, "at"_a, "shape"_a, "levels"_a,
              "encoding"_a)
         .def("crossings", &bind_crossings, "layer"_a)
         .def("signs", &bind_signs);
