@@ -20,6 +20,9 @@ from .private import NO_LINK
 FLUSH_S = 0.05
 """Seconds between two flushes of a file that is being written; small ones are complete before the first."""
 
+BUFFER = 1 << 20
+"""Bytes of a file that are written at once: an archive has thousands of small members."""
+
 LARGE = 1 << 26
 """Bytes of a replaced file that another thread releases."""
 
@@ -111,7 +114,7 @@ def replacing(path: str | Path, mode: int | None = None) -> Iterator[BinaryIO]:
     with reported(path):
         handle, part = tempfile.mkstemp(".part", f".{target.name[:100]}.", target.parent)
         try:
-            with os.fdopen(handle, "wb") as file:
+            with os.fdopen(handle, "wb", BUFFER) as file:
                 yield file
                 file.flush()
                 os.chmod(part, _permissions(target) if mode is None else mode)

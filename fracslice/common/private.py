@@ -33,7 +33,11 @@ class NotPrivateError(PermissionError):
 
 @contextmanager
 def opened(
-    path: str | Path, mode: Literal["rb", "r+b"], flags: int = 0, folder: int | None = None
+    path: str | Path,
+    mode: Literal["rb", "r+b"],
+    flags: int = 0,
+    folder: int | None = None,
+    buffering: int = -1,
 ) -> Iterator[BinaryIO]:
     """Open a file that no other user can write; do not follow a symbolic link.
 
@@ -47,6 +51,8 @@ def opened(
         Further flags for `os.open`. A file that they create is for its owner only.
     folder
         Descriptor of the open folder of the file, as from `private_folder`.
+    buffering
+        As for `open`.
 
     Raises
     ------
@@ -59,7 +65,7 @@ def opened(
     def opener(name: str, by_mode: int) -> int:
         return os.open(name, by_mode | flags | NO_LINK | NO_WAIT, OWNER_ONLY, dir_fd=folder)
 
-    with open(path if folder is None else Path(path).name, mode, opener=opener) as file:
+    with open(path if folder is None else Path(path).name, mode, buffering, opener=opener) as file:
         status = os.fstat(file.fileno())
         if not stat.S_ISREG(status.st_mode) or not _is_private(status):
             raise NotPrivateError(f"{path}: others can write this file")

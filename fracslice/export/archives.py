@@ -77,12 +77,13 @@ def _archive(file: BinaryIO, members: Iterator[tuple[str, bytes]]) -> None:
     with zipfile.ZipFile(file, "w") as archive:
         for name, data in members:
             info = zipfile.ZipInfo(name)
-            info.external_attr, info.header_offset = 0o600 << 16, file.tell()
+            info.external_attr, info.header_offset = 0o600 << 16, archive.start_dir
             info.CRC, info.file_size, info.compress_size = crc32(data), len(data), len(data)
-            file.write(info.FileHeader())
+            header = info.FileHeader()
+            file.write(header)
             file.write(data)
             archive.filelist.append(info)
-        archive.start_dir = file.tell()
+            archive.start_dir += len(header) + len(data)
 
 
 def _preview(job: PrintData, width: int, height: int) -> bytes:

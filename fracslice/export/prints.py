@@ -69,20 +69,14 @@ class PrintData:
         return (record[_AREA.size :] for record in records)
 
     @cached_property
-    def _read(self) -> tuple[NDArray[np.float64], list[int]]:
-        """Areas of all layers and sizes of their pictures."""
-        areas, sizes = zip(*self.journal.heads(_AREA.size), strict=True)
-        return np.frombuffer(b"".join(areas), "<f8"), [size - _AREA.size for size in sizes]
-
-    @property
     def areas(self) -> NDArray[np.float64]:
         """Areas of the layers, mm^2, float64 [n]."""
-        return self._read[0]
+        return np.frombuffer(b"".join(self.journal.begins), "<f8")
 
     @property
     def sizes(self) -> list[int]:
         """Sizes of the encoded pictures, bytes."""
-        return self._read[1]
+        return [size - _AREA.size for size in self.journal.sizes]
 
     @property
     def layers(self) -> int:

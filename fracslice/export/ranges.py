@@ -15,7 +15,7 @@ from ..slicing import Layer
 from ..slicing.layers import SLAB
 from ..slicing.slab import Pictures
 from ..work import Work
-from .resuming import Journal
+from .resuming import Journal, whole_layers
 
 if TYPE_CHECKING:
     from ..cluster import Contents
@@ -188,7 +188,8 @@ def encoded_layers(
     job = run.key(form)
     tasks = RangeTask.all(run, job, start)
     for task, data in zip(tasks, pool.results(tasks, run.work, "slicing"), strict=True):
-        for index, layer in enumerate(Journal(io.BytesIO(data), task.end - task.first), task.first):
+        layers = whole_layers(io.BytesIO(data), task.end - task.first)
+        for index, layer in enumerate(layers, task.first):
             if index >= start:
                 yield layer
     pool.finished(job)

@@ -8,14 +8,14 @@ import struct
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from itertools import chain
+from dataclasses import dataclass, field
+from itertools import chain, islice
 from pathlib import Path
 from typing import BinaryIO
 
 from isal.isal_zlib import crc32
 
-from ..common.files import FULL, check_target, replacing, reported
+from ..common.files import BUFFER, FULL, check_target, replacing, reported
 from ..common.locks import lock, locked_folder
 from ..common.private import OWNER_ONLY, opened
 from ..common.seals import seal
@@ -34,6 +34,9 @@ UNREADABLE = "the finished layers cannot be read back"
 KEPT = "the same command goes on from the finished layers"
 """What is left of a job that stops."""
 
+BEGIN = 8
+"""Bytes of each layer that are in memory: its area in a print."""
+
 GROUP = 1 << 22
 """Bytes that are read while those before are written."""
 
@@ -49,15 +52,26 @@ class Journal:
     ----------
     file : file
         Binary file, open for reading and writing.
-    count : int
-        Number of finished layers.
+    size : int
+        Size of the file, bytes.
+    begins : list of bytes
+        The first `BEGIN` bytes of each layer.
+    sizes : list of int
+        Size of each layer, bytes.
     """
 
     file: BinaryIO
-    count: int = 0
+    size: int = 0
+    begins: list[bytes] = field(default_factory=list)
+    sizes: list[int] = field(default_factory=list)
+
+    @property
+    def count(self) -> int:
+        """Number of finished layers."""
+        return len(self.sizes)
 
     def append(self, layer: bytes) -> None:
-        """Append the next layer.
+        """Append the next layer, which survives the process.
 
         Parameters
         ----------
@@ -65,12 +79,14 @@ class Journal:
             The encoded layer.
         """
         self.file.write(_HEAD.pack(len(layer), crc32(layer)) + layer)
-        self.count += 1
+        self.file.flush()
+        self.add(layer)
 
-    @property
-    def size(self) -> int:
-        """Size of the layers that are appended, bytes."""
-        return self.file.tell()
+    def add(self, layer: bytes) -> None:
+        """Count a layer that the file already holds."""
+        self.size += _HEAD.size + len(layer)
+        self.begins.append(layer[:BEGIN])
+        self.sizes.append(len(layer))
 
     def __iter__(self) -> Iterator[bytes]:
         """Iterate over all layers in order. Raises `ExportError` if a record cannot be read back."""
@@ -91,10 +107,7 @@ class Journal:
         """
         self.file.seek(0)
         group, size = list[bytes](), 0
-        for _ in range(self.count):
-            layer = self.next()
-            if layer is None:
-                raise ExportError(UNREADABLE)
+        for layer in whole_layers(self.file, self.count):
             group.append(layer)
             size += len(layer)
             if size >= GROUP:
@@ -103,43 +116,43 @@ class Journal:
         if group:
             yield group
 
-    def heads(self, size: int) -> Iterator[tuple[bytes, int]]:
-        """Iterate over the begins of all layers, without reading the rest.
 
-        Yields
-        ------
-        tuple of bytes and int
-            The first bytes of a layer, and its length.
+def whole_layers(file: BinaryIO, count: int) -> Iterator[bytes]:
+    """Read layers that `Journal.append` wrote.
 
-        Raises
-        ------
-        ExportError
-            If a record cannot be read back.
-        """
-        at = 0
-        for _ in range(self.count):
-            self.file.seek(at)
-            head = self.file.read(_HEAD.size + size)
-            if len(head) < _HEAD.size:
-                raise ExportError(UNREADABLE)
-            length, _ = _HEAD.unpack_from(head)
-            yield head[_HEAD.size :], length
-            at += _HEAD.size + length
+    Parameters
+    ----------
+    file : file
+        Binary file at the first layer.
+    count : int
+        Number of layers.
 
-    def next(self) -> bytes | None:
-        """Read the next record.
+    Yields
+    ------
+    bytes
+        An encoded layer.
 
-        Returns
-        -------
-        bytes or None
-            The encoded layer; None if it is missing, incomplete or damaged.
-        """
-        head = self.file.read(_HEAD.size)
-        if len(head) < _HEAD.size:
-            return None
+    Raises
+    ------
+    ExportError
+        If one is missing, incomplete or damaged.
+    """
+    made = 0
+    for layer in islice(_readable(file), count):
+        yield layer
+        made += 1
+    if made < count:
+        raise ExportError(UNREADABLE)
+
+
+def _readable(file: BinaryIO) -> Iterator[bytes]:
+    """Layers before the first that is missing, incomplete or damaged."""
+    while len(head := file.read(_HEAD.size)) == _HEAD.size:
         size, crc = _HEAD.unpack(head)
-        data = self.file.read(size)
-        return data if len(data) == size and crc32(data) == crc else None
+        data = file.read(size)
+        if len(data) < size or crc32(data) != crc:
+            return
+        yield data
 
 
 @contextmanager
@@ -166,7 +179,7 @@ def journal(path: str | Path, job: str) -> Iterator[Journal]:
     part, manifest = (target.with_name(f".{target.name}.{end}") for end in ("part", "job"))
     with _resumed(path):
         _remove_foreign(part)
-        with opened(part, "r+b", os.O_CREAT) as file:
+        with opened(part, "r+b", os.O_CREAT, buffering=BUFFER) as file:
             lock(file.fileno(), path)
             if _read(manifest) != _manifest(job):
                 if os.fstat(file.fileno()).st_size:
@@ -175,10 +188,10 @@ def journal(path: str | Path, job: str) -> Iterator[Journal]:
                 file.truncate()
                 os.fsync(file.fileno())  # else, after a power cut, the new job could own the old data
                 _write_manifest(manifest, job)
-            layers, end = Journal(file), 0
-            while layers.next() is not None:
-                layers.count, end = layers.count + 1, file.tell()
-            file.seek(end)
+            layers = Journal(file)
+            for layer in _readable(file):
+                layers.add(layer)
+            file.seek(layers.size)
             file.truncate()
             yield layers
         manifest.unlink(missing_ok=True)

@@ -299,13 +299,13 @@ def test_layers_of_a_folder_are_written_by_their_threads(
 def test_a_print_is_written_while_another_thread_reads_the_layers(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    real, threads = Journal.next, set()
+    real, threads = resuming.crc32, set()
 
-    def watched(self: Journal) -> bytes | None:
+    def watched(data: bytes) -> int:
         threads.add(threading.current_thread())
-        return real(self)
+        return real(data)
 
-    monkeypatch.setattr(Journal, "next", watched)
+    monkeypatch.setattr(resuming, "crc32", watched)
     monkeypatch.setattr(resuming, "GROUP", 1 << 10)
     whole = [
         write_slices(run(Work(threads=n)), _beside(tmp_path, "part"), "goo").read_bytes() for n in (1, 2)
@@ -479,12 +479,27 @@ def test_a_full_disk_leaves_the_remainder_and_no_archive(
     write_slices(run(), tmp_path / "part.sl1")
 
 
-def test_the_heads_of_layers_are_their_first_bytes_and_lengths() -> None:
-    layers = Journal(io.BytesIO())
-    for layer in (b"area and pixels", b"8 bytes.", b"area" * 9):
-        layers.append(layer)
-    assert list(layers.heads(8)) == [(b"area and", 15), (b"8 bytes.", 8), (b"areaarea", 36)]
-    assert list(layers) == [b"area and pixels", b"8 bytes.", b"area" * 9]
+def test_a_journal_knows_the_begins_and_sizes_of_layers(tmp_path: Path) -> None:
+    def interrupted() -> None:
+        with journal(tmp_path / "job", "key") as layers:
+            for layer in (b"area and pixels", b"8 bytes.", b"area" * 9):
+                layers.append(layer)
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        interrupted()
+    with journal(tmp_path / "job", "key") as layers:
+        assert (layers.begins, layers.sizes) == ([b"area and", b"8 bytes.", b"areaarea"], [15, 8, 36])
+        layers.append(b"areaarea")
+        assert layers.begins[3:] == [b"areaarea"]
+        assert layers.size == sum(layers.sizes) + 4 * 8
+        assert list(layers) == [b"area and pixels", b"8 bytes.", b"area" * 9, b"areaarea"]
+
+
+def test_a_layer_survives_the_process_as_soon_as_it_is_appended(tmp_path: Path) -> None:
+    with journal(tmp_path / "job", "key") as layers:
+        layers.append(b"one layer")
+        assert (tmp_path / ".job.part").read_bytes().endswith(b"one layer")
 
 
 @pytest.mark.parametrize(
