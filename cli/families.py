@@ -7,7 +7,6 @@ import math
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from decimal import Decimal
 from itertools import product
 from pathlib import Path
 from typing import TypeVar
@@ -67,6 +66,8 @@ def _values(setting: str) -> Iterator[tuple[str, str]]:
     if not match:
         yield setting, ""
         return
+    from decimal import Decimal  # takes a millisecond to import
+
     first, last, step = (Decimal(number or 1) for number in match.groups())
     if not step or (last - first) / step < 0:
         raise click.UsageError(f"--set {setting}: expected a range such as {name}=2..9:0.5")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +51,8 @@ def read_table(path: Path, fail: type[Exception]) -> dict[str, Any]:
     Exception
         An error of `fail` if the file cannot be read or parsed.
     """
+    import tomllib  # of a user's own files
+
     try:
         return tomllib.loads(read_text(path, fail))
     except tomllib.TOMLDecodeError as error:

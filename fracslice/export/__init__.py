@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 from ..common.files import check_target, flushing, replacing
 from ..errors import ExportError
-from ..mesh.model import Mesh
 from ..version import __version__
+
+if TYPE_CHECKING:
+    from ..mesh.model import Mesh
 
 __all__ = ["FORMATS", "application", "check_format", "check_target", "flushing", "replacing", "write"]
 
-Write = Callable[[Mesh, BinaryIO, Mapping[str, str]], None]
+Write = Callable[["Mesh", BinaryIO, Mapping[str, str]], None]
 """Writer of a format: the mesh, mm; a binary file, open for writing and able to seek; names and values of
 metadata, with Application among them."""
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from datetime import datetime
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +15,15 @@ from numpy.typing import NDArray
 from ..common.keys import key, program
 from ..errors import SliceError
 from ..kernel.host import toolchain
-from ..mesh.model import Mesh
 from ..slicing import Slicer, Stack
 from ..slicing.raster import Screen
 from ..slicing.sublayers import COUNTS, MeanSlicer
 from ..work import Work
 from .ranges import Recipe
 from .resins import Resin
+
+if TYPE_CHECKING:
+    from ..mesh.model import Mesh
 
 EPOCH = datetime(1980, 1, 1)
 """Date of files by default, so that equal jobs give equal bytes."""

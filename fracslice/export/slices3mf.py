@@ -15,7 +15,6 @@ from .layerformats import FileFormat
 from .packages import package
 from .ranges import Encode
 from .text import rows
-from .threemf import mesh_element
 
 LEVEL = 1
 HEAD = (
@@ -43,6 +42,8 @@ class SlicesAndMesh(FileFormat):
 
 
 def _assemble(run: SliceRun, layers: Iterable[bytes], file: BinaryIO) -> None:
+    from .threemf import mesh_element  # of this format alone
+
     assert run.mesh
     middle = np.array(run.stack.shape[::-1]) * run.stack.pixel / 2
     build, mesh = BUILD.format(*middle).encode(), mesh_element(run.mesh())

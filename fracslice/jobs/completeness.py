@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,6 @@ from ..formulas.box import Triple
 from ..volume import Lattice, Plan
 from ..volume.amount import FINER, amount, finer
 from ..work import Work
-from .report import Amount
 
 if TYPE_CHECKING:
     from ..kernel import Field
@@ -26,6 +26,28 @@ spacing.
 
 SLABS = 6
 """Slabs of a stack that are measured, evenly distributed."""
+
+
+@dataclass(frozen=True)
+class Amount:
+    """Volumes of the object and of its mesh or layers, mm3.
+
+    Attributes
+    ----------
+    object
+        Volume of the object, estimated from its field at random points.
+    error
+        Standard error of that estimate.
+    made
+        Volume of the mesh or the layers.
+    off
+        Relative difference if it is significant, else 0.
+    """
+
+    object: float
+    error: float
+    made: float
+    off: float
 
 
 def mesh_amount(planned: Plan, made: float, scale: float, work: Work) -> tuple[Amount, tuple[str, ...]]:

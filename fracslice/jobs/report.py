@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from ..mesh.mesh_report import MeshReport
     from ..mesh.refine import Refined
     from ..mesh.simplify import Simplified
+    from .completeness import Amount
 
 
 @dataclass(frozen=True)
@@ -81,28 +82,6 @@ class SurfaceToMesh:
             Summary.
         """
         return cls(float(mm.mean()), float(mm.max()), len(mm))
-
-
-@dataclass(frozen=True)
-class Amount:
-    """Volumes of the object and of its mesh or layers, mm3.
-
-    Attributes
-    ----------
-    object
-        Volume of the object, estimated from its field at random points.
-    error
-        Standard error of that estimate.
-    made
-        Volume of the mesh or the layers.
-    off
-        Relative difference if it is significant, else 0.
-    """
-
-    object: float
-    error: float
-    made: float
-    off: float
 
 
 @dataclass(frozen=True)

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..formulas import Node
-from ..mesh import Mesh
 from ..meshjob import COARSEST, RESOLUTION, MeshJob
 from ..scene import Scene
 from ..scene.view import Film, View
 from ..slicing import SliceJob
 from ..volume.sizing import oriented
 from ..work import Work
+
+if TYPE_CHECKING:
+    from ..mesh import Mesh
 
 SIZE, SAMPLES = (400, 240), 4
 """Width and height of pictures, half of the largest preview of a format, and samples per pixel. One of full

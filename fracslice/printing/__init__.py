@@ -1,5 +1,51 @@
 """Field edits that make an object printable, and printability checks of solids."""
 
-from .make import printable
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..scene import Print
+from ..work import Work
+
+if TYPE_CHECKING:
+    from ..volume import Plan
+    from ..volume.sizing import Sizing
 
 __all__ = ["printable"]
+
+
+def printable(planned: Plan, size: Sizing, how: Print, work: Work | None = None) -> tuple[Plan, float]:
+    """Make a planned scene printable.
+
+    Samples with the voxel of `planned` lie at the same points before and after.
+
+    Parameters
+    ----------
+    planned : Plan
+        The scene.
+    size : Sizing
+        Size of the bodies that stay, measured on the field before anything is cut off or added.
+    how : Print
+        Changes to make.
+    work : Work, optional
+        Threads, progress and cancellation.
+
+    Returns
+    -------
+    plan : Plan
+        The printable scene.
+    scale : float
+        mm per scene unit.
+
+    Raises
+    ------
+    VolumeError
+        If nothing would be left, or a length is too small to measure or larger than the object.
+    Cancelled
+        When the work is cancelled.
+    """
+    if how == Print():
+        return planned, size.scale(planned.box)
+    from .make import edited  # most objects are printed as they are
+
+    return edited(planned, size, how, work or Work())

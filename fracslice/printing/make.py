@@ -31,42 +31,14 @@ REPEATS = 4
 """Maximum number of times that fragments are joined."""
 
 
-def printable(planned: Plan, size: Sizing, how: Print, work: Work | None = None) -> tuple[Plan, float]:
-    """Make a planned scene printable.
-
-    Samples with the voxel of `planned` lie at the same points before and after.
-
-    Parameters
-    ----------
-    planned : Plan
-        The scene.
-    size : Sizing
-        Size of the bodies that stay, measured on the field before anything is cut off or added.
-    how : Print
-        Changes to make.
-    work : Work, optional
-        Threads, progress and cancellation.
-
-    Returns
-    -------
-    plan : Plan
-        The printable scene.
-    scale : float
-        mm per scene unit.
-
-    Raises
-    ------
-    VolumeError
-        If nothing would be left, or a length is too small to measure or larger than the object.
-    Cancelled
-        When the work is cancelled.
-    """
+def edited(planned: Plan, size: Sizing, how: Print, work: Work) -> tuple[Plan, float]:
+    """Make the changes of a `Print`; see `fracslice.printing.printable`."""
     for name in ("bridge", "gap", "thickness", "hollow", "drain", "base", "raft"):
         if (length := getattr(how, name)) > size.longest and (name != "drain" or how.hollow):
             raise VolumeError(
                 f"{name} {length:g} mm: expected at most the object's size, {size.longest:g} mm"
             )
-    job = _Edits(planned, size, how, work or Work())
+    job = _Edits(planned, size, how, work)
     for stage, change in job.changes():
         job.work.check()
         job.work.progress(stage, 0.0)

@@ -25,11 +25,9 @@ from .crops import Crop
 from .host_accumulator import HostAccumulator
 from .linking import Frame, link_frame
 from .optics import optics
-from .parts import PoolTracer
 from .passes import Pass
 from .sequence import SampleRange
 from .setup import clipped, prepare
-from .state import load_state, save_state
 
 TOLERANCE = 0.002
 """Standard error of displayed brightness at which a pixel has converged: half a level of 256."""
@@ -113,6 +111,8 @@ class Renderer:
         self.tracer = tracer(self._frame, self.dtype, *self.crop.size)
         self.tracer.samples = samples or self.tracer.samples
         if self.work.cluster is not None:
+            from .parts import PoolTracer
+
             self.tracer = PoolTracer(root, view, self.tracer, film, crop)
         self.accumulator = self._placed(self._empty)
         self._prepasses = 0
@@ -163,6 +163,8 @@ class Renderer:
         file : BinaryIO
             Writable binary file.
         """
+        from .state import save_state
+
         save_state(file, self.key, self.accumulator.host())
 
     def resume(self, path: str | Path) -> None:
@@ -178,6 +180,8 @@ class Renderer:
         RenderError
             If the file belongs to another picture or is damaged.
         """
+        from .state import load_state
+
         self.accumulator = self._placed(load_state(path, self.key, self._empty))
 
     def passes(self, samples: int | None = None, tolerance: float = TOLERANCE) -> Iterator[Pass]:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .._slices import Slab
 from ..common.digits import counted
 from ..kernel import Kernel
-from .bends import bends
-from .corners import corners
-from .section import CrossSection, Vertices
 from .stack import Stack
+
+# Pictures need no contours: what traces them is imported where needed.
+if TYPE_CHECKING:
+    from .section import CrossSection, Vertices
 
 ROUNDS = 20
 """Maximum number of steps of false position."""
@@ -87,6 +89,8 @@ def contours(slab: Slab, k: int, z: float, stack: Stack, exact: Kernel) -> Conto
     Contours
         The polygons.
     """
+    from .section import CrossSection, Vertices
+
     edges, ends = slab.crossings(k)
     following, section = edges[:, 3], CrossSection(exact, z, stack.frame)
     order, starts = _cycles(following)
@@ -103,6 +107,9 @@ def contours(slab: Slab, k: int, z: float, stack: Stack, exact: Kernel) -> Conto
 
 def _turns(points: np.ndarray, edges: np.ndarray, section: CrossSection) -> Vertices:
     """Corners and bends between crossings."""
+    from .bends import bends
+    from .corners import corners
+
     following, middles = edges[:, 3], edges[:, :2] + 0.5 * np.eye(2)[edges[:, 2]]
     pixels = np.floor((middles + middles[following]) / 2).astype(int)
     sharp = corners(points, following, pixels, section)

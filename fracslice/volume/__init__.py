@@ -2,29 +2,26 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import TypeVar
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import VolumeError
 from ..formulas.box import Box, Triple
-from ..formulas.field import Bounds
 from ..formulas.registry import Node
-from ..kernel import Field, Kernel
+from ..kernel import Field
 from ..kernel.depth import advised, depth_notes, resolve_depths, visible
 from ..meshjob import RESOLUTION
-from ..store import Arrays, stored
 from ..work import Work
-from .bricks import Bricks, SignBricks
-from .exploration import Evaluate
 from .extent import Extent, extent, reached
 from .lattice import Lattice
-from .pruning import Proofs
-from .sampler import sample, sample_signs
+
+if TYPE_CHECKING:
+    from .bricks import Bricks, SignBricks
+    from .sampler import sample, sample_signs
+    from .scene_samples import sample_scene, sample_scene_signs
 
 __all__ = [
     "Bricks",
@@ -44,16 +41,27 @@ __all__ = [
     "with_depths",
 ]
 
-
-AnyBricks = TypeVar("AnyBricks", Bricks, SignBricks)
+_SAMPLING = {
+    "Bricks": "bricks",
+    "SignBricks": "bricks",
+    "sample": "sampler",
+    "sample_scene": "scene_samples",
+    "sample_scene_signs": "scene_samples",
+    "sample_signs": "sampler",
+}
+"""Modules of what samples, by name: layers and pictures need a plan alone."""
 
 COARSE = 64
 """Voxels along the longest side for the first estimate of the size, accurate to a quarter of a voxel, from
 which depths follow.
 """
 
-MANY = 64**3
-"""Bricks of a lattice from which cells are proved."""
+
+def __getattr__(name: str) -> Any:
+    """Load what samples at its first use."""
+    if name not in _SAMPLING:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f".{_SAMPLING[name]}", __name__), name)
 
 
 @dataclass(frozen=True)
@@ -198,99 +206,3 @@ def with_depths(root: Node, work: Work | None = None) -> Node:
             break
         known = deeper
     return known
-
-
-def sample_scene(planned: Plan, work: Work | None = None) -> Bricks:
-    """Sample a planned scene around its surface, or read the samples from the cache.
-
-    Parameters
-    ----------
-    planned
-        Scene, bounds and voxel size.
-    work
-        Execution settings.
-
-    Returns
-    -------
-    Bricks
-        Samples around the surface.
-
-    Raises
-    ------
-    VolumeError
-        If there is no surface or it leaves the lattice.
-    Cancelled
-        If the job was cancelled.
-    """
-    return _sampled(planned, work or Work(), sample, Bricks, "values")
-
-
-def sample_scene_signs(
-    planned: Plan, work: Work | None = None, evaluate: Evaluate | None = None
-) -> SignBricks:
-    """Sample a planned scene as `sample_scene` does, but keep only the signs.
-
-    Signs suffice to extract the exact surface.
-
-    Parameters
-    ----------
-    planned
-        Scene, bounds and voxel size.
-    work
-        Execution settings.
-    evaluate
-        As for `sample_signs`.
-
-    Returns
-    -------
-    SignBricks
-        Signs of the samples around the surface.
-
-    Raises
-    ------
-    VolumeError
-        If there is no surface or it leaves the lattice.
-    Cancelled
-        If the job was cancelled.
-    """
-    take = partial(sample_signs, evaluate=evaluate)
-    return _sampled(planned, work or Work(), take, SignBricks, "signs")
-
-
-def _sampled(
-    planned: Plan, work: Work, take: Callable[..., AnyBricks], kind: type[AnyBricks], held: str
-) -> AnyBricks:
-    """Sample a planned scene or read it from the cache. `held` names the array that the bricks hold besides
-    positions and index.
-    """
-    lattice, fresh = planned.lattice, list[AnyBricks]()
-
-    def made() -> Arrays:
-        kernel, bounds, conservative = _fields(planned, work)
-        with advised(planned.root.tree, planned.voxel):
-            bricks = take(kernel, bounds, lattice, work, conservative, _proofs(planned))
-        fresh.append(bricks)
-        arrays = {name: getattr(bricks, name) for name in ("ijk", held, "index")}
-        return {**arrays, "proved": np.array([np.nan if bricks.proved is None else bricks.proved])}
-
-    kept = stored(work.store, ("samples", held, work.device, lattice, planned.proved), planned.root, made)
-    if fresh:
-        return fresh[0]
-    (proved,) = kept["proved"].tolist()
-    known = None if np.isnan(proved) else proved
-    return kind(lattice.origin, lattice.voxel, kept["ijk"], kept[held], kept["index"], proved=known)
-
-
-def _proofs(planned: Plan) -> Proofs | None:
-    """Proofs to sample with: for a small lattice, compiling them takes longer than they save."""
-    if not planned.proved and math.prod(planned.lattice.bricks) < MANY:
-        return None
-    cells = planned.root.cells()
-    return Proofs(cells, planned.proved) if cells or planned.proved else None
-
-
-def _fields(planned: Plan, work: Work) -> tuple[Kernel, Bounds, Kernel]:
-    """Kernel to sample, and bounds and kernel to prune by; mostly the same field."""
-    root = planned.root
-    conservative = root.conservative()
-    return root.kernel(work.device), conservative.bounds, conservative.kernel(work.device)
