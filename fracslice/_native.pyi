@@ -156,13 +156,9 @@ class ProjectionLoops:
         Loops of `fracslice.mesh.root_loops`: `lead` and `find` in float32, `find` and `aim` in float64.
     field : Entry
         The same float64 field.
-    steps : tuple of int
-        Steps for all segments, and for those that have not converged by then.
     """
 
-    def __init__(
-        self, lanes: int, lead: Loop, guess: Loop, find: Loop, aim: Loop, field: Entry, steps: tuple[int, int]
-    ) -> None: ...
+    def __init__(self, lanes: int, lead: Loop, guess: Loop, find: Loop, aim: Loop, field: Entry) -> None: ...
 
 def project(
     points: NDArray[float64],
@@ -188,22 +184,12 @@ class RootLoops:
         Loops of `fracslice.volume.root_loops`: `find` in float32, `find` in float64, and `polish`.
     field : Entry
         The same float64 field.
-    steps : tuple of int
-        Steps for all segments, and for those that have not converged by then.
     sure : float
         A root that `polish` moves less than this is exact.
     """
 
     def __init__(
-        self,
-        lanes: int,
-        batch: int,
-        guess: Loop,
-        find: Loop,
-        polish: Loop,
-        field: Entry,
-        steps: tuple[int, int],
-        sure: float,
+        self, lanes: int, batch: int, guess: Loop, find: Loop, polish: Loop, field: Entry, sure: float
     ) -> None: ...
 
 class Cells:

@@ -50,10 +50,10 @@ class CudaLoop:
     loop: Any
     parameters: Any
 
-    def __call__(self, frame: np.ndarray, rows: np.ndarray, out: np.ndarray, *numbers: int) -> None:
+    def __call__(self, frame: np.ndarray, rows: np.ndarray, out: np.ndarray) -> None:
         cuda = require()
         result = cuda.to_device(out)
-        self.launch(rows.shape[1], cuda.to_device(frame), *cuda.to_device(rows), *result, *numbers)
+        self.launch(rows.shape[1], cuda.to_device(frame), *cuda.to_device(rows), *result)
         result.copy_to_host(out)
 
     def launch(self, count: int, frame: Any, *arguments: Any) -> None:
@@ -66,7 +66,7 @@ class CudaLoop:
         frame
             Frame of the loop.
         *arguments
-            Input rows, output rows and numbers.
+            Input rows and output rows.
         """
         launched(self.loop, count, self.parameters, frame, *arguments, count)
 

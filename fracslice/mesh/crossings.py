@@ -14,7 +14,7 @@ import numpy as np
 from .._native import Cells, RootLoops
 from ..kernel import Field
 from ..work import Work
-from .roots import MOST, QUICK, SURE, Roots
+from .roots import SURE, Roots
 
 Point = tuple[float, float, float]
 
@@ -82,7 +82,7 @@ class LaneSearch:
     ) -> None:
         loops = fast.native("find"), exact.native("find"), exact.native("polish")
         entry = root.kernel("cpu", "float64").entry
-        self._loops = RootLoops(fast.width, fast.batch, *loops, entry, (QUICK, MOST), SURE)
+        self._loops = RootLoops(fast.width, fast.batch, *loops, entry, SURE)
         self._cells, self._placement = cells, (origin, voxel)
 
     def memory(self, size: int) -> tuple[np.ndarray, np.ndarray]:

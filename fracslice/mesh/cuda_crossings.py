@@ -11,7 +11,7 @@ from ..kernel.cuda_driver import require
 from ..kernel.cuda_launching import CudaLoop, launched, load_loops
 from ..kernel.linker import Linked
 from .cuda_segment_loops import LOOPS
-from .roots import MOST, SURE, Roots
+from .roots import SURE, Roots
 
 MOST_EDGES = 1 << 20
 """Grid edges of one round, which take 140 MB of GPU memory."""
@@ -85,7 +85,7 @@ class CudaSearch:
         n, (run, frame), (polish, exact_frame) = len(edges), find, self._polish
         placed = self._cuda.to_device(edges)
         launched(self._loops.lay, n, placed, *self._placement, self._segments, self._narrow)
-        run(n, frame, *segments, found[0], MOST)
+        run(n, frame, *segments, found[0])
         launched(self._loops.start, n, found[0], self._roots[0], n)
         polish(n, exact_frame, *self._segments, self._roots[0], *self._polished)
         results = self._roots[0], self._polished, SURE, self._normals, self._unsure[0]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..kernel.cuda_stubs import device, kernel, real, thread
+from ..kernel.cuda_stubs import kernel, real, thread
 
 
 @kernel
@@ -29,12 +29,6 @@ def lay(E, ox, oy, oz, h, R, S):
             S[k, i] = R[k, i]
 
 
-@device
-def unmarked(root):
-    """Return a root of `find` without the mark of too many steps."""
-    return root - real(2) if root > real(1) else root
-
-
 @kernel
 def start(U, T, n):
     """Start `polish` from the roots of `find`.
@@ -50,7 +44,7 @@ def start(U, T, n):
     """
     i = thread()
     if i < n:
-        T[i] = unmarked(real(U[i]))
+        T[i] = U[i]
 
 
 @kernel
@@ -81,7 +75,7 @@ def collect(U, T, D, sure, N, F, n):
         F[i] = 0
         if not D[3, i] <= sure:
             F[i] = 1
-            T[i] = unmarked(real(U[i]))
+            T[i] = U[i]
 
 
 LOOPS = lay, start, collect

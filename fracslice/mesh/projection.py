@@ -9,7 +9,7 @@ import numpy as np
 from .. import _native
 from ..kernel import Field
 from ..work import Work, chunks
-from .roots import MOST, QUICK, Roots
+from .roots import Roots
 
 TrustRegions = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """Function of point numbers, [n], and of a mask of the interior ones, [n]; float64 [4, 3, n], scene units.
@@ -59,7 +59,7 @@ def project(
     guess, exact = (Roots(root, precision, voxel) for precision in ("float32", "float64"))
     lead, find, entry = guess.native("lead"), guess.native("find"), root.kernel("cpu", "float64").entry
     exactly = exact.native("find"), exact.native("aim")
-    loops = _native.ProjectionLoops(guess.width, lead, find, *exactly, entry, (QUICK, MOST))
+    loops = _native.ProjectionLoops(guess.width, lead, find, *exactly, entry)
     for part in chunks(len(points), AT_ONCE):
         work.check()
         _native.project(points, part.start, part.stop, loops, trust_regions, voxel, work.threads)

@@ -12,7 +12,7 @@ from fracslice._native import Cells
 from fracslice.formulas.catalogue import FORMULAS
 from fracslice.kernel import cuda, reference
 from fracslice.mesh.crossings import Refiner
-from fracslice.mesh.roots import LOOPS, MOST, Roots
+from fracslice.mesh.roots import LOOPS, Roots
 from fracslice.volume import plan, sample_scene
 from fracslice.work import Work
 from tests.examples import DEFINED, EXAMPLES
@@ -66,10 +66,10 @@ def bricks() -> None:
     kernel.bricks(corners[:0], (0, 0, 0), 1.0, out[:0])
 
 
-def ran(finder: Roots, name: str, rows: np.ndarray, count: int, *numbers: int) -> np.ndarray:
+def ran(finder: Roots, name: str, rows: np.ndarray, count: int) -> np.ndarray:
     """Rows that a loop writes."""
     out = np.empty((count, rows.shape[1]), finder.dtype)
-    finder.runs[name](finder.frame, rows, out, *numbers)
+    finder.runs[name](finder.frame, rows, out)
     return out
 
 
@@ -83,7 +83,7 @@ def roots() -> None:
     for precision, tolerance in (("float32", 1e-4), ("float64", 1e-9)):
         rows = segments.astype(precision)
         lanes, threads = (Roots(root, precision, 0.02, device) for device in ("cpu", "cuda"))
-        expected, computed = (ran(finder, "find", rows, 1, MOST)[0] for finder in (lanes, threads))
+        expected, computed = (ran(finder, "find", rows, 1)[0] for finder in (lanes, threads))
         assert ((expected > 0) & (expected < 1)).all()
         np.testing.assert_allclose(computed, expected, atol=tolerance)
     polished = [np.tile(expected, (5, 1)) for _ in range(2)]
