@@ -44,15 +44,19 @@ class CudaSearch:
         self._segments, self._found = self._rows(6, np.float64), self._rows(1, np.float64)
         self._roots, self._polished = self._rows(1, np.float64), self._rows(4, np.float64)
         self._normals, self._unsure = self._rows(3, np.float32), self._rows(1, np.uint8)
+        self._memories = [(np.empty(0), np.empty((3, 0), np.float32))] * 2
 
     def _rows(self, count: int, dtype: type) -> Any:
         """Allocate GPU memory for the segments of one round, [count, MOST_EDGES]."""
         return self._cuda.device_array((count, MOST_EDGES), dtype)
 
     def memory(self, size: int) -> tuple[np.ndarray, np.ndarray]:
-        """See `Search.memory`."""
-        pinned = self._cuda.pinned_array  # the GPU copies faster into page-locked memory
-        return pinned(size, np.float64), pinned((3, size), np.float32)
+        """See `Search.memory`. It alternates between two: the caller still reads the other."""
+        self._memories.reverse()
+        if size > len(self._memories[0][0]):
+            pinned = self._cuda.pinned_array  # the GPU copies faster into page-locked memory
+            self._memories[0] = pinned(size, np.float64), pinned((3, size), np.float32)
+        return self._memories[0]
 
     def find(self, begin: int, end: int, t: np.ndarray, normals: np.ndarray) -> None:
         """See `Search.find`."""
