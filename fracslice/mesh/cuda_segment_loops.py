@@ -6,20 +6,22 @@ from ..kernel.cuda_stubs import kernel, real, thread
 
 
 @kernel
-def lay(E, ox, oy, oz, h, R, S):
+def lay(E, ox, oy, oz, h, R, S, n):
     """Lay grid edges out as segments.
 
     Parameters
     ----------
-    E : array of int16, shape (n, 4)
+    E : array of int16, shape (n or more, 4)
         Lower grid point and axis of each edge.
     ox, oy, oz, h : float
         Position of grid point (0, 0, 0), and grid spacing, scene units.
     R, S : array of float64 and of float32, shape (6, n or more)
         Receive the segments.
+    n : int
+        Number of edges.
     """
     i = thread()
-    if i < E.shape[0]:
+    if i < n:
         R[0, i] = ox + h * real(E[i, 0])
         R[1, i] = oy + h * real(E[i, 1])
         R[2, i] = oz + h * real(E[i, 2])

@@ -8,13 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from fracslice._native import Cells
 from fracslice.formulas.catalogue import FORMULAS
 from fracslice.kernel import cuda, reference
-from fracslice.mesh.crossings import Refiner
 from fracslice.mesh.roots import LOOPS, Roots
-from fracslice.volume import plan, sample_scene
-from fracslice.work import Work
 from tests.examples import DEFINED, EXAMPLES
 from tests.kernel.idioms import HEAD, SAME, P, imported
 
@@ -30,7 +26,6 @@ def main() -> None:
         idioms()
         bricks()
         roots()
-        crossings()
 
 
 def points(name: str, kernel: cuda.CudaKernel, expected: Callable[..., np.ndarray]) -> None:
@@ -95,21 +90,6 @@ def roots() -> None:
     finders = (Roots(root, "float32", 0.02, device) for device in ("cpu", "cuda"))
     guesses = [ran(finder, "lead", regions.astype(np.float32), 3) for finder in finders]
     np.testing.assert_allclose(*guesses, atol=1e-3)
-
-
-def crossings() -> None:
-    """A thread per grid edge finds the crossings and normals of the lanes."""
-    planned = plan(EXAMPLES["torus"], 16)
-    bricks = sample_scene(planned)
-    cells = Cells(bricks.signs.ijk, bricks.signs.signs, bricks.signs.index)
-    count = cells.crossings_before(len(bricks.index))
-    lanes, threads = (
-        Refiner(planned.root, cells, bricks.origin, bricks.voxel, Work(1, device=device)).between(0, count)
-        for device in ("cpu", "cuda")
-    )
-    assert count > 100
-    np.testing.assert_allclose(threads.t, lanes.t, atol=1e-6)
-    np.testing.assert_allclose(threads.normals, lanes.normals, atol=1e-4)
 
 
 if __name__ == "__main__":
