@@ -19,8 +19,8 @@ the boxes or on their boundaries where the field has the opposite sign, or NaN; 
 middle of the known part of the surface there, or NaN.
 """
 
-AT_ONCE = 1 << 17
-"""Points projected between two checks for cancellation."""
+AT_ONCE = 1 << 16
+"""Points per thread between two checks for cancellation."""
 
 
 def project(
@@ -60,7 +60,7 @@ def project(
     lead, find, entry = guess.native("lead"), guess.native("find"), root.kernel("cpu", "float64").entry
     exactly = exact.native("find"), exact.native("aim")
     loops = _native.ProjectionLoops(guess.width, lead, find, *exactly, entry)
-    for part in chunks(len(points), AT_ONCE):
+    for part in chunks(len(points), AT_ONCE * work.threads):
         work.check()
         _native.project(points, part.start, part.stop, loops, trust_regions, voxel, work.threads)
 
