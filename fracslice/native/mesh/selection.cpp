@@ -82,6 +82,22 @@ Selection selected(const MeshView& mesh, std::span<const bool> keep) {
     return result;
 }
 
+Ordered in_order(const Triangles& triangles) {
+    std::vector<int32_t> number(triangles.vertices, -1);
+    Ordered result{{triangles.vertices, 1}, {triangles.count, 3}};
+    int32_t used = 0;
+    for (size_t i = 0; i < 3 * triangles.count; ++i) {
+        const int32_t vertex = triangles.corners[i];
+        if (number[size_t(vertex)] < 0) {
+            result.first.data[used] = vertex;
+            number[size_t(vertex)] = used++;
+        }
+        result.triangles.data[i] = number[size_t(vertex)];
+    }
+    result.first.rows = size_t(used);
+    return result;
+}
+
 std::vector<int64_t> touching(const Triangles& triangles, std::span<const bool> vertices) {
     assert(vertices.size() == triangles.vertices);
     return chosen(triangles.count, [&](size_t t) {
