@@ -28,6 +28,7 @@ using Point = std::array<double, 3>;
 void require_labels(const MeshView& mesh, const Vector<int32_t>& labels, size_t components) {
     if (labels.size() != mesh.vertices) throw std::invalid_argument("vertices and labels differ in length");
     require_below(span_of(labels), components, "a label names a component that does not exist", -1);
+    if (!counted(mesh.vertices, [&](size_t v) { return labels.data()[v] < 0; }).back()) return;
     std::atomic<bool> unknown = false;
     for_each_number(mesh.count, [&](size_t t) {
         if (labels.data()[mesh[t][0]] < 0) unknown.store(true, std::memory_order_relaxed);
