@@ -3,7 +3,7 @@
 Arrays are C-contiguous and laid out as in `fracslice.volume.bricks.Bricks`. Long calls release the GIL.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from numpy import bool_, float32, float64, int16, int32, int64, uint8
@@ -156,13 +156,9 @@ class ProjectionLoops:
         Loops of `fracslice.mesh.root_loops`: `lead` and `find` in float32, `find` and `aim` in float64.
     field : Entry
         The same float64 field.
-    steps : tuple of int
-        Steps for all segments, and for those that have not converged by then.
     """
 
-    def __init__(
-        self, lanes: int, lead: Loop, guess: Loop, find: Loop, aim: Loop, field: Entry, steps: tuple[int, int]
-    ) -> None: ...
+    def __init__(self, lanes: int, lead: Loop, guess: Loop, find: Loop, aim: Loop, field: Entry) -> None: ...
 
 def project(
     points: NDArray[float64],
@@ -188,22 +184,12 @@ class RootLoops:
         Loops of `fracslice.volume.root_loops`: `find` in float32, `find` in float64, and `polish`.
     field : Entry
         The same float64 field.
-    steps : tuple of int
-        Steps for all segments, and for those that have not converged by then.
     sure : float
         A root that `polish` moves less than this is exact.
     """
 
     def __init__(
-        self,
-        lanes: int,
-        batch: int,
-        guess: Loop,
-        find: Loop,
-        polish: Loop,
-        field: Entry,
-        steps: tuple[int, int],
-        sure: float,
+        self, lanes: int, batch: int, guess: Loop, find: Loop, polish: Loop, field: Entry, sure: float
     ) -> None: ...
 
 class Cells:
@@ -421,6 +407,9 @@ def selected(
 ) -> tuple[NDArray[float64], NDArray[int32]] | None:
     """See `fracslice.mesh.model.Mesh.selected`; None if nothing is removed."""
 
+def in_order(triangles: NDArray[int32], vertices: int) -> tuple[NDArray[int32], NDArray[int32]]:
+    """Vertices by their first use, without unused ones, and the triangles with their new numbers."""
+
 def touching(triangles: NDArray[int32], vertices: NDArray[bool_], threads: int = 0) -> NDArray[int64]:
     """Triangles, ascending, with a corner among some vertices, bool [n]."""
 
@@ -455,6 +444,12 @@ def surroundings(
 
 def stl(vertices: NDArray[float64], triangles: NDArray[int32], threads: int = 0) -> NDArray[uint8]:
     """Records of a binary STL, uint8 [m, 50]."""
+
+def text_rows(before: Sequence[str], end: str, values: NDArray[float32] | NDArray[int64]) -> bytes:
+    """Text of rows of numbers, [n, k]: each number after one of k texts, and `end` after a row.
+
+    A number has the fewest digits that read back as the same number.
+    """
 
 def weld(points: NDArray[float32]) -> tuple[NDArray[int64], NDArray[int32]]:
     """First point of each group of equal points, ascending, and the group of each point.

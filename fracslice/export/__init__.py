@@ -1,4 +1,4 @@
-"""Mesh file formats: one module each with `write(mesh, file, metadata)`, selected by file name extension."""
+"""Mesh file formats: one module each with `write`, selected by file name extension."""
 
 from __future__ import annotations
 
@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING, BinaryIO
 from ..common.files import check_target, flushing, replacing
 from ..errors import ExportError
 from ..version import __version__
+from ..work import Work
 
 if TYPE_CHECKING:
     from ..mesh.model import Mesh
 
 __all__ = ["FORMATS", "application", "check_format", "check_target", "flushing", "replacing", "write"]
 
-Write = Callable[["Mesh", BinaryIO, Mapping[str, str]], None]
+Write = Callable[["Mesh", BinaryIO, Mapping[str, str], Work], None]
 """Writer of a format: the mesh, mm; a binary file, open for writing and able to seek; names and values of
-metadata, with Application among them."""
+metadata, with Application among them; threads and cancellation."""
 
 
 def _writer(module: str) -> Write:
@@ -30,7 +31,7 @@ def _in_order(write: Write) -> Write:
     """Writer of a mesh whose vertices are sorted by their first use: equal triangles give equal bytes,
     however the mesh was made.
     """
-    return lambda mesh, file, metadata: write(mesh.in_order(), file, metadata)
+    return lambda mesh, *arguments: write(mesh.in_order(), *arguments)
 
 
 FORMATS: dict[str, Write] = {
@@ -76,7 +77,12 @@ def check_format(path: str | Path) -> str:
     return ending
 
 
-def write(mesh: Mesh, path: str | Path, metadata: Mapping[str, str] | None = None) -> Path:
+def write(
+    mesh: Mesh,
+    path: str | Path,
+    metadata: Mapping[str, str] | None = None,
+    work: Work | None = None,
+) -> Path:
     """Write a mesh to a file atomically, in the format of its extension. Equal meshes give equal bytes.
 
     Coordinates are written as float32: quantise the mesh with `fracslice.mesh.quantisation.quantised` first,
@@ -91,6 +97,8 @@ def write(mesh: Mesh, path: str | Path, metadata: Mapping[str, str] | None = Non
     metadata : mapping of str to str, optional
         Names and values for the file, such as Title, Description or scene_hash, as far as the format holds
         them; Application is added.
+    work : Work, optional
+        Threads and cancellation.
 
     Returns
     -------
@@ -100,10 +108,12 @@ def write(mesh: Mesh, path: str | Path, metadata: Mapping[str, str] | None = Non
     ------
     ExportError
         For an empty mesh, an unknown extension, or an error of the file system.
+    Cancelled
+        If the job was cancelled.
     """
     format_write = FORMATS[check_format(path)]
     if not len(mesh.triangles):
         raise ExportError(f"{path}: the mesh has no triangles")
     with replacing(path) as file:
-        format_write(mesh, file, {"Application": application()} | dict(metadata or {}))
+        format_write(mesh, file, {"Application": application()} | dict(metadata or {}), work or Work())
     return Path(path)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..common.srgb import to_linear
 from ..errors import ExportError
 from ..mesh.model import Mesh
+from ..work import Work
 
 TO_METRES_Y_UP = 0.001 * np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1000]])
 GREY = {"baseColorFactor": [204, 204, 199, 255], "metallicFactor": 0.0, "roughnessFactor": 0.7}
@@ -21,7 +22,7 @@ HEADERS = 1 << 16
 """Bytes of a file beside its arrays, at most, metadata aside."""
 
 
-def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
+def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str], _: Work) -> None:
     """Write a mesh without normals, so that viewers use flat shading, as printed; see `Write`.
 
     Raises

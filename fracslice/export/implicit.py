@@ -97,7 +97,7 @@ def _model(
         references.append(reference)
         yield text.encode()
     yield OBJECT.format(references[-1]).encode()
-    yield from mesh_element(_cuboid(box))
+    yield from (text() for text in mesh_element(_cuboid(box)))
     yield LEVEL_SET.format(finest).encode()
 
 

@@ -1,31 +1,28 @@
-"""Wavefront OBJ by trimesh, with comments. The format has no unit; a comment states mm."""
+"""Wavefront OBJ, with comments. The format has no unit; a comment states mm."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
+from itertools import chain
 from typing import BinaryIO
 
 import numpy as np
 
 from ..mesh.model import Mesh
+from ..work import Work
+from .text import number_rows
 
 
-def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
-    """Write a mesh, with metadata as comments; every float32 coordinate survives. See `Write`."""
-    from trimesh.exchange.obj import export_obj
-
-    header = "\n# ".join(
-        f"{key}: {' '.join(value.split())}" for key, value in (*metadata.items(), ("units", "mm"))
+def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str], work: Work) -> None:
+    """Write a mesh, with metadata as comments and colours, if any, behind the coordinates; see `Write`."""
+    about = (*metadata.items(), ("units", "mm"))
+    comments = "".join(f"# {key}: {' '.join(value.split())}\n" for key, value in about)
+    file.write(comments.encode("ascii", "replace"))
+    vertices = mesh.vertices
+    if mesh.colours is not None:
+        vertices = np.hstack([vertices, mesh.colours / 255])
+    before = "v ", *" " * (vertices.shape[1] - 1)
+    texts = chain(
+        number_rows(before, "\n", vertices), number_rows(("f ", " ", " "), "\n", mesh.triangles + 1)
     )
-    text = export_obj(mesh.to_trimesh(), include_normals=False, digits=_digits(mesh.vertices), header=header)
-    file.write(text.encode("ascii", "replace"))
-
-
-def _digits(coordinates: np.ndarray) -> int:
-    """Decimals with which every coordinate reads back as the same float32: one in the last place is less than
-    the distance from the smallest coordinate to the next smaller number.
-    """
-    sizes = np.abs(coordinates.astype(np.float32))
-    smallest = np.min(sizes, initial=1.0, where=sizes > 0)
-    return max(math.ceil(-math.log10(float(np.spacing(smallest)) / 2)), 0)
+    file.writelines(work.ordered(lambda text: text(), texts))

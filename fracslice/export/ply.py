@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from typing import BinaryIO
 
 from ..mesh.model import Mesh
+from ..work import Work
 
 
-def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
+def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str], _: Work) -> None:
     """Write a mesh, with metadata as comments; see `Write`."""
     from trimesh.exchange.ply import export_ply
 

@@ -46,7 +46,7 @@ def _assemble(run: SliceRun, layers: Iterable[bytes], file: BinaryIO) -> None:
 
     assert run.mesh
     middle = np.array(run.stack.shape[::-1]) * run.stack.pixel / 2
-    build, mesh = BUILD.format(*middle).encode(), mesh_element(run.mesh())
+    build, mesh = BUILD.format(*middle).encode(), (text() for text in mesh_element(run.mesh()))
     package(file, chain([HEAD.encode()], layers, [OBJECT.encode()], mesh, [build]), run.layers > 1000, LEVEL)
 
 

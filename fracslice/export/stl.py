@@ -19,7 +19,7 @@ BLOCK = 1 << 16
 """Triangles that are encoded together: so few that their memory is used again, see `keep_freed_memory`."""
 
 
-def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
+def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str], work: Work) -> None:
     """Write a mesh, with Application in the header; see `Write`.
 
     Raises
@@ -27,10 +27,10 @@ def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
     ExportError
         For more than 4294967295 triangles.
     """
-    write_pieces([mesh], file, metadata)
+    write_pieces([mesh], file, metadata, work)
 
 
-def write_pieces(meshes: Iterable[Mesh], file: BinaryIO, metadata: Mapping[str, str]) -> None:
+def write_pieces(meshes: Iterable[Mesh], file: BinaryIO, metadata: Mapping[str, str], work: Work) -> None:
     """Write a mesh, mm, piece by piece, with one piece in memory at a time; see `write`."""
     start, count = file.tell(), 0
     head = header(0, metadata)
@@ -38,16 +38,16 @@ def write_pieces(meshes: Iterable[Mesh], file: BinaryIO, metadata: Mapping[str, 
     for mesh in meshes:
         count += len(mesh.triangles)
         head = header(count, metadata)
-        _append(mesh, file)
+        _append(mesh, file, work)
     file.seek(start)
     file.write(head)
     file.seek(0, os.SEEK_END)
 
 
-def _append(mesh: Mesh, file: BinaryIO) -> None:
+def _append(mesh: Mesh, file: BinaryIO, work: Work) -> None:
     """Write triangles; each thread puts the blocks that it encodes in their places, if the system can."""
     if not (isinstance(file, io.BufferedWriter) and hasattr(os, "pwrite")):
-        for block in ahead(blocks(mesh)):
+        for block in ahead(blocks(mesh, work.threads)):
             file.write(block)
         return
     file.flush()
@@ -59,7 +59,7 @@ def _append(mesh: Mesh, file: BinaryIO) -> None:
             written = os.pwrite(file.fileno(), block, place)
             block, place = block[written:], place + written
 
-    Work().map(put, range(0, len(mesh.triangles), BLOCK))
+    work.map(put, range(0, len(mesh.triangles), BLOCK))
     file.seek(start + TRIANGLE * len(mesh.triangles))
 
 

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..mesh.model import Mesh
+from ..work import Work
 from .packages import HEAD, Fragment, append, deflated, join
-from .text import rows
+from .text import Text, number_rows, rows
 
 MODEL = (
     HEAD + '<model unit="millimeter" xml:lang="en-US" '
@@ -30,6 +31,7 @@ PLAIN, VERTICES, TRIANGLES, END_OF_MESH, END = (
     b"</triangles>\n</mesh>",
     b'</object></resources>\n<build><item objectid="1"/></build>\n</model>\n',
 )
+TRIANGLE, END_OF_ROW = ('<triangle v1="', '" v2="', '" v3="'), '"/>\n'
 CORE_NAMES = {"Title", "Designer", "Description", "Copyright", "LicenseTerms", "Rating", "Application"}
 CORE_NAMES |= {"CreationDate", "ModificationDate"}
 MATERIALS = "http://schemas.microsoft.com/3dmanufacturing/material/2015/02"
@@ -37,8 +39,8 @@ GROUP = 2
 """Number of the group of colours, of the materials extension."""
 
 
-def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
-    """Write a mesh, streamed. Blocks of the text are deflated by themselves, so that they can be joined.
+def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str], work: Work) -> None:
+    """Write a mesh, streamed. Threads make and deflate blocks of the text, which are joined.
 
     Parameters
     ----------
@@ -48,10 +50,13 @@ def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str]) -> None:
         Binary file, open for writing and able to seek.
     metadata : mapping of str to str
         Names and values; names that 3MF does not define get fracslice's namespace.
+    work : Work
+        Threads and cancellation.
     """
     coloured = mesh.colours is not None
     is_large = _is_large(len(mesh.vertices), len(mesh.triangles), coloured)
-    join(file, (partial(append, deflated(text)) for text in _model(mesh, metadata)), is_large)
+    blocks = work.ordered(lambda text: deflated(text()), _model(mesh, metadata))
+    join(file, (partial(append, block) for block in blocks), is_large)
 
 
 def write_fragments(
@@ -98,22 +103,25 @@ def _head(metadata: Mapping[str, str], model: str = MODEL) -> Iterator[bytes]:
     yield b"<resources>"
 
 
-def _model(mesh: Mesh, metadata: Mapping[str, str]) -> Iterator[bytes]:
+def _model(mesh: Mesh, metadata: Mapping[str, str]) -> Iterator[Text]:
     if mesh.colours is None:
-        yield from _head(metadata)
-        yield PLAIN
+        yield from _texts(*_head(metadata), PLAIN)
         yield from mesh_element(mesh)
     else:
-        yield from _head(metadata, MODEL.replace("<model ", f'<model xmlns:m="{MATERIALS}" '))
+        yield from _texts(*_head(metadata, MODEL.replace("<model ", f'<model xmlns:m="{MATERIALS}" ')))
         colours, index = np.unique(mesh.colours, axis=0, return_inverse=True)
-        yield f'<m:colorgroup id="{GROUP}">\n'.encode()
-        yield from rows('<m:color color="#%02X%02X%02X"/>\n', colours)
-        yield f'</m:colorgroup>\n<object id="1" type="model" pid="{GROUP}" pindex="0">'.encode()
+        yield from _texts(f'<m:colorgroup id="{GROUP}">\n'.encode())
+        yield from _texts(*rows('<m:color color="#%02X%02X%02X"/>\n', colours))
+        yield from _texts(f'</m:colorgroup>\n<object id="1" type="model" pid="{GROUP}" pindex="0">'.encode())
         yield from mesh_element(mesh, index.reshape(-1).astype(np.int32))
-    yield END
+    yield from _texts(END)
 
 
-def mesh_element(mesh: Mesh, colours: NDArray[np.int32] | None = None) -> Iterator[bytes]:
+def _texts(*blocks: bytes) -> Iterator[Text]:
+    return (partial(bytes, block) for block in blocks)
+
+
+def mesh_element(mesh: Mesh, colours: NDArray[np.int32] | None = None) -> Iterator[Text]:
     """Encode a mesh as the mesh element of an object, in blocks.
 
     Parameters
@@ -125,32 +133,32 @@ def mesh_element(mesh: Mesh, colours: NDArray[np.int32] | None = None) -> Iterat
 
     Yields
     ------
-    bytes
-        Part of the element.
+    callable
+        Makes a part of the element.
     """
-    yield VERTICES
-    yield from vertex_rows(mesh.vertices.astype(np.float32))
-    yield TRIANGLES
+    yield from _texts(VERTICES)
+    yield from vertex_rows(mesh.vertices)
+    yield from _texts(TRIANGLES)
     if colours is None:
         yield from triangle_rows(mesh.triangles)
     else:
-        template = f'<triangle v1="%d" v2="%d" v3="%d" pid="{GROUP}" p1="%d" p2="%d" p3="%d"/>\n'
-        yield from rows(template, np.hstack([mesh.triangles, colours[mesh.triangles]]))
-    yield END_OF_MESH
+        before = *TRIANGLE, f'" pid="{GROUP}" p1="', '" p2="', '" p3="'
+        yield from number_rows(before, END_OF_ROW, np.hstack([mesh.triangles, colours[mesh.triangles]]))
+    yield from _texts(END_OF_MESH)
 
 
-def vertex_rows(vertices: NDArray[np.float32]) -> Iterator[bytes]:
+def vertex_rows(vertices: NDArray[np.floating]) -> Iterator[Text]:
     """Encode vertices, in blocks of `text.ROWS`.
 
     Parameters
     ----------
-    vertices : ndarray of float32, shape (n, 3)
+    vertices : ndarray of float, shape (n, 3)
         Vertices, mm.
     """
-    return rows('<vertex x="%.9g" y="%.9g" z="%.9g"/>\n', vertices)
+    return number_rows(('<vertex x="', '" y="', '" z="'), END_OF_ROW, vertices)
 
 
-def triangle_rows(triangles: NDArray[np.integer]) -> Iterator[bytes]:
+def triangle_rows(triangles: NDArray[np.integer]) -> Iterator[Text]:
     """Encode triangles, in blocks of `text.ROWS`.
 
     Parameters
@@ -158,4 +166,4 @@ def triangle_rows(triangles: NDArray[np.integer]) -> Iterator[bytes]:
     triangles : ndarray of int, shape (n, 3)
         Indices of vertices.
     """
-    return rows('<triangle v1="%d" v2="%d" v3="%d"/>\n', triangles)
+    return number_rows(TRIANGLE, END_OF_ROW, triangles)

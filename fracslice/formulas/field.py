@@ -108,7 +108,7 @@ class Kernel(Protocol):
 class FieldLoop(Protocol):
     """A loop over a field."""
 
-    def __call__(self, frame: np.ndarray, rows: np.ndarray, out: np.ndarray, *numbers: int) -> None:
+    def __call__(self, frame: np.ndarray, rows: np.ndarray, out: np.ndarray) -> None:
         """Run the loop.
 
         Parameters
@@ -119,8 +119,6 @@ class FieldLoop(Protocol):
             Input rows, C-contiguous.
         out
             Receives the output rows, C-contiguous.
-        *numbers
-            Integer arguments of the loop.
         """
 
     def native(self, frame: np.ndarray) -> tuple[Any, ...] | Callable[..., None]:
@@ -134,7 +132,7 @@ class FieldLoop(Protocol):
         Returns
         -------
         tuple or callable
-            Machine code, parameters and frame; or a function of input rows, output rows and numbers.
+            Machine code, parameters and frame; or a function of input rows and output rows.
         """
 
 

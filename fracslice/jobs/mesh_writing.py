@@ -139,10 +139,10 @@ class Writing:
         about = metadata(self.scene)
         with replacing(self.path) as file, flushing(file):
             if self.path.suffix.lower() == STL:
-                write_pieces(timed(), file, about)
+                write_pieces(timed(), file, about, self.clock.work)
             else:
                 for whole in timed():
-                    FORMATS[self.path.suffix.lower()](whole, file, about)
+                    FORMATS[self.path.suffix.lower()](whole, file, about, self.clock.work)
         return None if several else mesh, simplified
 
     def _painted(self, meshes: Iterator[Mesh], finish: Finish) -> Iterator[Mesh]:

@@ -95,7 +95,7 @@ class EncodeTask(MeshTask):
         begin = self.number * BLOCKS * texts.ROWS
         blocks, whole = list[bytes](), TextSum(0, 0)
         for text in self.rows(table, begin, begin + BLOCKS * texts.ROWS):
-            block, about = deflated(text)
+            block, about = deflated(text())
             blocks.append(block)
             whole = followed(whole, about)
         self.pieces.write(self.job, self.text_file, blocks)
@@ -106,7 +106,7 @@ class EncodeTask(MeshTask):
         """Name of the file with the deflated text."""
         return f"text-{self.name}"
 
-    def rows(self, table: Files, begin: int, end: int) -> Iterator[bytes]:
+    def rows(self, table: Files, begin: int, end: int) -> Iterator[texts.Text]:
         """Text of rows, in blocks."""
         raise NotImplementedError
 
@@ -116,7 +116,7 @@ class EncodeVertices(EncodeTask):
 
     stage = "encoded-vertices"
 
-    def rows(self, table: Files, begin: int, end: int) -> Iterator[bytes]:
+    def rows(self, table: Files, begin: int, end: int) -> Iterator[texts.Text]:
         """Text of rows, in blocks; see `EncodeTask.rows`."""
 
         def rows(number: int, part: slice) -> NDArray[np.float32]:
@@ -132,7 +132,7 @@ class EncodeTriangles(EncodeTask):
 
     stage = "encoded-triangles"
 
-    def rows(self, table: Files, begin: int, end: int) -> Iterator[bytes]:
+    def rows(self, table: Files, begin: int, end: int) -> Iterator[texts.Text]:
         """Text of rows, in blocks; see `EncodeTask.rows`."""
 
         def rows(number: int, part: slice) -> NDArray[np.int64]:

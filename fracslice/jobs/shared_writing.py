@@ -140,8 +140,8 @@ def write_shared(
         if path:
             with replacing(path) as file, flushing(file):
                 if mesh is None:
-                    stl.write_pieces(meshes, file, about)
+                    stl.write_pieces(meshes, file, about, surface.clock.work)
                 else:
-                    FORMATS[ending](mesh, file, about)
+                    FORMATS[ending](mesh, file, about, surface.clock.work)
     check.end()
     return check, mesh

@@ -40,9 +40,9 @@ class ArrayLoop:
     loop: Loop
     kernel: Kernel
 
-    def __call__(self, frame: np.ndarray, rows: np.ndarray, out: np.ndarray, *numbers: int) -> None:
+    def __call__(self, frame: np.ndarray, rows: np.ndarray, out: np.ndarray) -> None:
         with np.errstate(all="ignore"):
-            self.loop.function(self.kernel.points, frame, *rows, *out, *numbers, rows.shape[1])
+            self.loop.function(self.kernel.points, frame, *rows, *out, rows.shape[1])
 
     def native(self, frame: np.ndarray) -> Callable[..., None]:
         """Return the loop for native code; see `FieldLoop.native`."""

@@ -114,8 +114,8 @@ class CompiledLoop:
     function: Function
     parameters: np.ndarray
 
-    def __call__(self, frame: np.ndarray, rows: np.ndarray, out: np.ndarray, *numbers: int) -> None:
-        self.function(self.parameters, frame, *rows, *out, *numbers, rows.shape[1])
+    def __call__(self, frame: np.ndarray, rows: np.ndarray, out: np.ndarray) -> None:
+        self.function(self.parameters, frame, *rows, *out, rows.shape[1])
 
     def native(self, frame: np.ndarray) -> tuple[Function, np.ndarray, np.ndarray]:
         """Return the loop for native code; see `FieldLoop.native`."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
 from contextlib import suppress
 from functools import lru_cache
@@ -12,6 +11,9 @@ from typing import Any
 from ..common.extras import lacking
 from ..common.keys import key, texts
 from ..errors import KernelError
+from . import cuda_memory
+from .cuda_api import present
+from .kept_texts import kept_text
 
 NO_GPU = "CUDA: no NVIDIA GPU, or no driver for it, was found on this machine"
 """Message for a missing GPU or driver."""
@@ -27,22 +29,34 @@ def missing() -> str | None:
     """
     if reason := lacking("numba_cuda", "CUDA needs", "numba-cuda[cu13]"):
         return reason
-    if os.environ.get("NUMBA_ENABLE_CUDASIM") != "1" and not _driver():
+    if not simulated() and not present():
         return NO_GPU
+    try:
+        _compiler()
+    except KernelError as error:
+        return str(error)
+    return None
+
+
+def simulated() -> bool:
+    """Return True if Numba's simulator takes the place of a GPU."""
+    return os.environ.get("NUMBA_ENABLE_CUDASIM") == "1"
+
+
+@lru_cache(maxsize=1)
+def _compiler() -> str:
+    """Key of a compiler that works: cached, or imported, which takes longer than a small job."""
+    return kept_text("compilers", (cuda_toolchain(),), _imported)
+
+
+def _imported() -> str:
     try:
         from . import cuda_intrinsics
     except (ImportError, RuntimeError) as error:
-        return f"CUDA cannot be used: {str(error).splitlines()[0]}"
-    return None if cuda_intrinsics.cuda.is_available() else NO_GPU
-
-
-def _driver() -> bool:
-    """True if NVIDIA's driver is installed: a fast test without Numba."""
-    try:
-        ctypes.CDLL("nvcuda.dll" if os.name == "nt" else "libcuda.so.1")
-    except OSError:
-        return False
-    return True
+        raise KernelError(f"CUDA cannot be used: {str(error).splitlines()[0]}") from error
+    if not cuda_intrinsics.cuda.is_available():
+        raise KernelError(NO_GPU)
+    return cuda_toolchain()
 
 
 def available() -> bool:
@@ -51,12 +65,12 @@ def available() -> bool:
 
 
 def require() -> Any:
-    """Return Numba's ``cuda`` module.
+    """Return the functions that allocate arrays.
 
     Returns
     -------
     module
-        Module `numba.cuda`.
+        Module `cuda_memory`; for Numba's simulator, `numba.cuda`.
 
     Raises
     ------
@@ -66,6 +80,8 @@ def require() -> Any:
     reason = missing()
     if reason:
         raise KernelError(reason)
+    if not simulated():
+        return cuda_memory
     from . import cuda_intrinsics
 
     return cuda_intrinsics.cuda

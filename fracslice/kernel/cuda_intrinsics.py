@@ -26,13 +26,12 @@ if not hasattr(np, "row_stack"):  # NumPy 2.5 removed it, but numba-cuda 0.30 st
 from llvmlite import ir
 
 cuda: Any = import_module("numba.cuda")
-cuda.config.CUDA_LOW_OCCUPANCY_WARNINGS = 0  # small launches are intended
 SIMULATED = bool(cuda.config.ENABLE_CUDASIM)
-_types: Any = np if SIMULATED else import_module("numba.cuda.types")
-float32, float64, int32 = _types.float32, _types.float64, int if SIMULATED else _types.int32
+types: Any = np if SIMULATED else import_module("numba.cuda.types")
+float32, float64, int32 = types.float32, types.float64, int if SIMULATED else types.int32
 device = cuda.jit(device=True) if SIMULATED else cuda.jit(device=True, forceinline=True)
 called = cuda.jit(device=True)
-kernel = cuda.jit(cache=True)
+kernel = cuda.jit
 
 
 @device

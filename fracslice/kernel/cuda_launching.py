@@ -1,35 +1,27 @@
-"""Loops over linked scenes on an NVIDIA GPU.
-
-Machine code is cached in the cache folder, next to its source text.
-"""
+"""Loops over linked scenes on an NVIDIA GPU."""
 
 from __future__ import annotations
 
-import sys
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from ..common.keys import key
 from ..formulas.field import Loops, Precision
 from . import cuda_source
-from .cuda_driver import cuda_toolchain, require
+from .cuda_code import loaded
+from .cuda_driver import require
 from .linker import Linked
 from .loops import Loop
-from .modules import imported
 
 BLOCK = 128
 """Threads per block."""
 
 _LAUNCH = threading.Lock()
-"""Lock around kernel launches: Numba's first launch of a kernel must happen only once, and launching holds
-the GIL anyway.
-"""
+"""Lock around kernel launches: the first of a loop compiles it, which must happen only once."""
 
 LANES = 1 << 18
 """Lanes of a call of a loop: few enough that one call is copied while native code prepares others."""
@@ -50,10 +42,10 @@ class CudaLoop:
     loop: Any
     parameters: Any
 
-    def __call__(self, frame: np.ndarray, rows: np.ndarray, out: np.ndarray, *numbers: int) -> None:
+    def __call__(self, frame: np.ndarray, rows: np.ndarray, out: np.ndarray) -> None:
         cuda = require()
         result = cuda.to_device(out)
-        self.launch(rows.shape[1], cuda.to_device(frame), *cuda.to_device(rows), *result, *numbers)
+        self.launch(rows.shape[1], cuda.to_device(frame), *cuda.to_device(rows), *result)
         result.copy_to_host(out)
 
     def launch(self, count: int, frame: Any, *arguments: Any) -> None:
@@ -66,7 +58,7 @@ class CudaLoop:
         frame
             Frame of the loop.
         *arguments
-            Input rows, output rows and numbers.
+            Input rows and output rows.
         """
         launched(self.loop, count, self.parameters, frame, *arguments, count)
 
@@ -124,7 +116,7 @@ def parameters(linked: Linked, precision: Precision) -> Any:
     return require().to_device(linked.parameters.astype(precision))
 
 
-def load_loops(linked: Linked, precision: Precision, loops: Sequence[Loop]) -> ModuleType:
+def load_loops(linked: Linked, precision: Precision, loops: Sequence[Loop]) -> Any:
     """Load loops over a linked scene. Each is compiled at its first call, for the types of its arguments.
 
     Parameters
@@ -138,8 +130,8 @@ def load_loops(linked: Linked, precision: Precision, loops: Sequence[Loop]) -> M
 
     Returns
     -------
-    module
-        Module with the loops as attributes.
+    object
+        Has the loops as attributes.
 
     Raises
     ------
@@ -148,5 +140,4 @@ def load_loops(linked: Linked, precision: Precision, loops: Sequence[Loop]) -> M
     """
     require()
     text = cuda_source.module(linked, 32 if precision == "float32" else 64, loops)
-    name = f"cuda_{key(text, cuda_toolchain())}"
-    return sys.modules.get(name) or imported(name, text)
+    return loaded(text, tuple(loop.name for loop in loops))

@@ -99,8 +99,10 @@ class SurfaceContours:
 
         cells, signs = self._cells, self.signs
         surface = Contouring(cells, first, last, *self._placement)
-        for begin, end in _batches(cells, first - 1, last + 1, work.threads << 16):
-            known = refiner.between(*map(cells.crossings_before, (min(begin, last - 1), end + 1)))
+        batches = list(_batches(cells, first - 1, last + 1, work.threads << 16))
+        before = cells.crossings_before
+        needed = [(before(min(begin, last - 1)), before(end + 1)) for begin, end in batches]
+        for (_, end), known in zip(batches, refiner.each(needed), strict=True):
             called(surface.advance, end, known.first, known.t, known.normals)
         vertices, triangles, count, cases, to_means = surface.finish()
         features = vertices[count:]

@@ -6,17 +6,21 @@ fold a mesh or make it self-intersect if its triangles stay in their cells.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from .._native import Cells, RootLoops
+from ..background import ahead
 from ..kernel import Field
 from ..work import Work
-from .roots import MOST, QUICK, SURE, Roots
+from .roots import SURE, Roots
 
 Point = tuple[float, float, float]
+Memory = tuple[np.ndarray, np.ndarray]
+"""Positions along the edges, float64 [n], and normals, float32 [3, n]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,14 +45,8 @@ class Crossings:
 class Search(Protocol):
     """Search for intersections on numbered grid edges."""
 
-    def memory(self, size: int) -> tuple[np.ndarray, np.ndarray]:
-        """Allocate memory for intersections.
-
-        Returns
-        -------
-        tuple of ndarray
-            Positions along the edges, float64 [size], and normals, float32 [3, size].
-        """
+    def memory(self, size: int) -> Memory:
+        """Return memory for at least `size` intersections, which may be that of an earlier call."""
 
     def find(self, begin: int, end: int, t: np.ndarray, normals: np.ndarray) -> None:
         """Find intersections `begin` to `end` - 1.
@@ -82,12 +80,15 @@ class LaneSearch:
     ) -> None:
         loops = fast.native("find"), exact.native("find"), exact.native("polish")
         entry = root.kernel("cpu", "float64").entry
-        self._loops = RootLoops(fast.width, fast.batch, *loops, entry, (QUICK, MOST), SURE)
+        self._loops = RootLoops(fast.width, fast.batch, *loops, entry, SURE)
         self._cells, self._placement = cells, (origin, voxel)
+        self._memory: Memory = np.empty(0), np.empty((3, 0), np.float32)
 
-    def memory(self, size: int) -> tuple[np.ndarray, np.ndarray]:
+    def memory(self, size: int) -> Memory:
         """See `Search.memory`."""
-        return np.empty(size), np.empty((3, size), np.float32)
+        if size > len(self._memory[0]):
+            self._memory = np.empty(size), np.empty((3, size), np.float32)
+        return self._memory
 
     def find(self, begin: int, end: int, t: np.ndarray, normals: np.ndarray) -> None:
         """See `Search.find`."""
@@ -127,10 +128,33 @@ class Refiner:
             from .cuda_crossings import CudaSearch
 
             self._search: Search = CudaSearch(fast, exact, cells, origin, voxel)
+            self._in_order: Callable[[Iterator[Crossings]], Iterator[Crossings]] = ahead
         else:
-            self._search = LaneSearch(root, fast, exact, cells, origin, voxel)
-        self._memory: tuple[np.ndarray, np.ndarray] = np.empty(0), np.empty((3, 0), np.float32)
+            self._search, self._in_order = LaneSearch(root, fast, exact, cells, origin, voxel), iter
+        self._memory: Memory = np.empty(0), np.empty((3, 0), np.float32)
         self._first, self._end = 0, 0  # computed intersections: first in memory, one past the last
+
+    def each(self, ranges: Iterable[tuple[int, int]]) -> Iterator[Crossings]:
+        """Yield the intersections of ranges, as `between` returns them.
+
+        A GPU finds those of the next range while the caller uses the ones before.
+
+        Parameters
+        ----------
+        ranges
+            First intersections, ascending, and ends.
+
+        Yields
+        ------
+        Crossings
+            Views that are valid until the next ones are asked for.
+
+        Raises
+        ------
+        Cancelled
+            If the job was cancelled.
+        """
+        return self._in_order(self.between(begin, end) for begin, end in ranges)
 
     def between(self, begin: int, end: int) -> Crossings:
         """Return the intersections from number `begin` to at least `end` - 1.
@@ -147,7 +171,7 @@ class Refiner:
         Returns
         -------
         Crossings
-            Views that the next call overwrites.
+            Views that the next call overwrites; on a GPU, the call after that.
 
         Raises
         ------
@@ -162,14 +186,13 @@ class Refiner:
             self._end = end
         return Crossings(begin, t, normals)
 
-    def _space(self, begin: int, size: int, known: int) -> tuple[np.ndarray, np.ndarray]:
+    def _space(self, begin: int, size: int, known: int) -> Memory:
         """Memory for `size` intersections, the first `known` of which are computed. They are moved only if no
         space is left behind them.
         """
         memory, here = self._memory, begin - self._first
         if here + size > len(memory[0]):
-            if 2 * size > len(memory[0]):
-                self._memory = self._search.memory(2 * size)
+            self._memory = self._search.memory(2 * size)
             for old, new in zip(memory, self._memory, strict=True):
                 new[..., :known] = old[..., here : here + known]
             self._first, here = begin, 0

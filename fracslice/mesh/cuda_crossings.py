@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
@@ -11,10 +12,44 @@ from ..kernel.cuda_driver import require
 from ..kernel.cuda_launching import CudaLoop, launched, load_loops
 from ..kernel.linker import Linked
 from .cuda_segment_loops import LOOPS
-from .roots import MOST, SURE, Roots
+from .roots import SURE, Roots
 
-MOST_EDGES = 1 << 20
-"""Grid edges of one round, which take 140 MB of GPU memory."""
+MOST_EDGES = 1 << 21
+"""Grid edges of one round, which take 300 MB of GPU memory; a batch of a mesh on 16 cores has fewer."""
+
+
+class Table:
+    """Rows in GPU memory for the edges of one round. Slicing takes longer than launching: it happens once.
+
+    Attributes
+    ----------
+    whole
+        All rows, [count, MOST_EDGES].
+    rows
+        Each row.
+    """
+
+    def __init__(self, count: int, dtype: np.typing.DTypeLike) -> None:
+        self.whole = require().device_array((count, MOST_EDGES), dtype)
+        self.rows = [self.whole[k] for k in range(count)]
+
+
+@dataclass(frozen=True, eq=False)
+class Find:
+    """Loop `find` of one precision.
+
+    Attributes
+    ----------
+    launch, frame
+        Function that launches it, and its FRAME.
+    segments, roots
+        What it reads and writes.
+    """
+
+    launch: Any
+    frame: Any
+    segments: Table
+    roots: Any
 
 
 class CudaSearch:
@@ -35,24 +70,30 @@ class CudaSearch:
     ) -> None:
         self._cuda, self._cells, self._placement = require(), cells, (*origin, voxel)
         self._loops = load_loops(Linked("", np.zeros(1)), "float64", LOOPS)
-        loops: list[tuple[Roots, str]] = [(fast, "find"), (exact, "find"), (exact, "polish")]
-        self._find_fast, self._find, self._polish = (
-            (cast(CudaLoop, roots.runs[name]).launch, self._cuda.to_device(roots.frame))
-            for roots, name in loops
+        self._edges = self._cuda.device_array((MOST_EDGES, 4), np.int16)
+        self._fast, self._exact = (
+            Find(*self._loop(roots, "find"), Table(6, roots.dtype), self._row(roots.dtype))
+            for roots in (fast, exact)
         )
-        self._narrow, self._guesses = self._rows(6, np.float32), self._rows(1, np.float32)
-        self._segments, self._found = self._rows(6, np.float64), self._rows(1, np.float64)
-        self._roots, self._polished = self._rows(1, np.float64), self._rows(4, np.float64)
-        self._normals, self._unsure = self._rows(3, np.float32), self._rows(1, np.uint8)
+        self._polish = self._loop(exact, "polish")
+        self._roots, self._polished = self._row(np.float64), Table(4, np.float64)
+        self._normals, self._unsure = Table(3, np.float32), self._row(np.uint8)
+        self._memories = [(np.empty(0), np.empty((3, 0), np.float32))] * 2
 
-    def _rows(self, count: int, dtype: type) -> Any:
-        """Allocate GPU memory for the segments of one round, [count, MOST_EDGES]."""
-        return self._cuda.device_array((count, MOST_EDGES), dtype)
+    def _loop(self, roots: Roots, name: str) -> tuple[Any, Any]:
+        """Function that launches a loop, and its FRAME."""
+        return cast(CudaLoop, roots.runs[name]).launch, self._cuda.to_device(roots.frame)
+
+    def _row(self, dtype: np.typing.DTypeLike) -> Any:
+        return self._cuda.device_array(MOST_EDGES, dtype)
 
     def memory(self, size: int) -> tuple[np.ndarray, np.ndarray]:
-        """See `Search.memory`."""
-        pinned = self._cuda.pinned_array  # the GPU copies faster into page-locked memory
-        return pinned(size, np.float64), pinned((3, size), np.float32)
+        """See `Search.memory`. It alternates between two: the caller still reads the other."""
+        self._memories.reverse()
+        if size > len(self._memories[0][0]):
+            pinned = self._cuda.pinned_array  # the GPU copies faster into page-locked memory
+            self._memories[0] = pinned(size, np.float64), pinned((3, size), np.float32)
+        return self._memories[0]
 
     def find(self, begin: int, end: int, t: np.ndarray, normals: np.ndarray) -> None:
         """See `Search.find`."""
@@ -63,35 +104,27 @@ class CudaSearch:
 
     def _round(self, edges: np.ndarray, t: np.ndarray, normals: np.ndarray) -> None:
         """Find roots in float32 and polish them in float64; find them in float64 where that is not exact."""
-        unsure = np.flatnonzero(
-            self._searched(self._find_fast, self._narrow, self._guesses, edges, t, normals)
-        )
+        unsure = np.flatnonzero(self._searched(self._fast, edges, t, normals))
         if len(unsure):
             few = np.empty(len(unsure)), np.empty((3, len(unsure)), np.float32)
-            self._searched(self._find, self._segments, self._found, edges[unsure], *few)
+            self._searched(self._exact, edges[unsure], *few)
             for row, new in zip((t, *normals), (few[0], *few[1]), strict=True):
                 row[unsure] = new
 
-    def _searched(
-        self,
-        find: tuple[Any, Any],
-        segments: Any,
-        found: Any,
-        edges: np.ndarray,
-        t: np.ndarray,
-        normals: np.ndarray,
-    ) -> np.ndarray:
-        """Find and polish roots; return flags of those that are not exact."""
-        n, (run, frame), (polish, exact_frame) = len(edges), find, self._polish
-        placed = self._cuda.to_device(edges)
-        launched(self._loops.lay, n, placed, *self._placement, self._segments, self._narrow)
-        run(n, frame, *segments, found[0], MOST)
-        launched(self._loops.start, n, found[0], self._roots[0], n)
-        polish(n, exact_frame, *self._segments, self._roots[0], *self._polished)
-        results = self._roots[0], self._polished, SURE, self._normals, self._unsure[0]
-        launched(self._loops.collect, n, found[0], *results, n)
-        self._roots[0, :n].copy_to_host(t)
-        for k in range(3):
-            self._normals[k, :n].copy_to_host(normals[k])
-        flags: np.ndarray = self._unsure[0, :n].copy_to_host()
-        return flags
+    def _searched(self, find: Find, edges: np.ndarray, t: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """Find and polish roots; return a mask of those that are not exact."""
+        n, (polish, frame) = len(edges), self._polish
+        segments, polished = self._exact.segments, self._polished
+        self._edges[:n].copy_to_device(edges)
+        launched(
+            self._loops.lay, n, self._edges, *self._placement, segments.whole, self._fast.segments.whole, n
+        )
+        find.launch(n, find.frame, *find.segments.rows, find.roots)
+        launched(self._loops.start, n, find.roots, self._roots, n)
+        polish(n, frame, *segments.rows, self._roots, *polished.rows)
+        results = self._roots, polished.whole, SURE, self._normals.whole, self._unsure
+        launched(self._loops.collect, n, find.roots, *results, n)
+        for row, to in zip((self._roots, *self._normals.rows), (t, *normals), strict=True):
+            row[:n].copy_to_host(to)
+        flags: np.ndarray = self._unsure[:n].copy_to_host()
+        return flags.view(np.bool_)  # NumPy finds flags twenty times faster than other numbers

@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-from ..kernel.cuda_stubs import device, kernel, real, thread
+from ..kernel.cuda_stubs import kernel, real, thread
 
 
 @kernel
-def lay(E, ox, oy, oz, h, R, S):
+def lay(E, ox, oy, oz, h, R, S, n):
     """Lay grid edges out as segments.
 
     Parameters
     ----------
-    E : array of int16, shape (n, 4)
+    E : array of int16, shape (n or more, 4)
         Lower grid point and axis of each edge.
     ox, oy, oz, h : float
         Position of grid point (0, 0, 0), and grid spacing, scene units.
     R, S : array of float64 and of float32, shape (6, n or more)
         Receive the segments.
+    n : int
+        Number of edges.
     """
     i = thread()
-    if i < E.shape[0]:
+    if i < n:
         R[0, i] = ox + h * real(E[i, 0])
         R[1, i] = oy + h * real(E[i, 1])
         R[2, i] = oz + h * real(E[i, 2])
@@ -27,12 +29,6 @@ def lay(E, ox, oy, oz, h, R, S):
             R[3 + k, i] = h if E[i, 3] == k else real(0)
         for k in range(6):
             S[k, i] = R[k, i]
-
-
-@device
-def unmarked(root):
-    """Return a root of `find` without the mark of too many steps."""
-    return root - real(2) if root > real(1) else root
 
 
 @kernel
@@ -50,7 +46,7 @@ def start(U, T, n):
     """
     i = thread()
     if i < n:
-        T[i] = unmarked(real(U[i]))
+        T[i] = U[i]
 
 
 @kernel
@@ -81,7 +77,7 @@ def collect(U, T, D, sure, N, F, n):
         F[i] = 0
         if not D[3, i] <= sure:
             F[i] = 1
-            T[i] = unmarked(real(U[i]))
+            T[i] = U[i]
 
 
 LOOPS = lay, start, collect

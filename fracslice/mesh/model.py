@@ -197,13 +197,9 @@ class Mesh(Exchange):
         Mesh
             The same triangles, in order, without unused vertices.
         """
-        flat = self.triangles.ravel()
-        first = np.full(len(self.vertices), -1)
-        first[flat[::-1]] = np.arange(len(flat))[::-1]  # the last assignment stays
-        starts = np.zeros(len(flat), bool)
-        starts[first[first >= 0]] = True
-        number = np.cumsum(starts, dtype=np.int32) - np.int32(1)
-        return self._taken(flat[starts], number[first[self.triangles]])
+        from .._native import in_order
+
+        return self._taken(*in_order(self.triangles, len(self.vertices)))
 
     def compact(self) -> Mesh:
         """Remove unused vertices.

@@ -9,7 +9,7 @@ import numpy as np
 from .. import _native
 from ..kernel import Field
 from ..work import Work, chunks
-from .roots import MOST, QUICK, Roots
+from .roots import Roots
 
 TrustRegions = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """Function of point numbers, [n], and of a mask of the interior ones, [n]; float64 [4, 3, n], scene units.
@@ -19,8 +19,8 @@ the boxes or on their boundaries where the field has the opposite sign, or NaN; 
 middle of the known part of the surface there, or NaN.
 """
 
-AT_ONCE = 1 << 17
-"""Points projected between two checks for cancellation."""
+AT_ONCE = 1 << 16
+"""Points per thread between two checks for cancellation."""
 
 
 def project(
@@ -59,8 +59,8 @@ def project(
     guess, exact = (Roots(root, precision, voxel) for precision in ("float32", "float64"))
     lead, find, entry = guess.native("lead"), guess.native("find"), root.kernel("cpu", "float64").entry
     exactly = exact.native("find"), exact.native("aim")
-    loops = _native.ProjectionLoops(guess.width, lead, find, *exactly, entry, (QUICK, MOST))
-    for part in chunks(len(points), AT_ONCE):
+    loops = _native.ProjectionLoops(guess.width, lead, find, *exactly, entry)
+    for part in chunks(len(points), AT_ONCE * work.threads):
         work.check()
         _native.project(points, part.start, part.stop, loops, trust_regions, voxel, work.threads)
 

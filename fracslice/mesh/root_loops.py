@@ -15,9 +15,12 @@ from ..formulas.vocabulary import absolute, any_of, maximum, minimum, rsqrt, whe
 from ..kernel.intrinsics import WIDTH, field, load, store
 from ..kernel.loops import loop
 
+STEPS = 48
+"""Largest number of steps to a root."""
 
-@loop("rrrrrrrrrnn")
-def find(P, FRAME, X, Y, Z, DX, DY, DZ, T, steps, n):
+
+@loop("rrrrrrrrrn")
+def find(P, FRAME, X, Y, Z, DX, DY, DZ, T, n):
     """Find one root on each of n segments.
 
     Fields are steep on one side of their surface and flat on the other, so the secant goes through the last
@@ -28,9 +31,7 @@ def find(P, FRAME, X, Y, Z, DX, DY, DZ, T, steps, n):
     ----------
     T
         Receives the roots as fractions of the segments, [n]. If both ends have the same sign, the end nearer
-        to zero; 2 is added to a root that needs more than `steps` steps.
-    steps
-        Largest number of steps.
+        to zero.
     """
     over, small, near, close = FRAME[0], FRAME[1], FRAME[2], FRAME[5]
     for i in range(0, n, WIDTH):
@@ -46,7 +47,7 @@ def find(P, FRAME, X, Y, Z, DX, DY, DZ, T, steps, n):
         t = where((fa < 0.0) & (fb < 0.0), where(fa > fb, a, b), where(fa < fb, a, b))
         open = ((fa < 0.0) & (fb >= 0.0)) | ((fa >= 0.0) & (fb < 0.0))
         u = fa / (fa - fb)
-        for step in range(steps):
+        for step in range(STEPS):
             if not any_of(open):
                 break
             t = where(open, a + u * (b - a), t)
@@ -68,7 +69,7 @@ def find(P, FRAME, X, Y, Z, DX, DY, DZ, T, steps, n):
             u = where(within, minimum(maximum(u, least), 1.0 - least), 0.5)
             if step > 8 and step % 2 > 0:
                 u = 0.5 + 0.0 * x
-        store(T, i, where(open, t + 2.0, t))
+        store(T, i, t)
 
 
 @loop("rrrrrrrrrrrrrn")

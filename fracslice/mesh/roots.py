@@ -1,4 +1,4 @@
-"""Roots of a field on many segments at once: the compiled loops and their rounds.
+"""Roots of a field on many segments at once: the compiled loops.
 
 A segment is six rows: its start, and the vector to its end; a root is a fraction t of it. Each lane is
 independent: its result does not depend on its neighbours or on the order of the segments.
@@ -17,9 +17,6 @@ from .root_loops import aim, find, lead, polish
 
 FRAMES = {"float32": (1e-6, 1e-5, 5e-2, 1e-6, 3e-4), "float64": (1e-9, 1e-7, 1e-5, 1e-6, 1e-7)}
 """Entries of FRAME after the first, lengths in voxels."""
-
-QUICK, MOST = 8, 48
-"""Steps for all segments, and further steps for those not finished."""
 
 SURE = 1e-4
 """Length of Newton's last step, as a fraction of a voxel, below which a root is exact: the error is of the

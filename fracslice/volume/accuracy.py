@@ -15,8 +15,8 @@ from ..work import Work, chunks
 REACH = 1e-4
 """Step of the finite differences, in voxels."""
 
-AT_ONCE = 1 << 17
-"""Points measured between two checks for cancellation."""
+AT_ONCE = 1 << 16
+"""Points per thread between two checks for cancellation."""
 
 _AXES = np.eye(3)
 _DIAGONALS = [way for way in product((-1.0, 0.0, 1.0), repeat=3) if np.count_nonzero(way) > 1]
@@ -121,7 +121,7 @@ def surface_error(
     points, error = np.asarray(points, np.float64), np.empty(len(points))
     rest = scale, offset, step * DIRECTIONS, step, voxel, work.threads
     entry = root.kernel("cpu", "float64").entry
-    for part in chunks(len(points), AT_ONCE):
+    for part in chunks(len(points), AT_ONCE * work.threads):
         work.check()
         error[part] = measured(entry, points[part], *rest)
     return error

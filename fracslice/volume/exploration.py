@@ -63,17 +63,18 @@ def brick_signs(kernel: Kernel, corners: np.ndarray, lattice: Lattice, values: n
     lattice
         Sampling grid.
     values
-        Output: the samples, float32 [n, 512].
+        Output: the samples, float32 [n, 512]; NaN where the field is.
 
     Returns
     -------
     ndarray
         Sign bits, uint8 [n, 64], set inside.
     """
+    from .._native import signs
+
     kernel.bricks(corners, lattice.origin, lattice.voxel, values)
-    if np.isnan(values.max()):
-        np.nan_to_num(values, copy=False, nan=lattice.voxel)
-    return np.packbits(values < 0, axis=1, bitorder="little")
+    bits: np.ndarray = signs(values, 1)
+    return bits.reshape(-1, 64)
 
 
 @dataclass
@@ -174,25 +175,29 @@ class Exploration:
     def sampled(self, states: States, bricks: np.ndarray) -> np.ndarray:
         """Sample bricks; return their sign bits, uint8 [n, 8, 8], bit z of byte (x, y) set inside."""
         corners = np.empty((len(bricks), 3), np.int32)
-        whole = self.evaluate if len(bricks) >= MANY else None
+        self.pruning.evaluations += len(bricks) * BRICK**3
+
+        def place(part: slice) -> None:
+            corners[part] = states.places(bricks[part]).T * BRICK
+
+        self.work.map(place, chunks(len(bricks), ROWS))
+        if self.evaluate and len(bricks) >= MANY:
+            return self.evaluate(corners).reshape(-1, 8, 8)
         values = np.empty((len(bricks) if self.keep else 0, BRICK**3), np.float32)
-        signs = np.empty((0 if whole else len(bricks), 64), np.uint8)
+        bits = np.empty((len(bricks), 64), np.uint8)
 
         def task(part: slice) -> None:
-            corners[part] = states.places(bricks[part]).T * BRICK
-            if not whole:
-                out = values[part] if self.keep else np.empty((part.stop - part.start, BRICK**3), np.float32)
-                signs[part] = brick_signs(self.kernel, corners[part], self.lattice, out)
+            out = values[part] if self.keep else np.empty((part.stop - part.start, BRICK**3), np.float32)
+            bits[part] = brick_signs(self.kernel, corners[part], self.lattice, out)
+            if self.keep and np.isnan(out.max()):
+                np.nan_to_num(out, copy=False, nan=self.lattice.voxel)
 
         most = self.kernel.batch // BRICK**3
         size = min(max(len(bricks) // (TASKS * self.work.threads), -(-most // SHARES)), most)
         self.work.map(task, chunks(len(bricks), size))
-        self.pruning.evaluations += len(bricks) * BRICK**3
-        if whole:
-            signs = whole(corners)
         if self.keep:
             self.keep(values)
-        return signs.reshape(-1, 8, 8)
+        return bits.reshape(-1, 8, 8)
 
     def neighbours(self, states: States, bricks: np.ndarray, signs: np.ndarray) -> list[np.ndarray]:
         """Bricks that must be sampled because of the signs on the faces of these bricks."""

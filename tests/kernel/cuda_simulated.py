@@ -8,13 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from fracslice._native import Cells
 from fracslice.formulas.catalogue import FORMULAS
 from fracslice.kernel import cuda, reference
-from fracslice.mesh.crossings import Refiner
-from fracslice.mesh.roots import LOOPS, MOST, Roots
-from fracslice.volume import plan, sample_scene
-from fracslice.work import Work
+from fracslice.mesh.roots import LOOPS, Roots
 from tests.examples import DEFINED, EXAMPLES
 from tests.kernel.idioms import HEAD, SAME, P, imported
 
@@ -30,7 +26,6 @@ def main() -> None:
         idioms()
         bricks()
         roots()
-        crossings()
 
 
 def points(name: str, kernel: cuda.CudaKernel, expected: Callable[..., np.ndarray]) -> None:
@@ -66,10 +61,10 @@ def bricks() -> None:
     kernel.bricks(corners[:0], (0, 0, 0), 1.0, out[:0])
 
 
-def ran(finder: Roots, name: str, rows: np.ndarray, count: int, *numbers: int) -> np.ndarray:
+def ran(finder: Roots, name: str, rows: np.ndarray, count: int) -> np.ndarray:
     """Rows that a loop writes."""
     out = np.empty((count, rows.shape[1]), finder.dtype)
-    finder.runs[name](finder.frame, rows, out, *numbers)
+    finder.runs[name](finder.frame, rows, out)
     return out
 
 
@@ -83,7 +78,7 @@ def roots() -> None:
     for precision, tolerance in (("float32", 1e-4), ("float64", 1e-9)):
         rows = segments.astype(precision)
         lanes, threads = (Roots(root, precision, 0.02, device) for device in ("cpu", "cuda"))
-        expected, computed = (ran(finder, "find", rows, 1, MOST)[0] for finder in (lanes, threads))
+        expected, computed = (ran(finder, "find", rows, 1)[0] for finder in (lanes, threads))
         assert ((expected > 0) & (expected < 1)).all()
         np.testing.assert_allclose(computed, expected, atol=tolerance)
     polished = [np.tile(expected, (5, 1)) for _ in range(2)]
@@ -95,21 +90,6 @@ def roots() -> None:
     finders = (Roots(root, "float32", 0.02, device) for device in ("cpu", "cuda"))
     guesses = [ran(finder, "lead", regions.astype(np.float32), 3) for finder in finders]
     np.testing.assert_allclose(*guesses, atol=1e-3)
-
-
-def crossings() -> None:
-    """A thread per grid edge finds the crossings and normals of the lanes."""
-    planned = plan(EXAMPLES["torus"], 16)
-    bricks = sample_scene(planned)
-    cells = Cells(bricks.signs.ijk, bricks.signs.signs, bricks.signs.index)
-    count = cells.crossings_before(len(bricks.index))
-    lanes, threads = (
-        Refiner(planned.root, cells, bricks.origin, bricks.voxel, Work(1, device=device)).between(0, count)
-        for device in ("cpu", "cuda")
-    )
-    assert count > 100
-    np.testing.assert_allclose(threads.t, lanes.t, atol=1e-6)
-    np.testing.assert_allclose(threads.normals, lanes.normals, atol=1e-4)
 
 
 if __name__ == "__main__":

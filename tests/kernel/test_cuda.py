@@ -14,28 +14,15 @@ from pathlib import Path
 
 import pytest
 
-from fracslice.errors import FracsliceWarning, KernelError
+from fracslice.errors import KernelError
 from fracslice.formulas import Node, sphere
-from fracslice.kernel import cuda, cuda_loops, cuda_source, link, modules
+from fracslice.kernel import cuda, cuda_loops, cuda_source, link
 from tests.examples import DEFINED, EXAMPLES
 from tests.kernel.cuda_ptx import compiled
 
 installed = pytest.mark.skipif(
     importlib.util.find_spec("numba_cuda") is None, reason="numba-cuda is not installed"
 )
-
-
-def test_text_that_others_can_write_is_not_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    folder = tmp_path / "kernels"
-    monkeypatch.setenv("FRACSLICE_CACHE", str(folder))
-    kept = modules.kept_text(folder, "text", "value = 1")
-    assert kept == folder / "text.py" and kept.read_text() == "value = 1"
-    kept.write_text("value = 2")
-    assert modules.kept_text(folder, "text", "value = 1") == kept and kept.read_text() == "value = 1"
-    folder.chmod(0o777)
-    with pytest.warns(FracsliceWarning, match="others can write"):
-        assert modules.kept_text(folder, "text", "value = 1") is None
-    assert modules.imported("fracslice_text", "value = 3").value == 3
 
 
 @installed

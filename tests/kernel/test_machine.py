@@ -48,7 +48,7 @@ def test_native_objects_hold_the_code_and_the_arrays() -> None:
     fast, slow = Roots(box(), "float32", 0.1), Roots(box(), "float64", 0.1)
     given = fast.native("find"), slow.native("find"), slow.native("polish"), exact.entry
     held = [weakref.ref(part) for tuple_ in (kernel.entry, exact.entry) for part in tuple_]
-    slab, loops = slab_of(kernel.entry), RootLoops(16, 1024, *given, (8, 48), 1e-4)
+    slab, loops = slab_of(kernel.entry), RootLoops(16, 1024, *given, 1e-4)
     del kernel, exact, fast, slow, given
     gc.collect()
     assert all(part() is not None for part in held)

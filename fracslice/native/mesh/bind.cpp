@@ -1,6 +1,8 @@
 // Functions of fracslice._native on triangle meshes.
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
 
 #include "../unlocked.h"
 #include "components.h"
@@ -14,6 +16,7 @@
 #include "selection.h"
 #include "self_intersections.h"
 #include "stl.h"
+#include "text_rows.h"
 #include "tree.h"
 #include "weld.h"
 
@@ -25,6 +28,7 @@ using Point = std::array<double, 3>;
 void require_labels(const MeshView& mesh, const Vector<int32_t>& labels, size_t components) {
     if (labels.size() != mesh.vertices) throw std::invalid_argument("vertices and labels differ in length");
     require_below(span_of(labels), components, "a label names a component that does not exist", -1);
+    if (!counted(mesh.vertices, [&](size_t v) { return labels.data()[v] < 0; }).back()) return;
     std::atomic<bool> unknown = false;
     for_each_number(mesh.count, [&](size_t t) {
         if (labels.data()[mesh[t][0]] < 0) unknown.store(true, std::memory_order_relaxed);
@@ -117,6 +121,12 @@ nb::object bind_selected(const Rows<double>& vertices, const Rows<int32_t>& tria
     return nb::make_tuple(to_numpy(std::move(result.vertices), {n, 3}), to_numpy(std::move(result.triangles), {m, 3}));
 }
 
+nb::tuple bind_in_order(const Rows<int32_t>& triangles, size_t vertices) {
+    Ordered result = unlocked(0, [&] { return in_order(triangles_of(triangles, vertices)); });
+    size_t n = result.first.rows;
+    return nb::make_tuple(to_numpy(std::move(result.first), {n}), to_numpy(std::move(result.triangles), {triangles.shape(0), 3}));
+}
+
 nb::object bind_touching(const Rows<int32_t>& triangles, const Vector<bool>& vertices, int threads) {
     return numbers(unlocked(threads, [&] { return touching(triangles_of(triangles, vertices.size()), span_of(vertices)); }));
 }
@@ -141,6 +151,18 @@ nb::object bind_surroundings(const Rows<double>& vertices, const Rows<int32_t>& 
         MeshView mesh = mesh_of(vertices, triangles);
         return surroundings(mesh, marks_of(of, mesh.count));
     }));
+}
+
+template <class Number>
+nb::bytes bind_text_rows(const std::vector<std::string>& before, const std::string& end,
+                         const nb::ndarray<const Number, nb::ndim<2>, nb::c_contig, nb::device::cpu>& values) {
+    if (before.empty() || values.shape(1) != before.size()) throw nb::value_error("expected a text for each column");
+    std::string text;
+    {
+        nb::gil_scoped_release released;
+        text = text_rows<Number>(span_of(values), before, end);
+    }
+    return nb::bytes(text.data(), text.size());
 }
 
 nb::object bind_stl(const Rows<double>& vertices, const Rows<int32_t>& triangles, int threads) {
@@ -206,11 +228,14 @@ void bind_mesh(nb::module_& module) {
     module.def("quantise", &bind_quantise, "vertices"_a, "triangles"_a, "keep"_a, "displaced"_a, "rows"_a, "corners"_a, "planes"_a,
                "frame"_a, "threads"_a = 0);
     module.def("selected", &bind_selected, "vertices"_a, "triangles"_a, "keep"_a, "threads"_a = 0);
+    module.def("in_order", &bind_in_order, "triangles"_a, "vertices"_a);
     module.def("touching", &bind_touching, "triangles"_a, "vertices"_a, "threads"_a = 0);
     module.def("near", &bind_near, "vertices"_a, "triangles"_a, "points"_a, "reach"_a, "threads"_a = 0);
     module.def("near_bodies", &bind_near_bodies, "points"_a, "labels"_a, "bodies"_a, "count"_a, "largest"_a, "origin"_a, "edge"_a,
                "threads"_a = 0);
     module.def("surroundings", &bind_surroundings, "vertices"_a, "triangles"_a, "of"_a, "threads"_a = 0);
+    module.def("text_rows", &bind_text_rows<float>, "before"_a, "end"_a, "values"_a);
+    module.def("text_rows", &bind_text_rows<int64_t>, "before"_a, "end"_a, "values"_a);
     module.def("stl", &bind_stl, "vertices"_a, "triangles"_a, "threads"_a = 0);
     module.def("weld", &bind_weld, "points"_a);
     module.def("tree", &bind_tree, "vertices"_a, "triangles"_a, "threads"_a = 0);

@@ -136,10 +136,10 @@ void bind_contour(nb::module_& module) {
                "voxel"_a, "minimum_edge_parameter"_a);
     module.def("project", &bind_project, "points"_a, "first"_a, "last"_a, "loops"_a, "trust_regions"_a, "voxel"_a, "threads"_a = 0);
     nb::class_<ProjectionLoops>(module, "ProjectionLoops")
-        .def(nb::new_(&projection_loops), "lanes"_a, "lead"_a, "guess"_a, "find"_a, "aim"_a, "field"_a, "steps"_a);
+        .def(nb::new_(&projection_loops), "lanes"_a, "lead"_a, "guess"_a, "find"_a, "aim"_a, "field"_a);
     nb::class_<RootLoops>(module, "RootLoops")
         .def(nb::new_(&root_loops), "lanes"_a, "batch"_a, "guess"_a, "find"_a, "polish"_a, "field"_a,
-             "steps"_a, "sure"_a);
+             "sure"_a);
     nb::class_<SurfaceCells>(module, "Cells")
         .def(nb::init<const IjkArray&, const SignsArray&, const IndexArray&, int>(),
              "ijk"_a, "signs"_a, "index"_a, "threads"_a = 0)

@@ -1,5 +1,6 @@
 // Meshes that come in from Python: looked through once, for no index may leave its array.
 #pragma once
+#include <limits>
 #include <span>
 #include <stdexcept>
 #include <type_traits>
@@ -20,14 +21,16 @@ std::span<const T> span_of(const nb::ndarray<const T, Shape...>& values) {
     return {values.data(), values.size()};
 }
 
-// Throws std::invalid_argument unless all values are at least `least` and those that are not negative below `end`.
+// Throws std::invalid_argument unless all values are at least `least`, which is not positive, and below `end`.
 template <class T>
 void require_below(std::span<const T> values, size_t end, const char* what, std::type_identity_t<T> least = 0) {
+    using Unsigned = std::make_unsigned_t<T>;  // what is less than `least` is then larger than all
+    const Unsigned from = Unsigned(least), most = Unsigned(std::min(end, size_t(std::numeric_limits<T>::max()) + 1)) - from;
     std::atomic<bool> result = false;
     for_each_block(values.size(), [&](size_t, size_t first, size_t last) {
-        bool beyond = false;
-        for (size_t i = first; i < last; ++i) beyond |= values[i] < least || (values[i] >= 0 && size_t(values[i]) >= end);
-        if (beyond) result.store(true, std::memory_order_relaxed);
+        Unsigned largest = 0;
+        for (size_t i = first; i < last; ++i) largest = std::max(largest, Unsigned(Unsigned(values[i]) - from));
+        if (largest >= most) result.store(true, std::memory_order_relaxed);
     });
     if (result) throw std::invalid_argument(what);
 }

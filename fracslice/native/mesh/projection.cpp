@@ -60,7 +60,7 @@ class Projection {
         lead();
         exact_.pad();
         fast_.convert(exact_, loops_.lanes);
-        fast_.find(loops_.guess, loops_.steps, loops_.lanes, fast_left_, slow_ones_);
+        loops_.guess(fast_.rows.data(), fast_.out.data(), fast_.whole);
         std::copy(fast_.out.begin(), fast_.out.begin() + ptrdiff_t(fast_.whole), exact_.out.begin());
         loops_.aim(exact_.rows.data(), exact_.out.data(), exact_.whole);
         unsure_.clear();
@@ -95,7 +95,7 @@ class Projection {
     // The roots that have not converged, by the exact field alone.
     void again() {
         slow_.take(exact_, unsure_, loops_.lanes);
-        slow_.find(loops_.find, loops_.steps, loops_.lanes, left_, slow_ones_);
+        loops_.find(slow_.rows.data(), slow_.out.data(), slow_.whole);
         std::fill(&slow_.out[0] + slow_.count, &slow_.out[0] + slow_.whole, slow_.out[slow_.count - 1]);
         loops_.aim(slow_.rows.data(), slow_.out.data(), slow_.whole);
         for (size_t i = 0; i < slow_.count; ++i) {
@@ -116,9 +116,9 @@ class Projection {
     std::unique_ptr<bool[]> inside_;
     std::vector<double> all_, values_, box_;
     std::vector<float> relative_, directions_;
-    Segments<double> exact_, slow_, left_;
-    Segments<float> fast_, fast_left_;
-    std::vector<uint32_t> unsure_, slow_ones_;
+    Segments<double> exact_, slow_;
+    Segments<float> fast_;
+    std::vector<uint32_t> unsure_;
 };
 
 }  // namespace

@@ -11,12 +11,11 @@ namespace fracslice::mesh {
 // Loops of fracslice.mesh.root_loops over one field, and the field itself.
 struct ProjectionLoops {
     size_t lanes;
-    std::function<void(const float* regions, float* directions, size_t n)> lead;
-    Find<float> guess;
-    Find<double> find;
-    std::function<void(const double* segments, double* roots, size_t n)> aim;  // refines roots; behind them |f| in voxels
+    SegmentLoop<float> lead;  // from regions to directions
+    SegmentLoop<float> guess;
+    SegmentLoop<double> find;
+    SegmentLoop<double> aim;  // refines roots; behind them |f| in voxels
     volume::FieldValues field;
-    Steps steps;
 };
 
 // For some points, inside or not: rows of `which.size()` numbers: the low and the high corner of the box that each must not

@@ -1,5 +1,5 @@
-// Batch by batch, in memory that is used again. Segments without a root after a few steps, or after the polish, are gathered
-// and iterated by themselves.
+// Batch by batch, in memory that is used again. Segments whose roots the polish moves far are gathered and
+// searched again.
 #include "roots.h"
 
 #include <tbb/blocked_range.h>
@@ -167,7 +167,7 @@ class Search {
     void each(const RootRows& result) {
         take(exact_, edges_, which_, voxel_, loops_.lanes);
         fast_.convert(exact_, loops_.lanes);
-        fast_.find(loops_.guess, loops_.steps, loops_.lanes, fast_left_, slow_ones_);
+        loops_.guess(fast_.rows.data(), fast_.out.data(), fast_.whole);
         std::copy(fast_.out.begin(), fast_.out.begin() + ptrdiff_t(fast_.whole), exact_.out.begin());
         loops_.polish(exact_.rows.data(), exact_.out.data(), exact_.whole);
         unsure_.clear();
@@ -180,7 +180,7 @@ class Search {
 
     void again(const RootRows& result) {
         slow_.take(exact_, unsure_, loops_.lanes);
-        slow_.find(loops_.find, loops_.steps, loops_.lanes, left_, slow_ones_);
+        loops_.find(slow_.rows.data(), slow_.out.data(), slow_.whole);
         roots_.assign(slow_.out.begin(), slow_.out.begin() + ptrdiff_t(slow_.count));
         std::fill(&slow_.out[0] + slow_.count, &slow_.out[0] + slow_.whole, roots_.back());
         loops_.polish(slow_.rows.data(), slow_.out.data(), slow_.whole);
@@ -202,9 +202,9 @@ class Search {
     std::array<double, 3> origin_;
     double voxel_;
     GridEdges edges_;
-    Segments<double> exact_, slow_, left_;
-    Segments<float> fast_, fast_left_;
-    std::vector<uint32_t> which_, slow_ones_, unsure_;
+    Segments<double> exact_, slow_;
+    Segments<float> fast_;
+    std::vector<uint32_t> which_, unsure_;
     std::vector<Lead> leads_;
     std::vector<FlatBrick> flat_;
     std::vector<double> roots_;

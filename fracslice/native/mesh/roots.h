@@ -10,11 +10,10 @@ namespace fracslice::mesh {
 // other in one array; the field itself; and how many segments are worth a call.
 struct RootLoops {
     size_t lanes, batch;
-    Find<float> guess;
-    Find<double> find;
-    std::function<void(const double* segments, double* out, size_t n)> polish;  // out: roots, normals, how far they moved
+    SegmentLoop<float> guess;
+    SegmentLoop<double> find;
+    SegmentLoop<double> polish;  // out: roots, normals, how far they moved
     volume::FieldValues field;
-    Steps steps;
     double sure;  // a root is exact where it moved less
 };
 

@@ -8,14 +8,9 @@
 
 namespace fracslice::mesh {
 
-// Steps that all segments are given, and those that then are left.
-struct Steps {
-    size_t quick, most;
-};
-
-// A loop that finds roots on n segments, a multiple of the lanes, as fractions of them; more than 1 where it needs more steps.
+// A loop of fracslice.mesh.root_loops over n segments, a multiple of the lanes; `find` writes roots as fractions of them.
 template <class Real>
-using Find = std::function<void(const Real* segments, Real* roots, size_t steps, size_t n)>;
+using SegmentLoop = std::function<void(const Real* segments, Real* out, size_t n)>;
 
 constexpr size_t kRows = 6;  // of a segment
 
@@ -50,19 +45,6 @@ struct Segments {
             for (size_t i = 0; i < count; ++i) rows[k * whole + i] = from.rows[k * from.whole + which[i]];
         }
         pad();
-    }
-
-    // Finds the roots; `left` is for those that take many steps.
-    void find(const Find<Real>& function, const Steps& steps, size_t lanes, Segments& left, std::vector<uint32_t>& which) {
-        function(rows.data(), out.data(), steps.quick, whole);
-        which.clear();
-        for (size_t i = 0; i < count; ++i) {
-            if (out[i] > 1) which.push_back(uint32_t(i));
-        }
-        if (which.empty()) return;
-        left.take(*this, which, lanes);
-        function(left.rows.data(), left.out.data(), steps.most, left.whole);
-        for (size_t i = 0; i < which.size(); ++i) out[which[i]] = left.out[i] > 1 ? left.out[i] - 2 : left.out[i];
     }
 };
 

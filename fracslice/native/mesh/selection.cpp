@@ -1,5 +1,6 @@
 #include "selection.h"
 
+#include <bit>
 #include <cassert>
 
 #include "blocks.h"
@@ -27,7 +28,7 @@ class CoarseGrid {
     template <class Do>
     bool any(size_t t, const Do& act) {
         const Cell &a = cell(t, 0), &b = cell(t, 1), &c = cell(t, 2);
-        if (a == b && b == c) return act(marked_[at(a[0], a[1], a[2])]);
+        if (same(a, b) && same(b, c)) return act(marked_[at(a[0], a[1], a[2])]);
         std::array<size_t, 3> first, last;
         for (size_t k = 0; k < 3; ++k) first[k] = std::min({a[k], b[k], c[k]}), last[k] = std::max({a[k], b[k], c[k]});
         for (size_t x = first[0]; x <= last[0]; ++x) {
@@ -44,6 +45,7 @@ class CoarseGrid {
     static constexpr size_t kSide = 64;
     using Cell = std::array<uint8_t, 4>;
 
+    static bool same(const Cell& a, const Cell& b) { return std::bit_cast<uint32_t>(a) == std::bit_cast<uint32_t>(b); }
     static size_t at(size_t x, size_t y, size_t z) { return (x * kSide + y) * kSide + z; }
     const Cell& cell(size_t t, int k) const { return cells_.data[size_t(mesh_[t][k])]; }
 
@@ -79,6 +81,22 @@ Selection selected(const MeshView& mesh, std::span<const bool> keep) {
             for (int k = 0; keep[t] && k < 3; ++k) *out++ = number.data[mesh[t][k]];
         }
     });
+    return result;
+}
+
+Ordered in_order(const Triangles& triangles) {
+    std::vector<int32_t> number(triangles.vertices, -1);
+    Ordered result{{triangles.vertices, 1}, {triangles.count, 3}};
+    int32_t used = 0;
+    for (size_t i = 0; i < 3 * triangles.count; ++i) {
+        const int32_t vertex = triangles.corners[i];
+        if (number[size_t(vertex)] < 0) {
+            result.first.data[used] = vertex;
+            number[size_t(vertex)] = used++;
+        }
+        result.triangles.data[i] = number[size_t(vertex)];
+    }
+    result.first.rows = size_t(used);
     return result;
 }
 

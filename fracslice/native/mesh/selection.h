@@ -16,6 +16,14 @@ struct Selection {
 // keep: of each triangle. Of a mesh that stays as it is, only how much that is.
 Selection selected(const MeshView& mesh, std::span<const bool> keep);
 
+struct Ordered {
+    Array<int32_t> first;      // of the vertices in use, by their first use: its number before
+    Array<int32_t> triangles;  // with new numbers
+};
+
+// The vertices by their first use.
+Ordered in_order(const Triangles& triangles);
+
 // The triangles with a corner among some vertices, ascending.
 std::vector<int64_t> touching(const Triangles& triangles, std::span<const bool> vertices);
 

@@ -158,10 +158,10 @@ def given(seen: Frame, pixels: np.ndarray) -> np.ndarray:
 
 
 def rows(run: Run) -> Iterator[Row]:
-    numba_cuda, seen, pixels = cuda.require(), frame(WIDTH, HEIGHT), ordered(WIDTH, HEIGHT)
+    memory, seen, pixels = cuda.require(), frame(WIDTH, HEIGHT), ordered(WIDTH, HEIGHT)
     tracer = CudaTracer(seen, SINGLE, WIDTH, HEIGHT)
-    placed = numba_cuda.to_device(pixels)
-    sums, work = numba_cuda.to_device(empty()), Work(1)
+    placed = memory.to_device(pixels)
+    sums, work = memory.to_device(empty()), Work(1)
     tracer.add(sums, PassPlan(placed, pixels.size, 1), work)
     picture = sums.copy_to_host().reshape(-1, CHANNELS)
     tracer.add(sums, PassPlan(placed, pixels.size, ROUNDS), work)

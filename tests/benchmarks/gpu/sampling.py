@@ -38,7 +38,9 @@ def surface(root: Node) -> np.ndarray:
 
 def best(run: Callable[[], None], rounds: int = 10) -> float:
     """The shortest of a few times on the GPU, ms; it is kept busy before, so that launching costs nothing."""
-    numba_cuda, times = cuda.require(), []
+    from fracslice.kernel.cuda_intrinsics import cuda as numba_cuda
+
+    times = []
     for _ in range(rounds):
         start, end = numba_cuda.event(), numba_cuda.event()
         run()
@@ -52,9 +54,9 @@ def best(run: Callable[[], None], rounds: int = 10) -> float:
 
 def rates(root: Node, corners: np.ndarray) -> dict[str, tuple[float, int]]:
     """By back end: G evaluations/s, and how many samples are inside."""
-    numba_cuda, kernel = cuda.require(), cuda.compile_scene(root)
-    count, placed = 512 * len(corners), cuda.require().to_device(corners)
-    out = numba_cuda.device_array((len(corners), 512), np.float32)
+    memory, kernel = cuda.require(), cuda.compile_scene(root)
+    count, placed = 512 * len(corners), memory.to_device(corners)
+    out = memory.device_array((len(corners), 512), np.float32)
     took = best(lambda: kernel.bricks_on_device(placed, ORIGIN, VOXEL, out))
     measured = {"fracslice": (count / took / 1e6, int((out.copy_to_host() < 0).sum()))}
     with tempfile.TemporaryDirectory() as folder:

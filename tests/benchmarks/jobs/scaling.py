@@ -15,14 +15,25 @@ from pathlib import Path
 from ..runner import Figures, Row, Run, process
 from .command import COMMAND
 
+W1 = '<scene version="1"><solid size="80mm"><mandelbulb power="8" iterations="10"/></solid></scene>'
 JOBS: dict[str, tuple[str, ...]] = {
-    "mesh": ("--resolution",),
-    "slice": ("--size", "30mm", "--printer", "sl1s", "--layer"),
-    "render": ("--size", "{pixels}", "--device", "cpu", "--samples"),
+    "mesh": ("{w1}", "--resolution"),
+    "slice": (
+        "mandelbulb",
+        "--printer",
+        "saturn-3-ultra",
+        "--exposure",
+        "2.5",
+        "30",
+        "--layer",
+        "0.05mm",
+        "--size",
+    ),
+    "render": ("mandelbulb", "--device", "cpu", "--samples", "64", "--size"),
 }
-ENDINGS = {"mesh": "stl", "slice": "sl1", "render": "png"}
+ENDINGS = {"mesh": "stl", "slice": "goo", "render": "png"}
 RUNS, THREADS = 3, [1, 4, 16, 64]
-SMALLEST = {"jobs": ("render=1",), "pixels": "32x16"}
+SMALLEST = {"jobs": ("render=32x16",)}
 
 
 def serial_share(threads: Sequence[int], seconds: Sequence[float]) -> float:
@@ -33,29 +44,27 @@ def serial_share(threads: Sequence[int], seconds: Sequence[float]) -> float:
     return min(1.0, max(0.0, share))
 
 
-def once(words: Sequence[object], folder: Path, threads: int) -> Figures:
+def once(words: Sequence[object], path: Path, threads: int) -> Figures:
     """One run; the output is removed, for a job resumes what is there."""
-    path = folder / f"out.{ENDINGS[str(words[len(COMMAND)])]}"
-    figures = process([*words, path, "--threads", threads])
+    figures = process([*COMMAND, *words, "--quiet", "--threads", threads, "-o", path])
     path.unlink()
     return figures
 
 
 def rows(
-    run: Run,
-    scene: str = "mandelbulb",
-    jobs: tuple[str, ...] = ("mesh=256", "mesh=512", "slice=0.025mm", "render=64"),
-    pixels: str = "1920x1080",
+    run: Run, jobs: tuple[str, ...] = ("mesh=512", "mesh=1024", "slice=110mm", "render=1920x1080")
 ) -> Iterator[Row]:
     for job in jobs:
         name, size = job.split("=")
         with tempfile.TemporaryDirectory() as folder:
-            options = [word.format(pixels=pixels) for word in JOBS[name]]
-            words = [*COMMAND, name, scene, *options, size, "--quiet", "-o"]
-            measured = run.interleaved({str(p): partial(once, words, Path(folder), p) for p in run.threads})
+            (scene := Path(folder) / "w1.xml").write_text(W1)
+            path = Path(folder) / f"out.{ENDINGS[name]}"
+            words = [name, *(word.format(w1=scene) for word in JOBS[name]), size]
+            measured = run.interleaved({str(p): partial(once, words, path, p) for p in run.threads})
         times = [measured.spread(str(p), "wall_s") for p in run.threads]
         share = serial_share(run.threads, [time.median for time in times])
         for p, time in zip(run.threads, times, strict=True):
             faster = measured.ratio(str(run.threads[0]), str(p), "wall_s")
             row = {"": name, "size": size, "threads": p, "time, s": time, "times faster": faster}
+            row["CPU s"] = measured.spread(str(p), "cpu_s")
             yield {**row, "peak MB": measured.spread(str(p), "peak_mb"), "serial share": f"{share:.1%}"}
