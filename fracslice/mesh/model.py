@@ -233,3 +233,16 @@ def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64
         i, j = (k + 1) % 3, (k + 2) % 3
         out[:, k] = a[:, i] * b[:, j] - a[:, j] * b[:, i]
     return out
+
+
+def joined(meshes: list[Mesh]) -> Mesh:
+    """Concatenate meshes without welding.
+
+    Returns
+    -------
+    Mesh
+        All their triangles, in order.
+    """
+    offsets = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
+    triangles = [mesh.triangles + np.int32(offset) for mesh, offset in zip(meshes, offsets, strict=True)]
+    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(triangles))

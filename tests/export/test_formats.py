@@ -18,8 +18,9 @@ from fracslice.errors import ExportError, MeshError
 from fracslice.export import FORMATS, application, packages, write
 from fracslice.mesh import Mesh
 from fracslice.mesh.check import check_mesh
+from fracslice.mesh.model import joined
 from fracslice.mesh.quantisation import quantised
-from fracslice.mesh.reading import joined, read_mesh
+from fracslice.mesh.reading import read_mesh
 from tests.mesh.shapes import cube, inverted, sphere
 
 METADATA = {"Title": 'A <sphere> & "more" é', "scene_hash": "ab12"}
