@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fracslice.common.digits import counted, significant
+from fracslice.common.digits import counted, decimal, significant
 
 from .cluster import ClusterOptions
 from .inputs import BadInput, check_targets, is_model, load_model, load_scene, refuse_options
@@ -264,7 +264,7 @@ def described(name: str, report: PrintReport) -> list[str]:
 
 def figures_of(report: PrintReport) -> str:
     """Layers, size, volume and weight of a print report."""
-    size = " x ".join(f"{s:.2f}" for s in report.size)
+    size = " x ".join(map(decimal, report.size))
     ml, g = significant(report.volume / 1000), significant(report.weight_g)
     return f"{counted(report.layers, 'layer')}, {size} mm, {ml} ml, {g} g"
 

@@ -73,7 +73,8 @@ def check_target(path: str | Path) -> Path:
     """
     target = Path(os.path.realpath(path))
     if not target.parent.is_dir():
-        raise ExportError(f"{path}: the folder {target.parent} does not exist")
+        wrong = "is a file, not a folder" if target.parent.exists() else "does not exist"
+        raise ExportError(f"{path}: the folder {target.parent} {wrong}")
     if target.is_dir():
         raise ExportError(f"{path}: is a folder")
     if target.exists() and not target.is_file():

@@ -151,9 +151,11 @@ def test_a_model_smaller_than_a_layer_is_in_another_unit(
 def test_a_sheet_thinner_than_a_layer_and_a_flipped_triangle_are_problems(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    box((10, 10, 0.01)).export(tmp_path / "thin.stl")
+    box((10, 10, 0.004)).export(tmp_path / "thin.stl")
     assert run(["check", str(tmp_path / "thin.stl"), "-q"]) == 1
-    assert "no layer of 0.05 mm has a pixel inside: all of it is thinner" in capfd.readouterr().out
+    out = capfd.readouterr().out
+    assert "10.00 x 10.00 x 0.004 mm, 0.40 mm3" in out
+    assert "no layer of 0.05 mm has a pixel inside: all of it is thinner" in out
     flipped = box((10, 10, 10))
     flipped.faces[0] = flipped.faces[0][::-1]
     flipped.export(tmp_path / "flipped.stl")
