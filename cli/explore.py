@@ -73,7 +73,7 @@ def explore(given: ExploreOptions) -> None:
     scenes = [scene, *(varied(scene, (given.seed, k), given.spread) for k in range(1, count))]
     with given.working() as work:
         pictures = [rendered(one, given.size, given.samples, k / count, work) for k, one in enumerate(scenes)]
-    write(target, scenes, pictures)
+        write(target, scenes, pictures)
     if not given.quiet:
         click.echo(f"{given.output}: {count} variations; their scenes are in {target.with_suffix('')}")
 

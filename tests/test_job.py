@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import threading
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -212,6 +213,13 @@ def test_a_file_is_named_that_is_written_when_its_last_check_is_cancelled(monkey
     assert target.exists()
     with pytest.raises(Cancelled, match="cancelled"):
         make_mesh(BALL, MeshJob(resolution=16))
+
+
+def test_a_file_is_named_that_is_written_when_the_work_is_cancelled(tmp_path):
+    target = tmp_path / "ball.stl"
+    cancel = SimpleNamespace(is_set=target.exists)
+    with pytest.raises(KeptError, match=r"^.*ball\.stl is written$"):
+        make_mesh(BALL, MeshJob(resolution=16), Work(cancel=cancel), path=target)
 
 
 def test_the_result_does_not_depend_on_threads_or_run():

@@ -140,6 +140,8 @@ def linked(source: str, path: str | Path) -> None:
             os.chmod(part, _permissions(target))
             os.fsync(file.fileno())
         _replace(part, target)
+        with suppress(FileNotFoundError):
+            os.unlink(part)  # still there if it was the target's already: POSIX does not rename then
     except OSError:
         with suppress(FileNotFoundError):
             os.unlink(part)
