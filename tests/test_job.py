@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import json
 import math
+import subprocess
+import sys
 import threading
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -186,6 +189,16 @@ def test_the_memory_of_a_mesh_follows_its_vertices():
 
 def test_there_is_memory():
     assert 1 << 20 < memory.available_bytes() < 1 << 60
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs /proc")
+def test_peak_memory_is_not_that_of_the_process_that_started_this_one():
+    own = "from fracslice.common.memory import peak_rss_mb; print(peak_rss_mb())"
+    large = (
+        f"import subprocess, sys; held = b'x' * (300 << 20); subprocess.run([sys.executable, '-c', {own!r}])"
+    )
+    done = subprocess.run([sys.executable, "-c", large], capture_output=True, text=True, check=True)
+    assert 1 < float(done.stdout) < 200
 
 
 def test_cancelling_stops_it():

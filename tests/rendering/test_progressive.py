@@ -128,7 +128,7 @@ def test_a_state_is_of_one_version(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     with open(tmp_path / "state.npz", "wb") as file:
         renderer().save(file)
     monkeypatch.setattr(progressive, "program", lambda: "another")
-    with pytest.raises(RenderError, match="another scene, view, size or version"):
+    with pytest.raises(RenderError, match="another scene, view, size, seed or version"):
         renderer().resume(tmp_path / "state.npz")
 
 
