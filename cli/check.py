@@ -168,7 +168,8 @@ def of_model(given: CheckOptions, work: Work) -> Checked:
     try:
         layers, lines, problems = of_layers(field, sides, given.printing(Print()), layered, work)
     except EmptyError:
-        nothing = f"no layer of {layered.layer[0]:.3g} mm has a pixel inside: all of it is thinner"
+        finest = f"layer of {layered.layer[0]:.3g} mm has a pixel of {max(layered.pixels):.3g} mm"
+        nothing = f"no {finest} inside: all of it is thinner"
         return numbers, [line, f"{given.source}: {verdict([nothing])}"], (*report.problems, nothing)
     return numbers | {"layers": layers}, [line, *lines], (*report.problems, *problems)
 

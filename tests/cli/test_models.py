@@ -155,7 +155,7 @@ def test_a_sheet_thinner_than_a_layer_and_a_flipped_triangle_are_problems(
     assert run(["check", str(tmp_path / "thin.stl"), "-q"]) == 1
     out = capfd.readouterr().out
     assert "10.00 x 10.00 x 0.004 mm, 0.40 mm3" in out
-    assert "no layer of 0.05 mm has a pixel inside: all of it is thinner" in out
+    assert "no layer of 0.05 mm has a pixel of 0.05 mm inside: all of it is thinner" in out
     flipped = box((10, 10, 10))
     flipped.faces[0] = flipped.faces[0][::-1]
     flipped.export(tmp_path / "flipped.stl")
