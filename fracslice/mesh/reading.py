@@ -48,7 +48,8 @@ def read_mesh(path: str | Path) -> Mesh:
     try:
         if path.is_file() and not path.stat().st_size:
             raise MeshError("the file is empty")
-        mesh = quantised(reader(path))
+        with np.errstate(invalid="ignore"):  # of coordinates that are not finite, which are refused
+            mesh = quantised(reader(path))
     except FileNotFoundError:
         raise MeshError(f"{path}: no such file") from None
     except (OSError, MeshError) as error:

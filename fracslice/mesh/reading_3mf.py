@@ -45,7 +45,7 @@ def read_3mf(path: Path) -> Mesh:
                 _parse(part, relations.start)
             package.read(archive, relations.model)
             return package.laid_out()
-    except (zipfile.BadZipFile, EOFError, KeyError, zlib.error) as error:
+    except (zipfile.BadZipFile, EOFError, KeyError, RuntimeError, zlib.error) as error:
         raise MeshError("not a whole 3MF file: it is cut short, or of another kind") from error
     except (expat.ExpatError, ValueError, OverflowError) as error:
         raise MeshError(f"not a valid 3MF file: {error}") from error

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 import zipfile
 from pathlib import Path
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from fracslice.errors import MeshError
+from fracslice.export import write
 from fracslice.mesh.check import check_mesh
 from fracslice.mesh.reading import read_mesh
 
@@ -76,6 +78,28 @@ def test_3mf_components_in_other_files_of_the_package(tmp_path: Path) -> None:
     with zipfile.ZipFile(whole, "a") as archive:
         archive.writestr("3D/Objects/1.model", model.replace(b'"10.0"', b'"5"'))
     assert read_mesh(whole).size.tolist() == [5, 10, 5]
+
+
+@pytest.mark.parametrize("change", [{8: 1}, {6: 255}])
+def test_3mf_that_is_encrypted_or_of_a_later_version(tmp_path: Path, change: dict[int, int]) -> None:
+    path = box(tmp_path / "locked.3mf")
+    data = bytearray(path.read_bytes())
+    for at in (match.start() for match in re.finditer(rb"PK\x01\x02", data)):
+        for offset, value in change.items():
+            data[at + offset] = value
+    path.write_bytes(data)
+    with pytest.raises(MeshError, match=r"locked\.3mf: not a whole 3MF file"):
+        read_mesh(path)
+
+
+@pytest.mark.filterwarnings("error")
+def test_stl_of_a_signalling_nan(tmp_path: Path) -> None:
+    path = write(cube(), tmp_path / "nan.stl")
+    data = bytearray(path.read_bytes())
+    data[96:100] = struct.pack("<I", 0x7FA00000)
+    path.write_bytes(data)
+    with pytest.raises(MeshError, match="not a finite number"):
+        read_mesh(path)
 
 
 def second(content: str) -> dict[str, str]:
