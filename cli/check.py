@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fracslice.common.digits import counted, significant
+from fracslice.common.digits import counted, decimal, significant
 
 from .cluster import ClusterOptions
 from .inputs import BadInput, check_targets, is_model, load_model, load_scene, refuse_options
@@ -131,20 +131,27 @@ def of_scene(given: CheckOptions, work: Work) -> Checked:
 
 
 def of_model(given: CheckOptions, work: Work) -> Checked:
-    """Check the mesh of a model and, if it is closed, its layers."""
+    """Check the mesh of a model and, if it encloses a volume, its layers."""
+    from fracslice.errors import EmptyError, MeshError
     from fracslice.mesh.check import check_mesh
     from fracslice.mesh.field import MeshField
     from fracslice.scene import Print
+    from fracslice.scene.lengths import LARGEST
     from fracslice.volume.sizing import SAME, UP, Sizing
 
     turned = placed(load_model(given.source), given.up, SAME)
     length = longest(turned) or 1.0
     side = given.size or length
+    if side > LARGEST:
+        raise BadInput(f"{given.source}: {side:.3g} mm long, more than a kilometre: expected a model in mm")
     x, y, z = (factor * side / length for factor in given.scale)
     mesh = placed(turned, UP, (x, y, z))
-    report = check_mesh(mesh, threads=work.threads)
+    try:
+        report = check_mesh(mesh, threads=work.threads)
+    except MeshError as error:
+        raise BadInput(f"{given.source}: {error}") from error
     line, numbers = f"{given.source}: {figures(report)}", report.as_dict()
-    if not report.watertight:
+    if not report.watertight or report.misoriented_edges or not report.volume_mm3:
         return numbers, [line], report.problems
     size, thinnest = longest(mesh), float(LAYER[:-2])
     if size <= thinnest and given.layer is None:
@@ -157,7 +164,13 @@ def of_model(given: CheckOptions, work: Work) -> Checked:
     )
     factor = size / side  # the mesh is compensated already: a size that is advised is before that
     sides = Sizing(side, 1 / factor, (factor,) * 3)
-    layers, lines, problems = of_layers(MeshField(mesh), sides, given.printing(Print()), layered, work)
+    field = MeshField(replace(mesh, vertices=mesh.vertices - mesh.bounds.mean(0)))
+    try:
+        layers, lines, problems = of_layers(field, sides, given.printing(Print()), layered, work)
+    except EmptyError:
+        finest = f"layer of {layered.layer[0]:.3g} mm has a pixel of {max(layered.pixels):.3g} mm"
+        nothing = f"no {finest} inside: all of it is thinner"
+        return numbers, [line, f"{given.source}: {verdict([nothing])}"], (*report.problems, nothing)
     return numbers | {"layers": layers}, [line, *lines], (*report.problems, *problems)
 
 
@@ -252,7 +265,7 @@ def described(name: str, report: PrintReport) -> list[str]:
 
 def figures_of(report: PrintReport) -> str:
     """Layers, size, volume and weight of a print report."""
-    size = " x ".join(f"{s:.2f}" for s in report.size)
+    size = " x ".join(map(decimal, report.size))
     ml, g = significant(report.volume / 1000), significant(report.weight_g)
     return f"{counted(report.layers, 'layer')}, {size} mm, {ml} ml, {g} g"
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fracslice.common.digits import counted
+from fracslice.common.digits import counted, decimal
 from fracslice.errors import keeping
 
 from .closing import of_layers
@@ -177,7 +177,7 @@ def described(run: SliceRun, output: str, notes: Sequence[str]) -> list[str]:
     from fracslice.export.layer_files import printers_file
 
     stack, screen = run.stack, run.screen
-    size = " x ".join(f"{s:.2f}" for s in stack.size)
+    size = " x ".join(map(decimal, stack.size))
     rows, columns = screen.shape
     first = f"{output}: {counted(len(stack.z), 'layer')} of {columns} x {rows} pixels, {size} mm"
     other = printers_file(screen.printer, output) if screen.printer else ""

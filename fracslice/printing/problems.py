@@ -40,7 +40,7 @@ class Problem:
         """The problem in one line."""
         where = [] if self.layer is None else [f"layer {self.layer}"]
         if self.at is not None:
-            where.append("at {:.2f} {:.2f} {:.2f} mm".format(*self.at))
+            where.append("at " + " ".join(f"{round(x, 2) + 0.0:.2f}" for x in self.at) + " mm")
         flags = " ".join(f"--{name} {value}" for name, value in self.mend)
         hints = " or ".join(filter(None, [flags, self.advice]))
         return " ".join(filter(None, [f"{self.text}:" if where else self.text, ", ".join(where)])) + (

@@ -97,6 +97,7 @@ def test_what_is_no_shape_is_named(source: object, message: str) -> None:
         ({"thickness": "thick"}, SceneError, "thickness='thick': expected 0, or a length"),
         ({"threads": 0}, SceneError, "threads=0: expected"),
         ({"progress": True}, TypeError, "progress=True: expected a callable"),
+        ({"cancel": 0}, TypeError, "cancel=0: expected a threading.Event"),
         ({"cancel": 3}, TypeError, "cancel=3: expected a threading.Event"),
     ],
 )

@@ -17,8 +17,8 @@ from fracslice._native import connected_components, side_of_line, side_of_plane
 from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
 from fracslice.mesh.check import check_mesh
+from fracslice.mesh.model import joined
 from fracslice.mesh.nesting import nesting
-from fracslice.mesh.reading import joined
 from fracslice.mesh.self_intersections import self_intersecting_triangles
 from fracslice.mesh.topology import component_sizes, edge_topology
 from fracslice.mesh.tree import build
