@@ -26,6 +26,9 @@ OF_RESIN = {"cavities", "cups", "traps", "fit"}
 FLAT = 50.0
 """Mean cross-section per area on the plate from which an object does not stand flat, as in the checks."""
 
+LISTED = 4
+"""Maximum number of drain holes whose places are all named."""
+
 SEALED = 1000
 """Volume of the solid per volume of sealed cavities above which they are not mentioned."""
 
@@ -98,10 +101,11 @@ class Closing:
             amount.append(f"cost {self.cost:.2f}")
         yield ", ".join(amount)
         if self.drains:
-            places = " and ".join(
-                " ".join(f"{round(x, 1) + 0.0:.1f}" for x in place) for place in self.drains
-            )
-            yield f"drain holes of {self.drain:g} mm leave the hollow at {places} mm"
+            places = [" ".join(f"{round(x, 1) + 0.0:.1f}" for x in place) for place in self.drains]
+            where = f"{' and '.join(places)} mm"
+            if len(places) > LISTED:
+                where = f"{places[0]} mm and at {len(places) - 1} other places"
+            yield f"drain holes of {self.drain:g} mm leave the hollow at {where}"
         if self.cavities and self.trapped * SEALED > self.volume:
             sealed = "a sealed cavity" if self.cavities == 1 else f"{self.cavities} sealed cavities"
             mend = "--cavities fill, or --drain 3mm for a hollow"

@@ -208,15 +208,18 @@ def refuse_what_no_print_has(given: SliceOptions, kind: str, resin: Resin | None
     This is checked before print preparation, which may take minutes.
     """
     from fracslice.export.layer_files import ENDINGS, printers_file
+    from fracslice.slicing.printers import PRINTERS
 
     machine, output = given.machine, given.output
     if machine is None:
-        raise click.UsageError(f'{output}: a .{kind} file needs --printer, such as sl1s; "list" shows all')
+        able = next((f", such as {p.name}" for p in PRINTERS.values() if not printers_file(p, output)), "")
+        raise click.UsageError(f'{output}: a .{kind} file needs --printer{able}; "list" shows all')
     if f".{machine.file}" in ENDINGS and (other := printers_file(machine, output)):
         raise click.UsageError(f"{output}: {other}")
     if resin is None:
         raise click.UsageError(
-            f"{output}: no exposure is known for {machine.title}; expected --exposure S S or --resin"
+            f"{output}: no exposure is known for {machine.title}; expected --resin, or --exposure: the seconds "
+            "of a layer and of a bottom layer, as in your slicer"
         )
     if given.layer[1] is not None and kind == "sl1":
         raise click.UsageError(f"{output}: an SL1 archive has layers of one height, not a range")
