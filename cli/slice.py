@@ -218,8 +218,8 @@ def refuse_what_no_print_has(given: SliceOptions, kind: str, resin: Resin | None
         raise click.UsageError(f"{output}: {other}")
     if resin is None:
         raise click.UsageError(
-            f"{output}: no exposure is known for {machine.title}; expected --resin, or --exposure: the seconds "
-            "of a layer and of a bottom layer, as in your slicer"
+            f"{output}: no exposure is known for {machine.title}; expected --resin, or --exposure: "
+            "the seconds of a layer and of a bottom layer, as in your slicer"
         )
     if given.layer[1] is not None and kind == "sl1":
         raise click.UsageError(f"{output}: an SL1 archive has layers of one height, not a range")
