@@ -105,11 +105,12 @@ class SliceOptions(ClusterOptions, LayerOptions):
 def slice_(given: SliceOptions) -> int:
     """Cut SCENE into the layers of a print, straight from its field.
 
-    An interrupted job resumes when it is started again.
+    No supports are added: fracslice check says whether the object needs them. An interrupted job
+    resumes when it is started again.
 
     Examples
     --------
-    fracslice slice mandelbulb -o bulb.sl1 --size 60mm --printer sl1s
+    fracslice slice menger-tower -o tower.sl1 --size 60mm --printer sl1s
     fracslice slice mandelbulb -o bulb.goo --printer mars-5 --exposure 2.5 30 --hollow 2mm
     fracslice slice my.xml -o layers --pixel 0.05mm --preview sheet.png
     """
