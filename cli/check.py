@@ -11,6 +11,7 @@ import click
 
 from fracslice.common.digits import counted, decimal, significant
 
+from .closing import DENSITIES, of_material
 from .cluster import ClusterOptions
 from .inputs import BadInput, check_targets, is_model, load_model, load_scene, refuse_options
 from .layers import LAYER, PIXEL_MM, LayerOptions, layer_option, printer_option, write_page
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from fracslice.work import Work
 
 SHARED = {"cluster", "shard", "store"}
-OF_LAYERS = {*SHARED, "pixel", "machine", "picture", "html", "fix"}
+OF_LAYERS = {*SHARED, "pixel", "machine", "picture", "html", "fix", "material"}
 OF_MESHES = {"voxel", "resolution", "dust", "chord", "simplify", "proved"}
 OF_SCENES = {*OF_MESHES, *SHARED, "settings"}
 
@@ -56,6 +57,11 @@ class CheckOptions(LayerOptions, MeshOptions, ClusterOptions):
     )
     picture: str | None = option(Name("FILE.png", ".png"), "With layers: draw the worst layers.")
     fix: bool = flag("With layers: mend what can be mended, and check again.")
+    material: str = option(
+        click.Choice(list(DENSITIES)),
+        "With layers: resin by default. Filaments have no resin traps, suction cups and sealed cavities.",
+        default="resin",
+    )
     wall: float = limit("walls")
     floor: float = limit("floors and roofs")
 
@@ -78,13 +84,14 @@ def check(given: CheckOptions) -> int:
 
     The layers of a model are always checked, those of a scene with --layer. Each problem comes with its
     layer, its place in mm from the middle of the object and above its lowest point, and the option that mends
-    it. Exit status: 1 if it would not print.
+    it. Exit status: 1 if it would not print, or only with supports.
 
     Examples
     --------
     fracslice check part.stl --printer sl1s
     fracslice check mandelbulb --size 60mm --layer 0.05mm --html summary.html
     fracslice check my.xml --layer 0.05mm --fix
+    fracslice check vase.stl --layer 0.2mm --wall 0.4mm --material pla
     """
     if is_model(given.source):
         refuse_options(OF_SCENES, "only for scenes, and a model was given")
@@ -118,7 +125,7 @@ def of_mesh(given: CheckOptions, work: Work) -> Checked:
     problems = (*result.report.problems, *solid.thin)
     hint = "" if problems else "; --layer looks at islands, cups, traps, overhangs and necks, too"
     numbers = result.report.as_dict() | {"solid": solid.as_dict()}
-    return numbers, [summary(given.source, result.report), solid.unseen, verdict(problems) + hint], problems
+    return numbers, [summary(given.source, result.report), solid.unseen, judged(problems) + hint], problems
 
 
 def of_scene(given: CheckOptions, work: Work) -> Checked:
@@ -231,6 +238,7 @@ def examined(
     else:
         stack = stack if most is None else adapted(stack, most, work)
         report = check_layers(stack, given.limits, machine, work)
+    report = of_material(report, given.material)
     if given.picture:
         draw(stack, report, given.picture, work)
     if given.html:
@@ -260,7 +268,7 @@ def draw(stack: Stack, report: PrintReport, path: str, work: Work) -> None:
 
 def described(name: str, report: PrintReport) -> list[str]:
     """Summary of a print report: figures, a line for each problem, and thin features that layers may miss."""
-    return [f"{name}: {figures_of(report)}, {verdict(report.problems)}", report.solid.unseen]
+    return [f"{name}: {figures_of(report)}, {judged(report.problems)}", report.solid.unseen]
 
 
 def figures_of(report: PrintReport) -> str:
@@ -270,6 +278,9 @@ def figures_of(report: PrintReport) -> str:
     return f"{counted(report.layers, 'layer')}, {size} mm, {ml} ml, {g} g"
 
 
-def verdict(problems: Sequence[object]) -> str:
+def judged(problems: Sequence[object]) -> str:
     """Verdict on printability, with a line for each problem."""
-    return os.linesep.join(["would not print:", *(f"  {p}" for p in problems)]) if problems else "would print"
+    from fracslice.printing.problems import verdict
+
+    lines = [f"  {problem}" for problem in problems]
+    return os.linesep.join([f"{verdict(problems)}{':' if lines else ''}", *lines])

@@ -59,7 +59,7 @@ def explore(given: ExploreOptions) -> None:
 
     Examples
     --------
-    fracslice explore mandelbox -o sheet.png --spread 0.5
+    fracslice explore quaternion-julia -o sheet.png --spread 0.5
     fracslice explore sheet/07.xml -o next.png --seed 1
     """
     from fracslice.scene.variation import varied

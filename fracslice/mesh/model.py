@@ -34,7 +34,7 @@ class Mesh(Exchange):
     Raises
     ------
     MeshError
-        For arrays of another shape.
+        If an array does not hold three numbers in each row.
 
     Examples
     --------
@@ -56,7 +56,7 @@ class Mesh(Exchange):
         for name, kind in (("vertices", np.float64), ("triangles", np.int32)):
             array = np.asarray(getattr(self, name), kind).view()
             if array.ndim != 2 or array.shape[1] != 3:
-                raise MeshError(f"{name} of shape {array.shape}: expected three numbers in each row")
+                raise MeshError(f"{name}: expected an array [n, 3], found one of shape {list(array.shape)}")
             array.flags.writeable = False
             object.__setattr__(self, name, array)
         object.__setattr__(self, "scalars", MappingProxyType(dict(self.scalars)))

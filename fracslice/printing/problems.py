@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+SUPPORTS = "supports in the slicer"
+
 Place = tuple[float, float, float]
 """Point, mm from the middle of the object along x and y, and above its lowest point."""
 
@@ -46,6 +48,20 @@ class Problem:
         return " ".join(filter(None, [f"{self.text}:" if where else self.text, ", ".join(where)])) + (
             f"; {hints}" if hints else ""
         )
+
+
+def verdict(problems: Sequence[object]) -> str:
+    """Say whether an object with some problems would print: as it is, with supports, or not.
+
+    Parameters
+    ----------
+    problems : sequence
+        Problems of its layers, as `Problem`, and of its mesh.
+    """
+    if not problems:
+        return "would print"
+    held = all(isinstance(problem, Problem) and SUPPORTS in problem.advice for problem in problems)
+    return "would print with supports" if held else "would not print"
 
 
 def flat_base(height: float) -> str:
