@@ -177,7 +177,7 @@ def of_model(given: CheckOptions, work: Work) -> Checked:
     except EmptyError:
         finest = f"layer of {layered.layer[0]:.3g} mm has a pixel of {max(layered.pixels):.3g} mm"
         nothing = f"no {finest} inside: all of it is thinner"
-        return numbers, [line, f"{given.source}: {verdict([nothing])}"], (*report.problems, nothing)
+        return numbers, [line, judged([nothing])], (*report.problems, nothing)
     return numbers | {"layers": layers}, [line, *lines], (*report.problems, *problems)
 
 

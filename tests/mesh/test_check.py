@@ -113,6 +113,7 @@ def test_arrays_that_contradict_each_other_are_refused() -> None:
     tree, labels = build(mesh), np.zeros(8, np.int32)
     calls: list[Callable[[], object]] = [
         lambda: edge_topology(beyond, 8),
+        lambda: edge_topology(np.array([[0, 1, -(2**31)]], np.int32), 8),
         lambda: connected_components(-beyond, 9),
         lambda: component_sizes(mesh.vertices, mesh.triangles, labels + 1, 1),
         lambda: build(Mesh(mesh.vertices, beyond)),
