@@ -10,13 +10,16 @@ import click
 from fracslice.common.digits import counted
 
 from .cluster import ClusterOptions
-from .inputs import check_folder, check_targets, load_scene
+from .inputs import check_folder, check_targets, load_scene, refuse_moved, refuse_options
 from .options import DEVICE, SAMPLES, SceneOptions, argument, command, flag, option, output
 from .sizes import PIXELS
-from .value_types import POSITIVE, SECONDS, Parsed
+from .value_types import INTERVAL, POSITIVE, Parsed
 
 SMALLER, FEWER = 4, 4
 """Of --preview: divisor of the size, and samples."""
+
+OF_FRAMES = {"samples", "preview", "resume", "cluster", "shard", "store"}
+"""Options without effect on the scene of a frame."""
 
 
 def read_frames(text: str) -> range:
@@ -43,11 +46,13 @@ class FilmOptions(ClusterOptions, SceneOptions):
     size: tuple[int, int] | None = option(PIXELS, "Pixels across and down; the scene's by default.")
     samples: int | None = SAMPLES
     fly: float | None = option(
-        SECONDS,
+        INTERVAL,
         "Fly along the surface for this time, such as 10s; the field makes the path. With OUT an .xml file, "
         "write the scene of the flight.",
     )
-    preview: bool = flag("Render at a quarter of the size, with 4 samples per pixel.")
+    preview: bool = flag(
+        "Render at a quarter of the size, with 4 samples per pixel unless --samples is given."
+    )
     resume: bool = flag("Keep the frames that are there.")
     exr: bool = flag("Write frames of linear floats, into a folder.")
     layers: bool = flag("Add depth, normal, position, albedo and samples to --exr frames.")
@@ -77,14 +82,18 @@ def animate(given: FilmOptions) -> None:
     folder = target.with_suffix(".preview.frames" if given.preview else ".frames") if ending else target
     check_targets(given.source, given.output if ending else None)
     check_folder(folder)
+    if ending == ".xml":
+        refuse_options(OF_FRAMES, "only for frames, and an .xml file is a scene")
     scene = load_scene(given.source, given.settings)
+    refuse_moved(scene, given.settings)
     film = scene.view.film
-    (width, height), samples = given.size or (film.width, film.height), given.samples or film.samples
+    width, height = given.size or (film.width, film.height)
+    samples = given.samples or (FEWER if given.preview else film.samples)
     if given.fly:
         scene = flown(scene, given.fly, (width, height))
     timeline = Timeline(scene)
     if given.preview:
-        width, height, samples = max(width // SMALLER, 1), max(height // SMALLER, 1), FEWER
+        width, height = max(width // SMALLER, 1), max(height // SMALLER, 1)
     rate = given.fps or timeline.animation.fps
     if ending and ending != ".xml":
         check_film(target, rate)

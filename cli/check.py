@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fracslice.common.digits import counted, significant
+from fracslice.common.digits import counted, decimal, significant
 
+from .closing import DENSITIES, of_material
 from .cluster import ClusterOptions
 from .inputs import BadInput, check_targets, is_model, load_model, load_scene, refuse_options
 from .layers import LAYER, PIXEL_MM, LayerOptions, layer_option, printer_option, write_page
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from fracslice.work import Work
 
 SHARED = {"cluster", "shard", "store"}
-OF_LAYERS = {*SHARED, "pixel", "machine", "picture", "html", "fix"}
+OF_LAYERS = {*SHARED, "pixel", "machine", "picture", "html", "fix", "material"}
 OF_MESHES = {"voxel", "resolution", "dust", "chord", "simplify", "proved"}
 OF_SCENES = {*OF_MESHES, *SHARED, "settings"}
 
@@ -56,6 +57,11 @@ class CheckOptions(LayerOptions, MeshOptions, ClusterOptions):
     )
     picture: str | None = option(Name("FILE.png", ".png"), "With layers: draw the worst layers.")
     fix: bool = flag("With layers: mend what can be mended, and check again.")
+    material: str = option(
+        click.Choice(list(DENSITIES)),
+        "With layers: resin by default. Filaments have no resin traps, suction cups and sealed cavities.",
+        default="resin",
+    )
     wall: float = limit("walls")
     floor: float = limit("floors and roofs")
 
@@ -78,13 +84,14 @@ def check(given: CheckOptions) -> int:
 
     The layers of a model are always checked, those of a scene with --layer. Each problem comes with its
     layer, its place in mm from the middle of the object and above its lowest point, and the option that mends
-    it. Exit status: 1 if it would not print.
+    it. Exit status: 1 if it would not print, or only with supports.
 
     Examples
     --------
     fracslice check part.stl --printer sl1s
     fracslice check mandelbulb --size 60mm --layer 0.05mm --html summary.html
     fracslice check my.xml --layer 0.05mm --fix
+    fracslice check vase.stl --layer 0.2mm --wall 0.4mm --material pla
     """
     if is_model(given.source):
         refuse_options(OF_SCENES, "only for scenes, and a model was given")
@@ -118,7 +125,7 @@ def of_mesh(given: CheckOptions, work: Work) -> Checked:
     problems = (*result.report.problems, *solid.thin)
     hint = "" if problems else "; --layer looks at islands, cups, traps, overhangs and necks, too"
     numbers = result.report.as_dict() | {"solid": solid.as_dict()}
-    return numbers, [summary(given.source, result.report), solid.unseen, verdict(problems) + hint], problems
+    return numbers, [summary(given.source, result.report), solid.unseen, judged(problems) + hint], problems
 
 
 def of_scene(given: CheckOptions, work: Work) -> Checked:
@@ -131,20 +138,27 @@ def of_scene(given: CheckOptions, work: Work) -> Checked:
 
 
 def of_model(given: CheckOptions, work: Work) -> Checked:
-    """Check the mesh of a model and, if it is closed, its layers."""
+    """Check the mesh of a model and, if it encloses a volume, its layers."""
+    from fracslice.errors import EmptyError, MeshError
     from fracslice.mesh.check import check_mesh
     from fracslice.mesh.field import MeshField
     from fracslice.scene import Print
+    from fracslice.scene.lengths import LARGEST
     from fracslice.volume.sizing import SAME, UP, Sizing
 
     turned = placed(load_model(given.source), given.up, SAME)
     length = longest(turned) or 1.0
     side = given.size or length
+    if side > LARGEST:
+        raise BadInput(f"{given.source}: {side:.3g} mm long, more than a kilometre: expected a model in mm")
     x, y, z = (factor * side / length for factor in given.scale)
     mesh = placed(turned, UP, (x, y, z))
-    report = check_mesh(mesh, threads=work.threads)
+    try:
+        report = check_mesh(mesh, threads=work.threads)
+    except MeshError as error:
+        raise BadInput(f"{given.source}: {error}") from error
     line, numbers = f"{given.source}: {figures(report)}", report.as_dict()
-    if not report.watertight:
+    if not report.watertight or report.misoriented_edges or not report.volume_mm3:
         return numbers, [line], report.problems
     size, thinnest = longest(mesh), float(LAYER[:-2])
     if size <= thinnest and given.layer is None:
@@ -157,7 +171,13 @@ def of_model(given: CheckOptions, work: Work) -> Checked:
     )
     factor = size / side  # the mesh is compensated already: a size that is advised is before that
     sides = Sizing(side, 1 / factor, (factor,) * 3)
-    layers, lines, problems = of_layers(MeshField(mesh), sides, given.printing(Print()), layered, work)
+    field = MeshField(replace(mesh, vertices=mesh.vertices - mesh.bounds.mean(0)))
+    try:
+        layers, lines, problems = of_layers(field, sides, given.printing(Print()), layered, work)
+    except EmptyError:
+        finest = f"layer of {layered.layer[0]:.3g} mm has a pixel of {max(layered.pixels):.3g} mm"
+        nothing = f"no {finest} inside: all of it is thinner"
+        return numbers, [line, judged([nothing])], (*report.problems, nothing)
     return numbers | {"layers": layers}, [line, *lines], (*report.problems, *problems)
 
 
@@ -218,6 +238,7 @@ def examined(
     else:
         stack = stack if most is None else adapted(stack, most, work)
         report = check_layers(stack, given.limits, machine, work)
+    report = of_material(report, given.material)
     if given.picture:
         draw(stack, report, given.picture, work)
     if given.html:
@@ -247,16 +268,19 @@ def draw(stack: Stack, report: PrintReport, path: str, work: Work) -> None:
 
 def described(name: str, report: PrintReport) -> list[str]:
     """Summary of a print report: figures, a line for each problem, and thin features that layers may miss."""
-    return [f"{name}: {figures_of(report)}, {verdict(report.problems)}", report.solid.unseen]
+    return [f"{name}: {figures_of(report)}, {judged(report.problems)}", report.solid.unseen]
 
 
 def figures_of(report: PrintReport) -> str:
     """Layers, size, volume and weight of a print report."""
-    size = " x ".join(f"{s:.2f}" for s in report.size)
+    size = " x ".join(map(decimal, report.size))
     ml, g = significant(report.volume / 1000), significant(report.weight_g)
     return f"{counted(report.layers, 'layer')}, {size} mm, {ml} ml, {g} g"
 
 
-def verdict(problems: Sequence[object]) -> str:
+def judged(problems: Sequence[object]) -> str:
     """Verdict on printability, with a line for each problem."""
-    return os.linesep.join(["would not print:", *(f"  {p}" for p in problems)]) if problems else "would print"
+    from fracslice.printing.problems import verdict
+
+    lines = [f"  {problem}" for problem in problems]
+    return os.linesep.join([f"{verdict(problems)}{':' if lines else ''}", *lines])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from fracslice.common.digits import counted, significant
@@ -14,13 +14,20 @@ if TYPE_CHECKING:
 
     from fracslice.export.jobs import SliceRun
     from fracslice.jobs.mesh_result import MeshResult
+    from fracslice.slicing.layer_checks import PrintReport
     from fracslice.volume import Drain
 
 DENSITIES = {"resin": 1.1, "pla": 1.24, "petg": 1.27, "abs": 1.04, "asa": 1.07, "tpu": 1.22}
 """Materials and their densities, g/ml; filaments as in PrusaResearch.ini of PrusaSlicer 2.5."""
 
+OF_RESIN = {"cavities", "cups", "traps", "fit"}
+"""Problems of liquid resin, and of the known printers, which are for resin."""
+
 FLAT = 50.0
 """Mean cross-section per area on the plate from which an object does not stand flat, as in the checks."""
+
+LISTED = 4
+"""Maximum number of drain holes whose places are all named."""
 
 SEALED = 1000
 """Volume of the solid per volume of sealed cavities above which they are not mentioned."""
@@ -94,10 +101,11 @@ class Closing:
             amount.append(f"cost {self.cost:.2f}")
         yield ", ".join(amount)
         if self.drains:
-            places = " and ".join(
-                " ".join(f"{round(x, 1) + 0.0:.1f}" for x in place) for place in self.drains
-            )
-            yield f"drain holes of {self.drain:g} mm leave the hollow at {places} mm"
+            places = [" ".join(f"{round(x, 1) + 0.0:.1f}" for x in place) for place in self.drains]
+            where = f"{' and '.join(places)} mm"
+            if len(places) > LISTED:
+                where = f"{places[0]} mm and at {len(places) - 1} other places"
+            yield f"drain holes of {self.drain:g} mm leave the hollow at {where}"
         if self.cavities and self.trapped * SEALED > self.volume:
             sealed = "a sealed cavity" if self.cavities == 1 else f"{self.cavities} sealed cavities"
             mend = "--cavities fill, or --drain 3mm for a hollow"
@@ -154,6 +162,12 @@ def of_mesh(result: MeshResult, material: str, price: float | None) -> Closing:
         bodies=mesh.components,
         bridge=JOINING * report.voxel_mm,
     )
+
+
+def of_material(report: PrintReport, material: str) -> PrintReport:
+    """Report on layers of a key of `DENSITIES`: its weight, and of a filament no problem of resin."""
+    problems = [p for p in report.problems if material == "resin" or p.kind not in OF_RESIN]
+    return replace(report, weight_g=report.volume / 1000 * DENSITIES[material], problems=problems)
 
 
 def of_layers(run: SliceRun, price: float | None) -> Closing:

@@ -46,8 +46,11 @@ class ClusterOptions(RunOptions):
     @contextmanager
     def working(self, kept: str = NOTHING, **settings: Any) -> Iterator[Work]:
         """Work with the pool of --cluster and --shard."""
-        with self._pooled() as pool, super().working(kept, cluster=pool, **settings) as work:
-            yield work
+        with ExitStack() as stack:
+            pool = stack.enter_context(self._pooled())
+            with super().working(kept, cluster=pool, **settings) as work:
+                yield work
+                stack.pop_all().close()  # Ctrl-C while workers end would say that nothing was written
 
     @contextmanager
     def _pooled(self) -> Iterator[Pool | None]:

@@ -14,13 +14,20 @@ import click
 from .inputs import check_folder, check_targets, load_scene
 from .options import SceneOptions, argument, command, option, output
 from .sizes import PIXELS
-from .value_types import Whole
+from .value_types import Parsed, Whole
 
 if TYPE_CHECKING:
     import numpy as np
 
     from fracslice.scene import Scene
     from fracslice.work import Work
+
+
+def read_spread(text: str) -> float:
+    """Parse the size of changes."""
+    from fracslice.formulas.parameters import Number
+
+    return float(Number(0.3, "", above=0, most=4).read(text))
 
 
 class ExploreOptions(SceneOptions):
@@ -31,10 +38,9 @@ class ExploreOptions(SceneOptions):
     count: int = option(Whole(1, 400), "Number of pictures; 16 by default.", default=16)
     seed: int = option(Whole(0, 2**31), "Seed of the changes; 0 by default.", default=0)
     spread: float = option(
-        click.FloatRange(0, 4, min_open=True),
+        Parsed(read_spread, "X"),
         "Size of the changes: 1 doubles or halves a number in a typical case; 0.3 by default.",
-        metavar="X",
-        default=0.3,
+        default="0.3",
     )
     size: tuple[int, int] = option(
         PIXELS, "Pixels of each picture, across and down; 240x180 by default.", default="240x180"
@@ -53,7 +59,7 @@ def explore(given: ExploreOptions) -> None:
 
     Examples
     --------
-    fracslice explore mandelbox -o sheet.png --spread 0.5
+    fracslice explore quaternion-julia -o sheet.png --spread 0.5
     fracslice explore sheet/07.xml -o next.png --seed 1
     """
     from fracslice.scene.variation import varied
@@ -67,7 +73,7 @@ def explore(given: ExploreOptions) -> None:
     scenes = [scene, *(varied(scene, (given.seed, k), given.spread) for k in range(1, count))]
     with given.working() as work:
         pictures = [rendered(one, given.size, given.samples, k / count, work) for k, one in enumerate(scenes)]
-    write(target, scenes, pictures)
+        write(target, scenes, pictures)
     if not given.quiet:
         click.echo(f"{given.output}: {count} variations; their scenes are in {target.with_suffix('')}")
 

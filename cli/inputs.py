@@ -46,6 +46,14 @@ def load_scene(source: str, settings: Iterable[str] = ()) -> Scene:
     return read(scene_path(source)).with_values(settings)
 
 
+def refuse_moved(scene: Scene, settings: Iterable[str]) -> None:
+    """Raise `BadInput` for a setting of an attribute that a track moves: it would have no effect."""
+    moved = {"".join(track.of.split()) for track in scene.tracks}
+    for setting in settings:
+        if "".join(setting.partition("=")[0].split()) in moved:
+            raise BadInput(f"{setting}: a <track> moves it; expected another attribute, or other keys")
+
+
 def is_model(source: str) -> bool:
     """True if the file name has the extension of a model."""
     return Path(source).suffix.lower() in MODELS

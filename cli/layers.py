@@ -83,9 +83,11 @@ def write_page(
 
     from fracslice.export import replacing
     from fracslice.export.page import page
+    from fracslice.printing.problems import verdict
     from fracslice.slicing.preview import worst_layers
 
     with io.BytesIO() as picture, replacing(path) as file:
         worst_layers(stack, report.worst, picture, work)
         problems = [str(problem) for problem in report.problems]
-        file.write(page(title, lines, problems, stack.tops, np.array(report.areas), picture.getvalue()))
+        areas, worst = np.array(report.areas), picture.getvalue()
+        file.write(page(title, lines, verdict(report.problems), problems, stack.tops, areas, worst))

@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING
 
 import click
 
+from fracslice.common.digits import decimal
+
 from .closing import DENSITIES, of_mesh
 from .cluster import ClusterOptions
 from .families import MOST, TABLE, families, going_on, is_table, suffixed
-from .inputs import check_folder, check_targets, load_scene, refuse_options
+from .inputs import check_folder, check_targets, load_scene, refuse_moved, refuse_options
 from .options import MeshOptions, argument, command, flag, option, output
 from .summary import summary
-from .value_types import AMOUNT, SECONDS, Name
+from .value_types import AMOUNT, INTERVAL, SECONDS, Name
 
 if TYPE_CHECKING:
     from fracslice.jobs.mesh_result import MeshResult
@@ -40,7 +42,7 @@ class MeshFileOptions(ClusterOptions, MeshOptions):
         SECONDS, "Mesh the scene at this time of its <animation>, such as 2.5s.", "--time"
     )
     every: float | None = option(
-        SECONDS,
+        INTERVAL,
         "Mesh the scene at this interval, such as 0.5s, from the start to the end of its <animation>.",
     )
     report: str | None = option(
@@ -99,7 +101,10 @@ def mesh(given: MeshFileOptions) -> int:
         refuse_options(names, "only for meshes, and a .vdb file holds samples")
     if given.implicit:
         refuse_what_needs_triangles(given.output)
-    scenes = moments(load_scene(given.source, given.settings), given.seconds, given.every)
+    scene = load_scene(given.source, given.settings)
+    if given.seconds is not None or given.every is not None:
+        refuse_moved(scene, given.settings)
+    scenes = moments(scene, given.seconds, given.every)
     problems = False
     with given.working(store=store_in(given.cache), device=chosen(given.device)) as work:
         for suffix, scene in scenes:
@@ -135,8 +140,8 @@ def moments(scene: Scene, seconds: float | None, every: float | None) -> list[tu
     timeline = Timeline(scene)
     if every is None:
         return [("", timeline.at(seconds or 0.0))]
-    if seconds is not None or not every:
-        raise click.UsageError("--every: expected a time above zero, and no --time")
+    if seconds is not None:
+        raise click.UsageError("--time and --every: expected one of them")
     count = int(timeline.animation.duration / every + 1e-9) + 1
     if count > MOST:
         raise click.UsageError(f"--every: expected at most {MOST} outputs, and this makes {count}")
@@ -161,7 +166,7 @@ def write_formula(scene: Scene, given: MeshFileOptions, work: Work) -> bool:
     for note in made.notes:
         click.echo(note, err=True)
     if not given.quiet:
-        size = " x ".join(f"{side:.2f}" for side in made.box.size)
+        size = " x ".join(map(decimal, made.box.size))
         kilobytes = made.path.stat().st_size / 1e3
         click.echo(
             f"{given.output}: a formula of {made.operations} operations, {kilobytes:.1f} kB, {size} mm"

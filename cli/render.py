@@ -86,11 +86,11 @@ def render(given: RenderOptions) -> None:
         renderer = Renderer(scene.root, scene.view, given.size, work, device, sequence, given.crop)
         aside = None if pool is None or given.state else pool.pieces.path(f"{renderer.key}.npz")
         render_passes(renderer, scene, given.but(state=given.state or aside), work)
-    if pool and not pool.first:
-        raise SharedError("the samples are made; shard 1 writes the file")
-    more = layers(renderer) if given.layers else None
-    done = without_noise(renderer) if given.denoise else renderer.seen()
-    save(given.output, done, scene, given.bits, given.threads, more)
+        if pool and not pool.first:
+            raise SharedError("the samples are made; shard 1 writes the file")
+        more = layers(renderer) if given.layers else None
+        done = without_noise(renderer) if given.denoise else renderer.seen()
+        save(given.output, done, scene, given.bits, given.threads, more)
     if pool and aside:
         Path(aside).unlink(missing_ok=True)
         if not given.shard:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fracslice.common.digits import counted
+from fracslice.common.digits import counted, decimal
 from fracslice.errors import keeping
 
 from .closing import of_layers
@@ -105,11 +105,12 @@ class SliceOptions(ClusterOptions, LayerOptions):
 def slice_(given: SliceOptions) -> int:
     """Cut SCENE into the layers of a print, straight from its field.
 
-    An interrupted job resumes when it is started again.
+    No supports are added: fracslice check says whether the object needs them. An interrupted job
+    resumes when it is started again.
 
     Examples
     --------
-    fracslice slice mandelbulb -o bulb.sl1 --size 60mm --printer sl1s
+    fracslice slice menger-tower -o tower.sl1 --size 60mm --printer sl1s
     fracslice slice mandelbulb -o bulb.goo --printer mars-5 --exposure 2.5 30 --hollow 2mm
     fracslice slice my.xml -o layers --pixel 0.05mm --preview sheet.png
     """
@@ -177,7 +178,7 @@ def described(run: SliceRun, output: str, notes: Sequence[str]) -> list[str]:
     from fracslice.export.layer_files import printers_file
 
     stack, screen = run.stack, run.screen
-    size = " x ".join(f"{s:.2f}" for s in stack.size)
+    size = " x ".join(map(decimal, stack.size))
     rows, columns = screen.shape
     first = f"{output}: {counted(len(stack.z), 'layer')} of {columns} x {rows} pixels, {size} mm"
     other = printers_file(screen.printer, output) if screen.printer else ""
@@ -208,15 +209,18 @@ def refuse_what_no_print_has(given: SliceOptions, kind: str, resin: Resin | None
     This is checked before print preparation, which may take minutes.
     """
     from fracslice.export.layer_files import ENDINGS, printers_file
+    from fracslice.slicing.printers import PRINTERS
 
     machine, output = given.machine, given.output
     if machine is None:
-        raise click.UsageError(f'{output}: a .{kind} file needs --printer, such as sl1s; "list" shows all')
+        able = next((f", such as {p.name}" for p in PRINTERS.values() if not printers_file(p, output)), "")
+        raise click.UsageError(f'{output}: a .{kind} file needs --printer{able}; "list" shows all')
     if f".{machine.file}" in ENDINGS and (other := printers_file(machine, output)):
         raise click.UsageError(f"{output}: {other}")
     if resin is None:
         raise click.UsageError(
-            f"{output}: no exposure is known for {machine.title}; expected --exposure S S or --resin"
+            f"{output}: no exposure is known for {machine.title}; expected --resin, or --exposure: "
+            "the seconds of a layer and of a bottom layer, as in your slicer"
         )
     if given.layer[1] is not None and kind == "sl1":
         raise click.UsageError(f"{output}: an SL1 archive has layers of one height, not a range")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fracslice.common.digits import counted
+from fracslice.common.digits import counted, decimal
 
 if TYPE_CHECKING:
     from fracslice.jobs.report import Report
@@ -30,8 +30,9 @@ def summary(path: str, report: Report) -> str:
 def figures(mesh: MeshReport) -> str:
     """Figures and printability of a mesh, in one line."""
     (x0, y0, z0), (x1, y1, z1) = mesh.bbox_mm
-    size = f"{x1 - x0:.2f} x {y1 - y0:.2f} x {z1 - z0:.2f} mm"
+    size = " x ".join(map(decimal, (x1 - x0, y1 - y0, z1 - z0))) + " mm"
     triangles, bodies = counted(mesh.triangles, "triangle"), counted(mesh.components, "body", "bodies")
     verdict = f"would not print: {', '.join(mesh.problems)}" if mesh.problems else "watertight, manifold"
-    volume = f"{mesh.volume_mm3 / 1000:.2f} cm3" if mesh.volume_mm3 >= 1000 else f"{mesh.volume_mm3:.2f} mm3"
-    return f"{triangles}, {size}, {volume}, {bodies}, {verdict}"
+    volume = mesh.volume_mm3
+    amount = f"{decimal(volume / 1000)} cm3" if volume >= 1000 else f"{decimal(volume)} mm3"
+    return f"{triangles}, {size}, {amount}, {bodies}, {verdict}"

@@ -109,6 +109,14 @@ def read_seconds(text: str) -> float:
     return float(Seconds(0.0, "").read(text))
 
 
+def read_interval(text: str) -> float:
+    """Parse a time above zero of an animation."""
+    seconds = read_seconds(text)
+    if not seconds:
+        raise ValueError("a time in seconds above zero, such as 2.5s")
+    return seconds
+
+
 def read_factors(text: str) -> tuple[float, float, float]:
     """Parse the compensation of shrinkage into factors along x, y and z."""
     from fracslice.scene.lengths import Percent
@@ -128,4 +136,5 @@ def direction(
 
 NUMBER, AMOUNT, POSITIVE = Finite(), Signed(">="), Signed(">")
 LENGTH, SECONDS = Parsed(read_length, "LENGTH"), Parsed(read_seconds, "TIME")
+INTERVAL = Parsed(read_interval, "TIME")
 FACTORS = Parsed(read_factors, "N%[,N%,N%]")

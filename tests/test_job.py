@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import json
 import math
+import subprocess
+import sys
 import threading
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -187,6 +191,16 @@ def test_there_is_memory():
     assert 1 << 20 < memory.available_bytes() < 1 << 60
 
 
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs /proc")
+def test_peak_memory_is_not_that_of_the_process_that_started_this_one():
+    own = "from fracslice.common.memory import peak_rss_mb; print(peak_rss_mb())"
+    large = (
+        f"import subprocess, sys; held = b'x' * (300 << 20); subprocess.run([sys.executable, '-c', {own!r}])"
+    )
+    done = subprocess.run([sys.executable, "-c", large], capture_output=True, text=True, check=True)
+    assert 1 < float(done.stdout) < 200
+
+
 def test_cancelling_stops_it():
     cancel = threading.Event()
     stages = []
@@ -212,6 +226,13 @@ def test_a_file_is_named_that_is_written_when_its_last_check_is_cancelled(monkey
     assert target.exists()
     with pytest.raises(Cancelled, match="cancelled"):
         make_mesh(BALL, MeshJob(resolution=16))
+
+
+def test_a_file_is_named_that_is_written_when_the_work_is_cancelled(tmp_path):
+    target = tmp_path / "ball.stl"
+    cancel = SimpleNamespace(is_set=target.exists)
+    with pytest.raises(KeptError, match=r"^.*ball\.stl is written$"):
+        make_mesh(BALL, MeshJob(resolution=16), Work(cancel=cancel), path=target)
 
 
 def test_the_result_does_not_depend_on_threads_or_run():

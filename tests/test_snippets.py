@@ -50,7 +50,7 @@ def test_what_a_page_shows_runs(page: Path, tmp_path: Path) -> None:
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     made = {path.name for path in tmp_path.iterdir()} - {code.name}
-    shown = set(re.findall(r'"([\w-]+\.(?:stl|3mf|ply|png|npy))"', code.read_text(encoding="utf-8")))
+    shown = set(re.findall(r'"([\w-]+\.(?:stl|3mf|ply|png|npy|vdb))"', code.read_text(encoding="utf-8")))
     assert made == shown
     assert all((tmp_path / name).stat().st_size > 500 for name in made)
 

@@ -66,7 +66,7 @@ def work_of(options: WorkOptions | Options, work: Work | None = None) -> Work:
         given["device"] = chosen(given["device"])
     if not callable(given.get("progress", print)):
         raise TypeError(f"progress={given['progress']!r}: expected a callable (stage, share)")
-    if not isinstance(given.get("cancel") or threading.Event(), threading.Event):
+    if not isinstance(given.get("cancel", threading.Event()), threading.Event):
         raise TypeError(f"cancel={given['cancel']!r}: expected a threading.Event")
     return replace(work or Work(), **given)
 

@@ -102,9 +102,10 @@ def render(
     view = replace(view, **{name: value for name, value in given.items() if value is not None})
     most = view.film.samples if samples is None else samples
     most = validated("samples", most, Film.kinds()["samples"], RenderError)
-    film = validated("size", size or (view.film.width, view.film.height), SIZE, RenderError)
+    pixels = (view.film.width, view.film.height) if size is None else size
+    film = validated("size", pixels, SIZE, RenderError)
     device = for_picture(options.get("device") or "auto", film, most)
-    renderer = Renderer(root, view, size, work, device)
+    renderer = Renderer(root, view, film, work, device)
     seen = renderer.seen()
     for seen in renderer.passes(most):
         work.progress("rendering", min(seen.samples / most, 1.0))

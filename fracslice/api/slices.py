@@ -189,7 +189,7 @@ def slice_layers(
     """
     work = work_of(options)
     scene = as_scene(shape, size)
-    low, high = layer if isinstance(layer, (tuple, list)) else (layer, None)
+    low, high = layer if isinstance(layer, (tuple, list)) and len(layer) == 2 else (layer, None)
     longest = None if size is None else parse_length(size, "size")
     given = sizing(scene, longest, work=work)
     how = print_of(scene, options), scale, given.unit

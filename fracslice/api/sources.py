@@ -36,7 +36,9 @@ def resolve(source: Source) -> Node | Scene:
     if isinstance(source, Formula):
         raise SceneError(f"{source.name}: expected a shape, {source.name}(...), found the formula itself")
     if not isinstance(source, (str, os.PathLike)):
-        raise SceneError(f"{shown(source)}: expected a shape such as sphere(), a scene, a file or a name")
+        wanted = "expected a shape such as sphere(), a scene, a file or a name"
+        made = "; formulas.shape makes a formula of a function" if callable(source) else ""
+        raise SceneError(f"{shown(source)}: {wanted}{made}")
     path = Path(source)
     if path.exists() or path.name != os.fspath(source) or path.suffix:
         return read(path)

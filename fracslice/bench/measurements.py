@@ -19,6 +19,7 @@ from typing import Any
 from ..cluster import Shard
 from ..common.digits import counted
 from ..common.keys import key, program
+from ..common.memory import MAXRSS, own_peak_mb, peak_rss_mb
 from ..errors import BenchError, FracsliceError, SharedError
 from ..formulas.parameters import Count, Number
 from ..formulas.records import attribute, validate, validated
@@ -244,25 +245,29 @@ def _run(command: list[str], text: str, work: Work) -> tuple[str, dict[str, floa
             child = subprocess.Popen(command, stdin=fed, stdout=out, stderr=err)
         except OSError as error:
             raise _FailedError(f"{command[0]}: {error.strerror}") from None
-        status, usage = _ended(child, work)
+        status, usage, peak = _ended(child, work)
         wall = time.perf_counter() - start
         out.seek(0)
         err.seek(0)
         if status:
             lines = err.read().decode(errors="replace").strip().splitlines()
             raise _FailedError(lines[-1] if lines else f"{command[0]} ended with status {status}")
-        peak = usage.ru_maxrss / (1 << 20 if sys.platform == "darwin" else 1 << 10)
         used = {"wall_s": wall, "cpu_s": usage.ru_utime + usage.ru_stime, "peak_mb": peak}
         return out.read().decode(errors="replace"), used
 
 
-def _ended(child: subprocess.Popen[bytes], work: Work) -> tuple[int, Any]:
-    """Wait for a child process; stop it if the work is cancelled."""
+def _ended(child: subprocess.Popen[bytes], work: Work) -> tuple[int, Any, float]:
+    """Wait for a child process; stop it if the work is cancelled. Returns its status, usage and peak memory,
+    MiB.
+    """
+    seen = 0.0
     while True:
+        seen = max(seen, own_peak_mb(child.pid))
         pid, status, usage = os.wait4(child.pid, os.WNOHANG)
         if pid:
             child.returncode = os.waitstatus_to_exitcode(status)
-            return child.returncode, usage
+            most = usage.ru_maxrss / MAXRSS
+            return child.returncode, usage, seen if seen and most <= peak_rss_mb() else most
         if work.cancel.wait(0.02):
             child.kill()
             child.wait()

@@ -12,6 +12,17 @@ def significant(value: float, digits: int = 3) -> str:
     return f"{float(f'{value:.{digits}g}'):.12g}"
 
 
+def decimal(value: float) -> str:
+    """Format a number with two decimals or, below a tenth, three significant digits.
+
+    Examples
+    --------
+    >>> decimal(80), decimal(0.1), decimal(0.00041), decimal(0)
+    ('80.00', '0.10', '0.00041', '0.00')
+    """
+    return significant(value) if 0 < value < 0.1 else f"{value:.2f}"
+
+
 def counted(count: int, one: str, more: str = "") -> str:
     """Format a count with its noun.
 

@@ -76,7 +76,8 @@ def check_target(path: str | Path) -> Path:
     """
     target = Path(os.path.realpath(path))
     if not target.parent.is_dir():
-        raise ExportError(f"{path}: the folder {target.parent} does not exist")
+        wrong = "is a file, not a folder" if target.parent.exists() else "does not exist"
+        raise ExportError(f"{path}: the folder {target.parent} {wrong}")
     if target.is_dir():
         raise ExportError(f"{path}: is a folder")
     if target.exists() and not target.is_file():
@@ -142,6 +143,8 @@ def linked(source: str, path: str | Path) -> None:
             os.chmod(part, _permissions(target))
             os.fsync(file.fileno())
         _replace(part, target)
+        with suppress(FileNotFoundError):
+            os.unlink(part)  # still there if it was the target's already: POSIX does not rename then
     except OSError:
         with suppress(FileNotFoundError):
             os.unlink(part)

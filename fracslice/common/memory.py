@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -15,6 +16,9 @@ KEPT, LARGEST = 32 << 20, 4 << 20
 
 KEPT_BY_TASKS, LARGEST_OF_TASKS = 512 << 20, 32 << 20
 """The same in a worker, whose tasks have large arrays, one after another; glibc allows no larger block."""
+
+MAXRSS = 1 << 20 if sys.platform == "darwin" else 1 << 10
+"""Units of ``ru_maxrss`` per MiB."""
 
 
 @cache
@@ -51,12 +55,33 @@ def peak_rss_mb() -> float:
     float
         Peak memory, MiB; 0 on a system that does not report it.
     """
+    if peak := own_peak_mb(os.getpid()):
+        return peak
     try:
         import resource
     except ImportError:
         return 0.0
-    unit = 1 << 20 if sys.platform == "darwin" else 1 << 10
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / MAXRSS
+
+
+def own_peak_mb(process: int) -> float:
+    """Return the peak resident set size of a running process, as Linux has it.
+
+    The maximum of ``getrusage`` begins with the memory of the process that started it.
+
+    Parameters
+    ----------
+    process : int
+        Number of the process.
+
+    Returns
+    -------
+    float
+        Peak memory, MiB; 0 if it is unknown.
+    """
+    with suppress(OSError), open(f"/proc/{process}/status") as status:
+        return next((int(line.split()[1]) / 1024 for line in status if line.startswith("VmHWM:")), 0.0)
+    return 0.0
 
 
 def available_bytes() -> int:

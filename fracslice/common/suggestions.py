@@ -9,18 +9,21 @@ MANY = 24
 
 
 def hint(wrong: str, right: Iterable[str], form: str = "{}", where: str = "") -> str:
-    """Suggestion for an unknown name: the nearest known one, or a list of all; `form` formats a name.
+    """Suggestion for an unknown name: the only known one that begins so, the nearest, or a list of all.
 
-    If there are more than `MANY` names, `where` takes the place of the list.
+    `form` formats a name. If there are more than `MANY` names, `where` takes the place of the list.
 
     >>> hint("mandelblub", ["julia", "mandelbulb"], "<{}>")
     'did you mean <mandelbulb>?'
+    >>> hint("res", ["threads", "resolution"])
+    'did you mean resolution?'
     """
     from difflib import get_close_matches  # for errors only: it takes a millisecond to import
 
     known = sorted(right)
     folded = {name.lower(): name for name in known}
-    near = get_close_matches(wrong.lower(), folded, n=1)
+    begun = [name for name in folded if len(wrong) > 1 and name.startswith(wrong.lower())]
+    near = begun if len(begun) == 1 else get_close_matches(wrong.lower(), folded, n=1)
     if near:
         return f"did you mean {form.format(folded[near[0]])}?"
     if where and len(known) > MANY:

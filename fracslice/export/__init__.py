@@ -7,6 +7,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
+import numpy as np
+
 from ..common.files import check_target, flushing, replacing
 from ..errors import ExportError
 from ..version import __version__
@@ -107,13 +109,17 @@ def write(
     Raises
     ------
     ExportError
-        For an empty mesh, an unknown extension, or an error of the file system.
+        For an empty or invalid mesh, an unknown extension, or an error of the file system.
     Cancelled
         If the job was cancelled.
     """
     format_write = FORMATS[check_format(path)]
     if not len(mesh.triangles):
         raise ExportError(f"{path}: the mesh has no triangles")
+    if not 0 <= mesh.triangles.min() <= mesh.triangles.max() < len(mesh.vertices):
+        raise ExportError(f"{path}: a triangle of the mesh names a vertex that does not exist")
+    if not np.abs(mesh.vertices).max() <= np.finfo(np.float32).max:  # false for NaN, too
+        raise ExportError(f"{path}: the mesh has a coordinate that is not a finite number of 32 bits")
     with replacing(path) as file:
         format_write(mesh, file, {"Application": application()} | dict(metadata or {}), work or Work())
     return Path(path)

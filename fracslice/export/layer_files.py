@@ -105,8 +105,8 @@ def printers_file(printer: Printer, output: str | Path) -> str:
     if ending in ENDINGS:
         return f"{printer.title} reads {ending} files: make {path.with_suffix(ending).name}"
     kind, name = ending.replace(".encrypted", "encrypted "), path.with_suffix(".goo").name
-    make = f"make {name} and convert it with UVtools"
-    return f"{printer.title} reads {kind} files, which are not written: {make}"
+    make = f"convert {name}" if path.name == name else f"make {name} and convert it"
+    return f"{printer.title} reads {kind} files, which are not written: {make} with UVtools"
 
 
 def write_slices(run: SliceRun, path: str | Path, name: str | None = None) -> Path:

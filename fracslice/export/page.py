@@ -18,6 +18,7 @@ _STYLE = "body{font:16px/1.5 sans-serif;max-width:60em;margin:2em auto;padding:0
 def page(
     title: str,
     lines: Sequence[str],
+    verdict: str,
     problems: Sequence[str],
     tops: NDArray[np.float64],
     areas: NDArray[np.float64],
@@ -31,8 +32,10 @@ def page(
         Heading.
     lines : sequence of str
         Figures, a paragraph each.
+    verdict : str
+        Whether the object would print.
     problems : sequence of str
-        Problems; empty if the object would print.
+        Problems, a list item each.
     tops, areas : float64 [n]
         Upper face, mm, and area, mm2, of each layer.
     picture : bytes
@@ -43,14 +46,13 @@ def page(
     bytes
         HTML, UTF-8.
     """
-    verdict = "Would not print" if problems else "Would print"
     image = b64encode(picture).decode("ascii")
     text = [
         "<!DOCTYPE html>",
         f'<html lang="en"><meta charset="utf-8"><title>{escape(title)}</title><style>{_STYLE}</style>',
         f"<h1>{escape(title)}</h1>",
         *(f"<p>{escape(line)}</p>" for line in lines),
-        f"<h2>{verdict}</h2>",
+        f"<h2>{escape(verdict.capitalize())}</h2>",
         *(["<ul>", *(f"<li>{escape(problem)}</li>" for problem in problems), "</ul>"] if problems else []),
         "<h2>Cross-section over height</h2>",
         "<p>The force that peels a layer from the film grows with its area.</p>",

@@ -194,6 +194,8 @@ class Vector(Bounded):
         return f"{count} {kind}{self.range}{nonzero}"
 
     def read(self, text: str) -> Any:
+        if "," in text:
+            raise ValueError(f"{self.expects}, separated by spaces")
         return self.check(tuple(map(self.parsed, text.split())))
 
     def check(self, value: Any) -> Any:

@@ -207,7 +207,7 @@ class _Job:
         with in_background(measure, clock.work.threads) as measured:
             made = Writing(self.scene, what, clock, self.path).made(surface, finish)
             written = nullcontext() if self.path is None else keeping(f"{self.path} is written")
-            with clock("checking"), written:
+            with written, clock("checking"):
                 amount, off = measured()
         fell = f"{thin}; expected a smaller voxel, or a thickness of {2 * scale * planned.voxel:.2g} mm"
         near = finish.near.count

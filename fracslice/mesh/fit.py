@@ -29,6 +29,9 @@ AROUND /= np.linalg.norm(AROUND, axis=1)[:, None]
 
 BEYOND = 1 + 1e-6
 
+FINEST = 1 / 8
+"""Reach, voxels, down to which it is halved where it proves nothing: a wide one sees past thin features."""
+
 UPRIGHT, OFF = 3, 7
 
 
@@ -81,7 +84,8 @@ class Fit:
 
         A continuous field has a zero between two points of opposite signs. A sign change along the normal
         through the point, or else within the ball of radius `reach` around it, proves that the surface is
-        within `reach`. Elsewhere the distance is a first-order estimate, and greater than `reach`.
+        within `reach`; so do those of shorter reaches. Elsewhere the distance is a first-order estimate, and
+        greater than `reach`.
 
         Parameters
         ----------
@@ -97,21 +101,34 @@ class Fit:
         """
 
         def look(rows: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-            p, step = rows[:3], self.reach * rows[3:]
-            up, down = self._kernel.points(*(p + step)), self._kernel.points(*(p - step))
-            passed = (up >= 0) & (down <= 0) & (up > down)
-            out[passed, 0] = self.reach * np.abs(up + down)[passed] / (up - down)[passed]
-            left = np.ascontiguousarray(p[:, ~passed])
-            f = self._kernel.points(*left)
-            around = np.array([self._kernel.points(*(left + self.reach * way[:, None])) for way in AROUND])
-            steep = np.abs(around - f).max(axis=0) / self.reach
-            far = np.minimum(np.abs(f) / np.maximum(steep, 1e-30), self._voxel)
-            near = np.ptp((around < 0).astype(np.int8), axis=0) > 0
-            out[~passed, 0] = np.where(
-                near, np.minimum(far, self.reach), np.maximum(far, BEYOND * self.reach)
-            )
+            left, reach = np.arange(rows.shape[1]), self.reach
+            while True:
+                off = self._within(reach, np.ascontiguousarray(rows[:, left]))
+                out[left, 0] = np.where(off <= reach, off, np.maximum(off, BEYOND * self.reach))
+                left = left[off > reach]
+                if not len(left) or reach <= FINEST * self._voxel:
+                    return
+                reach /= 2
 
         return self._each(look, np.concatenate([points, normals], axis=1), 1)[:, 0]
+
+    def _within(self, reach: float, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distances of points, with the normals below them, from the surface; greater than `reach` where no
+        sign change proves that it is within it, [n].
+        """
+        p, step = rows[:3], reach * rows[3:]
+        up, down = self._kernel.points(*(p + step)), self._kernel.points(*(p - step))
+        passed = (up >= 0) & (down <= 0) & (up > down)
+        out = np.empty(rows.shape[1])
+        out[passed] = reach * np.abs(up + down)[passed] / (up - down)[passed]
+        left = np.ascontiguousarray(p[:, ~passed])
+        f = self._kernel.points(*left)
+        around = np.array([self._kernel.points(*(left + reach * way[:, None])) for way in AROUND])
+        steep = np.abs(around - f).max(axis=0) / reach
+        far = np.minimum(np.abs(f) / np.maximum(steep, 1e-30), self._voxel)
+        near = np.ptp((around < 0).astype(np.int8), axis=0) > 0
+        out[~passed] = np.where(near, np.minimum(far, reach), np.maximum(far, BEYOND * reach))
+        return out
 
     def triangles(self, corners: NDArray[np.float64]) -> NDArray[np.float64]:
         """Measure the fit of triangles.

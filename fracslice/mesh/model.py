@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.digits import counted
+from ..errors import MeshError
 from .exchange import Exchange
 from .topology import Sizes, component_sizes, edge_topology
 
@@ -29,6 +30,11 @@ class Mesh(Exchange):
         Colours of the vertices, sRGB.
     scalars : mapping of str to ndarray of float32, shape (n,)
         Named numbers of the vertices.
+
+    Raises
+    ------
+    MeshError
+        If an array does not hold three numbers in each row.
 
     Examples
     --------
@@ -49,6 +55,8 @@ class Mesh(Exchange):
     def __post_init__(self) -> None:
         for name, kind in (("vertices", np.float64), ("triangles", np.int32)):
             array = np.asarray(getattr(self, name), kind).view()
+            if array.ndim != 2 or array.shape[1] != 3:
+                raise MeshError(f"{name}: expected an array [n, 3], found one of shape {list(array.shape)}")
             array.flags.writeable = False
             object.__setattr__(self, name, array)
         object.__setattr__(self, "scalars", MappingProxyType(dict(self.scalars)))
@@ -229,3 +237,16 @@ def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64
         i, j = (k + 1) % 3, (k + 2) % 3
         out[:, k] = a[:, i] * b[:, j] - a[:, j] * b[:, i]
     return out
+
+
+def joined(meshes: list[Mesh]) -> Mesh:
+    """Concatenate meshes without welding.
+
+    Returns
+    -------
+    Mesh
+        All their triangles, in order.
+    """
+    offsets = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
+    triangles = [mesh.triangles + np.int32(offset) for mesh, offset in zip(meshes, offsets, strict=True)]
+    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(triangles))

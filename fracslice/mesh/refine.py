@@ -49,7 +49,7 @@ class Refined:
     from_triangles : int
         Triangles before the refinement.
     off_mm : float
-        Greatest distance of the samples of the triangles, a quarter of a side apart.
+        Estimate of the greatest distance, from samples of the triangles a quarter of a side apart.
     left : int
         Triangles with a sample out of tolerance: in rough places, or where smaller triangles would turn over
         or intersect.
@@ -132,7 +132,8 @@ def refine(
         refused = np.concatenate([refused, latest])
         if (split.sum() - len(latest)) * WORTH < np.count_nonzero(state.off > state.fit.reach):
             break
-    return state.mesh, Refined(chord, count, float(state.off.max()), int((state.off > state.fit.reach).sum()))
+    far = np.count_nonzero(state.off > state.fit.reach)
+    return state.mesh, Refined(chord, count, float(state.off.max()) / AIM, int(far))
 
 
 def _repeated(keys: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -22,10 +22,10 @@ class Limits:
     Attributes
     ----------
     speck : float
-        Components with less area in every layer (mm^2), or less volume (mm^3), are counted as specks but are
-        not a problem.
+        Components with less area in every layer (mm^2; at least 8 pixels), or less volume (mm^3), are counted
+        as specks but are not a problem.
     cup : float
-        Minimum area of a suction cup or a resin trap, mm^2.
+        Minimum area of a suction cup, a resin trap or, in layers, a sealed cavity, mm^2.
     deep : float
         Minimum height of a suction cup, mm; every hole in the first layers is a shallow one.
     wall : float

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+SUPPORTS = "supports in the slicer"
+
 Place = tuple[float, float, float]
 """Point, mm from the middle of the object along x and y, and above its lowest point."""
 
@@ -40,12 +42,26 @@ class Problem:
         """The problem in one line."""
         where = [] if self.layer is None else [f"layer {self.layer}"]
         if self.at is not None:
-            where.append("at {:.2f} {:.2f} {:.2f} mm".format(*self.at))
+            where.append("at " + " ".join(f"{round(x, 2) + 0.0:.2f}" for x in self.at) + " mm")
         flags = " ".join(f"--{name} {value}" for name, value in self.mend)
         hints = " or ".join(filter(None, [flags, self.advice]))
         return " ".join(filter(None, [f"{self.text}:" if where else self.text, ", ".join(where)])) + (
             f"; {hints}" if hints else ""
         )
+
+
+def verdict(problems: Sequence[object]) -> str:
+    """Say whether an object with some problems would print: as it is, with supports, or not.
+
+    Parameters
+    ----------
+    problems : sequence
+        Problems of its layers, as `Problem`, and of its mesh.
+    """
+    if not problems:
+        return "would print"
+    held = all(isinstance(problem, Problem) and SUPPORTS in problem.advice for problem in problems)
+    return "would print with supports" if held else "would not print"
 
 
 def flat_base(height: float) -> str:

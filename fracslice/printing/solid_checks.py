@@ -200,7 +200,7 @@ def check_solid(
         *_too_thin("walls", narrow, limits.wall, limits.thin, thickening, scale, middle),
         *_too_thin("floors", bare, limits.floor, limits.thin, thickening, scale, middle),
     ]
-    unseen = _unseen(thick, finest or bricks.voxel * scale, limits.thin, scale)
+    unseen = _unseen(thick, finest or bricks.voxel * scale, limits.thin, scale, middle)
     return SolidReport(
         voxel=bricks.voxel * scale,
         bodies=bodies,
@@ -245,8 +245,8 @@ def _widths(walls: Walls, scale: float) -> Widths | None:
     return widths_of(walls.width * scale, walls.area * scale**2)
 
 
-def _unseen(walls: Walls, finest: float, least: float, scale: float) -> str:
-    """Describe the walls thinner than `finest` mm: area, least thickness and its place in the scene.
+def _unseen(walls: Walls, finest: float, least: float, scale: float, middle: np.ndarray) -> str:
+    """Describe the walls thinner than `finest` mm: area, least thickness and its place from `middle`.
 
     Empty if their area is below `least` mm2.
     """
@@ -255,10 +255,10 @@ def _unseen(walls: Walls, finest: float, least: float, scale: float) -> str:
     if area < least:
         return ""
     first = int(lost.width.argmin())
-    x, y, z = lost.middle[first].tolist()
+    x, y, z = (scale * (lost.middle[first] - middle)).tolist()
     return (
         f"{significant(area)} mm2 of walls are thinner than {finest:.3g} mm and may be lost; "
-        f"the thinnest, {lost.width[first] * scale:.2g} mm, at {x:.3g} {y:.3g} {z:.3g} in the scene"
+        f"the thinnest, {lost.width[first] * scale:.2g} mm, at {x:.2f} {y:.2f} {z:.2f} mm"
     )
 
 

@@ -6,6 +6,7 @@ import threading
 
 import numpy as np
 
+from ..errors import Cancelled
 from ..kernel.cpu import load_functions
 from ..kernel.host import lane_count
 from ..kernel.machine import constant
@@ -109,6 +110,11 @@ class CpuTracer:
             Pixels to sample.
         work : Work
             Threads and cancellation.
+
+        Raises
+        ------
+        Cancelled
+            If the work is cancelled before the last pixel.
         """
         if len(self._points) < plan.last:
             self._points = self.samples.points(2 * plan.last, self.frame.samples)
@@ -117,9 +123,15 @@ class CpuTracer:
             pixels = plan.pixels[part].copy()
             arrays = self._parameters, self._points, self._starts, *self._workspace, pixels, sums
             self._tile(*arrays, len(pixels), self.width, self.steps, self._shift, self._blocks)
+            done.append(part)
 
         tile = min(_tile(len(plan.pixels), work.threads), max(RAYS // plan.last, LEAST))
-        work.map(task, chunks(len(plan.pixels), tile))
+        parts, done = chunks(len(plan.pixels), tile), list[slice]()
+        try:
+            work.map(task, parts)
+        except Cancelled:
+            if len(done) < len(parts):  # a whole pass counts, or the next one would choose other pixels
+                raise
 
     @property
     def _workspace(self) -> tuple[np.ndarray, ...]:

@@ -62,7 +62,7 @@ def load_state(path: str | Path, key: str, like: HostAccumulator) -> HostAccumul
     try:
         with open(path, "rb") as file, NpzFile(file) as stored:
             if str(_array(stored, "key")) != key:
-                raise RenderError(f"{path}: is of another scene, view, size or version")
+                raise RenderError(f"{path}: is of another scene, view, size, seed or version")
             width, height, passes = map(int, _array(stored, "shape"))
             sums = _array(stored, "sums", like.sums.nbytes)
     except OSError as error:

@@ -145,6 +145,8 @@ def _changed(scene: Scene, override: Override) -> Scene:
     if override.element in (section.name for section in PICTURE):
         return replace(scene, view=_relit(scene.view, override))
     present = Counter(node.formula.name for node in scene.root.walk())
+    if override.element in SECTIONS:
+        raise override.fail(f"settings do not change <{override.element}>; expected another element")
     if override.element not in present:
         known = hint(override.element, present | {SOLID.name: 1}, "<{}>")
         raise override.fail(f"the scene has no <{override.element}>; {known}")

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from ..errors import SceneError
 from ..formulas import Node
+from ..formulas.conversion import shown
 from ..formulas.definitions import definitions
 from .definitions import attributes, written
 from .element import Part
@@ -28,7 +30,14 @@ def to_xml(scene: Scene) -> str:
     -------
     str
         XML that reads back as an equal scene.
+
+    Raises
+    ------
+    SceneError
+        For a shape, which has no size.
     """
+    if isinstance(scene, Node):
+        raise SceneError(f"{shown(scene)}: expected a scene, such as Scene(sphere(), 40)")
     return "\n".join(_lines(scene)) + "\n"
 
 

@@ -28,6 +28,9 @@ from .thickness import widths
 THICKNESS_LAYERS = 24
 """Layers, evenly spaced over the height, in which walls and gaps are measured."""
 
+SPECK = 8
+"""Area in pixels; smaller islands and bodies are indistinguishable from noise."""
+
 WORST = 6
 """Maximum number of layers in `PrintReport.worst`."""
 
@@ -229,8 +232,9 @@ class _Collector:
         bodies = self.groups(solid, np.ones(solid.count, bool))
         cups = [c for c in self.shut(empty, False) if self.height(c) >= self.limits.deep]
         traps = self.shut(empty, True)
-        real = [i for i in islands if i.area >= self.limits.speck]
-        kept = [b for b in bodies if b.area >= self.limits.speck]
+        speck = max(limits.speck, SPECK * square)
+        real = [i for i in islands if i.area >= speck]
+        kept = [b for b in bodies if b.area >= speck]
         report = PrintReport(
             layers=len(stack.z),
             pixels=stack.shape[::-1],
@@ -246,7 +250,7 @@ class _Collector:
             largest_overhang=float(overhang.max(initial=0)),
             cups=cups,
             traps=traps,
-            cavities=[c for c in self.groups(empty, empty.sealed()) if c.area >= self.limits.speck],
+            cavities=[c for c in self.groups(empty, empty.sealed()) if c.area >= limits.cup],
             walls=widths_of(*np.concatenate(walls).T),
             gaps=widths_of(*np.concatenate(gaps).T),
             overhang=max(far, key=lambda o: o.reach, default=None),

@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from ..common.digits import counted, significant
-from ..printing.problems import Problem, flat_base
-from ..printing.solid_checks import BRIDGE, FILL, loose
+from ..printing.problems import SUPPORTS, Problem, flat_base
+from ..printing.solid_checks import FILL, loose
 from .feature_graph import Feature
 from .printers import PRINTERS, Printer
 from .stack import Stack
@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from ..printing.limits import Limits
     from .layer_checks import PrintReport
     from .necks import Neck
-
-SUPPORTS = "supports in the slicer"
 
 
 def misfit(stack: Stack, printer: Printer | None) -> Problem | None:
@@ -74,7 +72,7 @@ def problems_of(report: PrintReport, stack: Stack, limits: Limits) -> list[Probl
         first = min(i.layers[0] for i in report.islands)
         text = f"{counted(len(report.islands), 'island')} in the air, the first from layer {first} on"
         text += f", the largest of {significant(largest.area)} mm2"
-        problems.append(Problem("islands", text, mend=BRIDGE, advice=SUPPORTS, **where(largest)))
+        problems.append(Problem("islands", text, advice=SUPPORTS, **where(largest)))
     if report.overhang:
         far = report.overhang
         text = f"a flat overhang reaches {far.reach:.3g} mm, {significant(far.area)} mm2 of it too far"

@@ -59,6 +59,10 @@ class Screen:
         validate(self, SliceError)
         if not abs(self.compensation) <= 1:
             raise SliceError(f"compensation {self.compensation:g} mm: expected at most 1 mm")
+        if -2 * self.compensation >= (width := min(self.stack.size[:2])):
+            raise SliceError(
+                f"compensation {self.compensation:g} mm: nothing is left of an object {width:.3g} mm wide"
+            )
         if self.printer:
             check_fits(self.stack, self.printer, max(self.compensation, 0.0))
 

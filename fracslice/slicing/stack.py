@@ -200,7 +200,8 @@ def plan_stack(root: Field, job: SliceJob, work: Work | None = None) -> Stack:
         corner[axis] = box.centre[axis] - step * shape[1 - axis] / 2
     tops = _tops(mm[2], job.layer)
     if max(shape) > MOST_PIXELS:
-        raise SliceError(f"{shape[1]} x {shape[0]} pixels: at most {MOST_PIXELS} along a side")
+        most = f"at most {MOST_PIXELS} along a side; expected larger pixels or a smaller object"
+        raise SliceError(f"{shape[1]} x {shape[0]} pixels, {most}")
     _check_precision(outer, scale, min(*job.pixel, job.layer))
     z = box.lo[2] + (tops - np.diff(tops, prepend=0.0) / 2) / scale
     size, at = (mm[0], mm[1], mm[2]), (corner[0], corner[1])

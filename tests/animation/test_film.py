@@ -231,6 +231,14 @@ def test_a_contact_sheet_needs_its_frames_alone(path: Path, tmp_path: Path) -> N
     assert Image.open(tmp_path / "film.png").size == (60, 24)
 
 
+def test_samples_of_a_preview(path: Path, tmp_path: Path) -> None:
+    shown = []
+    for name, samples in (("few", []), ("some", ["--samples", 4]), ("more", ["--samples", 16])):
+        assert animate(path, "-o", tmp_path / name, "--preview", "--frames", 0, *samples) == 0
+        shown.append((tmp_path / name / "frame00000.png").read_bytes())
+    assert shown[0] == shown[1] != shown[2]
+
+
 @pytest.mark.parametrize("fps", [12, 24, 29.97, 50])
 def test_a_gif_is_as_long_as_its_film(fps: float, tmp_path: Path) -> None:
     frames = []
@@ -342,6 +350,9 @@ def test_a_mesh_of_a_time(tmp_path: Path) -> None:
         (["-o", "f", "--layers"], "expected --exr"),
         (["-o", "f", "--frames", "9..3"], "such as 10..20"),
         (["-o", "f", "--fps", "0"], "--fps"),
+        (["-o", "film.png", "--fly", "0s"], "expected a time in seconds above zero"),
+        (["-o", "f", "--set", "camera . eye=0 -3 0"], "a <track> moves it"),
+        (["-o", "frame.xml", "--samples", "2"], "--samples: only for frames"),
         (["-o", "film.gif", "--fps", "60"], "expected at most 50 for .gif"),
     ],
 )

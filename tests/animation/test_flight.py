@@ -52,11 +52,11 @@ def test_a_flight_that_begins_too_near_is_refused() -> None:
 
 def test_a_flight_is_a_scene_file(tmp_path: Path) -> None:
     (tmp_path / "ball.xml").write_text('<scene version="1"><solid size="20mm"><sphere/></solid></scene>')
-    given = ["animate", str(tmp_path / "ball.xml"), "--fly", "2s", "--size", "8x6", "--samples", "1", "-q"]
+    given = ["animate", str(tmp_path / "ball.xml"), "--fly", "2s", "--size", "8x6", "-q"]
     assert run([*given, "-o", str(tmp_path / "flight.xml")]) == 0
     made = read(tmp_path / "flight.xml")
     assert made.animation.duration == 2.0
     assert {track.of for track in made.tracks} == {"camera.eye", "camera.target"}
     assert len(made.tracks[0].keys) == 5
-    assert run([*given, "--fps", "1", "-o", str(tmp_path / "film")]) == 0
+    assert run([*given, "--fps", "1", "--samples", "1", "-o", str(tmp_path / "film")]) == 0
     assert len(list((tmp_path / "film").glob("*.png"))) == 2

@@ -74,6 +74,7 @@ def test_names_and_files_are_shapes_too(tmp_path: Path) -> None:
         ("none.xml", "none.xml: No such file"),
         (sphere, r"sphere: expected a shape, sphere\(...\), found the formula itself"),
         (7, "7: expected a shape such as sphere"),
+        (max, r"max>: expected a shape .*, a file or a name; formulas\.shape makes a formula of a function"),
         ("union", "union: no such scene"),
     ],
 )
@@ -91,12 +92,14 @@ def test_what_is_no_shape_is_named(source: object, message: str) -> None:
             r"make_mesh\(\) has no argument 'resoluton'; did you mean resolution\?",
         ),
         ({"thicknes": 1}, TypeError, r"did you mean thickness\?"),
+        ({"res": 8}, TypeError, r"did you mean resolution\?"),
         ({"size": "8 bananas"}, SceneError, "size '8 bananas': expected a length"),
         ({"voxel": -1}, SceneError, "voxel -1: expected a length above zero"),
         ({"voxel": 1, "resolution": 64}, SceneError, "voxel and resolution: expected one of them"),
         ({"thickness": "thick"}, SceneError, "thickness='thick': expected 0, or a length"),
         ({"threads": 0}, SceneError, "threads=0: expected"),
         ({"progress": True}, TypeError, "progress=True: expected a callable"),
+        ({"cancel": 0}, TypeError, "cancel=0: expected a threading.Event"),
         ({"cancel": 3}, TypeError, "cancel=3: expected a threading.Event"),
     ],
 )

@@ -45,6 +45,10 @@ def test_the_scene_and_the_keywords_say_how() -> None:
     assert np.array_equal(by_scene, render(SHAPE, size=(20, 10), samples=1, camera=view.camera, device="cpu"))
 
 
+def test_an_array_is_a_size(picture: Picture) -> None:
+    assert np.array_equal(render(SHAPE, **{**SMALL, "size": np.array([48, 32])}), picture)
+
+
 def test_progress_is_reported_and_work_is_cancelled() -> None:
     reported: list[tuple[str, float]] = []
     render(SHAPE, size=(16, 16), samples=2, progress=lambda stage, share: reported.append((stage, share)))

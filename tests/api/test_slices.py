@@ -114,6 +114,7 @@ def test_layers_have_sizes_and_a_range_of_heights() -> None:
     [
         ({"layers": 0.1}, TypeError, r"slice_layers\(\) has no argument 'layers'; did you mean layer\?"),
         ({"layer": "thin"}, SceneError, "layer='thin': expected a length"),
+        ({"layer": [0.1]}, SceneError, r"layer=\[0.1\]: expected a length"),
         ({"pixel": 0}, SceneError, "pixel=0: expected"),
         ({"layer": 3}, SliceError, "a layer of 3 mm is as high as the object"),
     ],

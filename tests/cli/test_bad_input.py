@@ -87,7 +87,7 @@ def test_scenes(text, message, folder, capfd):
         ("mesh ball.xml -o out/x.foo", "out/x.foo: unknown kind of file; known are .stl"),
         ("mesh ball.xml -o out", "unknown kind of file"),
         ("mesh ball.xml -o none/x.stl", "none/x.stl: the folder"),
-        ("mesh ball.xml -o ball.xml/x.stl", "does not exist"),
+        ("mesh ball.xml -o ball.xml/x.stl", "is a file, not a folder"),
         ("mesh ball.xml -o out/x.stl --report none/x.json", "none/x.json: the folder"),
         ("mesh ball.xml -o out/x.stl --report out/x.txt", "expected a file name that ends in .json"),
         ("mesh ball.xml -o out/x.stl --picture out/x.gif", "expected a file name that ends in .png"),

@@ -41,6 +41,8 @@ def test_everything_that_a_maker_asks() -> None:
         "3 loose bodies: --bridge 1mm, or --keep largest",
         "does not stand flat, 2.5 mm2 on the plate: --base 1.2mm",
     ]
+    many = list(replace(whole, drains=[(-30.0, 0.0, 4.0)] * 5).lines())[1]
+    assert many == "drain holes of 3 mm leave the hollow at -30.0 0.0 4.0 mm and at 4 other places"
     assert list(replace(whole, trapped=0.0644, drains=(), bodies=1, contact=50).lines())[1:] == []
     tiny = replace(whole, volume=8, trapped=0.0644, drains=(), bodies=1, contact=50)
     assert [line.split(":")[0].split(",")[0] for line in tiny.lines()] == [

@@ -9,12 +9,15 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 
 import click
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from fracslice.cli.cluster import ClusterOptions
 from fracslice.cli.main import NAMES, commands, run
 
 from fracslice.scene import library
@@ -286,6 +289,33 @@ def test_a_signal_stops_it_and_leaves_no_file(tmp_path, number, status):
     assert running.communicate(timeout=60)[1] == "fracslice: stopped; nothing was written\n"
     assert running.returncode == status
     assert list(target.iterdir()) == []
+
+
+@pytest.mark.parametrize("command", ["render", "explore"])
+def test_a_signal_while_a_picture_is_written_leaves_it_whole(ball, tmp_path, monkeypatch, command):
+    flush = os.fsync
+
+    def pressed(handle):
+        monkeypatch.undo()
+        os.kill(os.getpid(), signal.SIGINT)
+        flush(handle)
+
+    monkeypatch.setattr(os, "fsync", pressed)
+    target = tmp_path / "a.png"
+    assert run([command, str(ball), "-o", str(target), "--size", "8x8", "--samples", "1", "-q"]) == 0
+    assert target.exists()
+
+
+def test_a_signal_while_workers_end_does_not_stop_what_is_done(tmp_path, monkeypatch):
+    @contextmanager
+    def connected(*_):
+        yield SimpleNamespace(pieces=SimpleNamespace(tidy=lambda: None))
+        os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr("fracslice.cluster.connected", connected)
+    given = {"output": str(tmp_path / "a.stl"), "cluster": "local:1", "shard": None, "store": None}
+    with ClusterOptions(**given, threads=1, quiet=True).working() as work:
+        assert work.cluster is not None
 
 
 def listens(pid: int) -> bool:

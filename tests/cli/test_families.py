@@ -103,8 +103,8 @@ def test_a_family_of_shards(scene: str, tmp_path: Path) -> None:
         (["--set", "sphere.radius=1..90000"], "expected at most 10000"),
         (["--set", "sphere.radius=-1..1"], "expected a number > 0"),
         (["--set", "sphere.radius=1..2", "--set", "sphere.radius=1..2"], "different names"),
-        (["--every", "0.5s", "--time", "0.5s"], "--every: expected a time above zero, and no --time"),
-        (["--every", "0s"], "--every: expected a time above zero"),
+        (["--every", "0.5s", "--time", "0.5s"], "--time and --every: expected one of them"),
+        (["--every", "0s"], "expected a time in seconds above zero"),
         (["--every", "0.00001s"], "expected at most 10000"),
     ],
 )

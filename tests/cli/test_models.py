@@ -146,3 +146,39 @@ def test_a_model_smaller_than_a_layer_is_in_another_unit(
     assert capfd.readouterr().err == (
         f"fracslice: {path}: 0.03 mm long, less than a layer: expected a model in mm\n"
     )
+
+
+def test_a_sheet_thinner_than_a_layer_and_a_flipped_triangle_are_problems(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    box((10, 10, 0.004)).export(tmp_path / "thin.stl")
+    assert run(["check", str(tmp_path / "thin.stl"), "-q"]) == 1
+    out = capfd.readouterr().out
+    assert "10.00 x 10.00 x 0.004 mm, 0.40 mm3" in out
+    assert "no layer of 0.05 mm has a pixel of 0.05 mm inside: all of it is thinner" in out
+    flipped = box((10, 10, 10))
+    flipped.faces[0] = flipped.faces[0][::-1]
+    flipped.export(tmp_path / "flipped.stl")
+    assert run(["check", str(tmp_path / "flipped.stl"), "-q"]) == 1
+    assert "3 edges between triangles of opposite orientation" in capfd.readouterr().out
+
+
+def test_the_layers_of_a_model_far_from_the_origin(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    box((20, 20, 20), 1e6).export(tmp_path / "far.stl")
+    assert run(["check", str(tmp_path / "far.stl"), *COARSE]) == 0
+    assert "40 layers, 20.00 x 20.00 x 20.00 mm" in capfd.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("size", "words"),
+    [((0, 0, 0), "the mesh has only triangles without area"), ((1e30, 1, 1), "1e+30 mm long, more than")],
+)
+def test_a_model_without_a_size_is_named(
+    size: tuple[float, float, float], words: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "odd.stl"
+    part = box((1, 1, 1))
+    part.apply_transform(np.diag([*size, 1]))
+    part.export(path)
+    assert run(["check", str(path), "-q"]) == 2
+    assert capfd.readouterr().err.startswith(f"fracslice: {path}: {words}")

@@ -75,8 +75,28 @@ def test_check_ends_with_a_verdict(pair: str, tmp_path: Path, capfd: pytest.Capt
     reported = lines(
         pair, "--layer", "0.5mm", "--pixel", "0.2mm", "--bridge", "0", "--set", "transform.rotate=0 1 0 45"
     )
-    assert reported[0].endswith(", would not print:")
+    assert reported[0].endswith(", would print with supports:")
     assert any(line.startswith("  1 island in the air, the first from layer ") for line in reported)
+
+
+def test_a_filament_has_a_weight_of_its_own_and_no_problems_of_resin(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    hollow = tmp_path / "hollow.xml"
+    hollow.write_text(
+        """<scene version="1"><solid size="20mm"><difference><box/><sphere radius="0.3"/></difference></solid>
+        </scene>"""
+    )
+
+    def lines(*arguments: str) -> list[str]:
+        run(["check", str(hollow), "--layer", "0.5mm", "--pixel", "0.5mm", "-q", *arguments])
+        return capfd.readouterr().out.splitlines()
+
+    resin, (filament,) = lines(), lines("--material", "pla")
+    assert "would not print" in resin[0] and " sealed cavity with " in resin[1]
+    assert filament.endswith(", would print")
+    ml, grams = (float(part.split()[0]) for part in filament.split(", ")[2:4])
+    assert grams == pytest.approx(1.24 * ml, rel=0.01)
 
 
 @pytest.mark.parametrize("flags", [["--bridge", "2mm"], ["--bridge", "0", "--keep", "largest"]])
@@ -122,6 +142,6 @@ def test_check_says_what_a_voxel_or_a_pixel_may_lose(
     (line,) = reported("--layer", "1mm", "--pixel", "0.3mm")
     assert "thinner than 0.3 mm" in line and "the thinnest, 0.15 mm" in line
     x, _, z = map(float, line.split(" at ")[1].split()[:3])
-    assert 0.5 < x < 1.5 and abs(z) < 0.05
+    assert 0 < x < 10 and abs(z - 5) < 0.5, "mm from the middle, above the lowest point"
     assert len(reported("--resolution", "48")) == 1
     assert reported("--layer", "1mm", "--pixel", "0.1mm") == []

@@ -60,7 +60,8 @@ def test_bad_input_is_one_line(
     ("options", "reported"),
     [
         (["--layer", "0.2mm..0.6mm", "--printer", "sl1s"], "has layers of one height"),
-        (["--layer", "0.2mm"], "needs --printer, such as sl1s"),
+        (["--layer", "0.2mm"], "needs --printer, such as sl1;"),
+        (["--layer", "0.2mm", "-o", "out.goo"], "needs --printer, such as jupiter-2;"),
     ],
 )
 def test_what_an_archive_cannot_say_is_refused_before_the_object_is_changed(

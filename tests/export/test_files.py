@@ -14,10 +14,19 @@ from pathlib import Path
 
 import pytest
 
-from fracslice.common.files import put
+from fracslice.common.files import linked, put
 from fracslice.errors import ExportError
 from fracslice.export import check_target, flushing, replacing, write
 from tests.mesh.shapes import cube
+
+
+def test_a_file_that_has_the_name_already_leaves_no_other(tmp_path: Path) -> None:
+    piece, path = tmp_path / "piece", tmp_path / "cube.stl"
+    piece.write_bytes(b"whole")
+    for _ in range(2):
+        linked(str(piece), path)
+        assert path.read_bytes() == b"whole"
+        assert sorted(tmp_path.iterdir()) == [path, piece]
 
 
 def test_replaces_what_was_there_and_keeps_its_permissions(tmp_path: Path) -> None:

@@ -18,8 +18,9 @@ from fracslice.errors import ExportError, MeshError
 from fracslice.export import FORMATS, application, packages, write
 from fracslice.mesh import Mesh
 from fracslice.mesh.check import check_mesh
+from fracslice.mesh.model import joined
 from fracslice.mesh.quantisation import quantised
-from fracslice.mesh.reading import joined, read_mesh
+from fracslice.mesh.reading import read_mesh
 from tests.mesh.shapes import cube, inverted, sphere
 
 METADATA = {"Title": 'A <sphere> & "more" é', "scene_hash": "ab12"}
@@ -123,6 +124,24 @@ def test_extreme_coordinates_survive_text(tmp_path: Path) -> None:
     for ending in (".3mf", ".obj"):
         back = read_mesh(write(mesh, tmp_path / f"extreme{ending}"))
         assert np.array_equal(back.corners, mesh.corners)
+
+
+@pytest.mark.parametrize("far", [np.nan, np.inf, 1e39])
+@pytest.mark.parametrize("ending", FORMATS)
+def test_invalid_meshes_are_not_written(tmp_path: Path, far: float, ending: str) -> None:
+    mesh = cube()
+    with pytest.raises(ExportError, match="not a finite number of 32 bits"):
+        write(Mesh(mesh.vertices + far, mesh.triangles), tmp_path / f"far{ending}")
+    with pytest.raises(ExportError, match="names a vertex that does not exist"):
+        write(Mesh(mesh.vertices, mesh.triangles - 1), tmp_path / f"gap{ending}")
+    assert not list(tmp_path.iterdir())
+
+
+def test_arrays_of_another_shape_are_no_mesh() -> None:
+    with pytest.raises(MeshError, match=r"vertices: expected an array \[n, 3\], found one of shape \[8, 2\]"):
+        Mesh(cube().vertices[:, :2], cube().triangles)
+    with pytest.raises(MeshError, match=r"triangles: expected .* of shape \[0\]"):
+        Mesh(cube().vertices, [])  # type: ignore[arg-type]
 
 
 def test_unknown_ending_and_empty_mesh(tmp_path: Path) -> None:

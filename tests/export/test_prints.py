@@ -131,7 +131,7 @@ def test_one_object_through_every_printer(name: str, tmp_path: Path) -> None:
     machine = PRINTERS[name]
     ending = f".{machine.file}" if f".{machine.file}" in ENDINGS else ".goo"
     instead = printers_file(machine, f"part{ending}")
-    assert instead == "" or instead.endswith("make part.goo and convert it with UVtools")
+    assert instead == "" or instead.endswith("convert part.goo with UVtools")
     columns, rows = machine.pixels
     printed(replace(machine, pixels=(columns // 8, rows // 8)), 3.0, tmp_path / f"part{ending}")
 

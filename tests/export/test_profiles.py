@@ -62,6 +62,11 @@ def test_only_the_printer_of_a_job_is_made(monkeypatch: pytest.MonkeyPatch) -> N
             "make a.goo and convert it with UVtools",
         ),
         (
+            "mars-3",
+            "a.goo",
+            "Elegoo Mars 3 reads encrypted .ctb files, which are not written: convert a.goo with UVtools",
+        ),
+        (
             "mars-5-ultra",
             "a.ctb",
             "Elegoo Mars 5 Ultra reads encrypted .ctb files, which are not written: "

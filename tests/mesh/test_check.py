@@ -17,8 +17,8 @@ from fracslice._native import connected_components, side_of_line, side_of_plane
 from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
 from fracslice.mesh.check import check_mesh
+from fracslice.mesh.model import joined
 from fracslice.mesh.nesting import nesting
-from fracslice.mesh.reading import joined
 from fracslice.mesh.self_intersections import self_intersecting_triangles
 from fracslice.mesh.topology import component_sizes, edge_topology
 from fracslice.mesh.tree import build
@@ -113,6 +113,7 @@ def test_arrays_that_contradict_each_other_are_refused() -> None:
     tree, labels = build(mesh), np.zeros(8, np.int32)
     calls: list[Callable[[], object]] = [
         lambda: edge_topology(beyond, 8),
+        lambda: edge_topology(np.array([[0, 1, -(2**31)]], np.int32), 8),
         lambda: connected_components(-beyond, 9),
         lambda: component_sizes(mesh.vertices, mesh.triangles, labels + 1, 1),
         lambda: build(Mesh(mesh.vertices, beyond)),

@@ -15,8 +15,8 @@ from fracslice.mesh.check import check_mesh
 from fracslice.mesh.components import Removed, Shells, choose
 from fracslice.mesh.contouring import Piece
 from fracslice.mesh.extract import contour_pieces
+from fracslice.mesh.model import joined
 from fracslice.mesh.pieces import Pieces
-from fracslice.mesh.reading import joined
 from fracslice.mesh.survey import survey
 from fracslice.mesh.whole_shells import WholeShells
 from fracslice.volume import SignBricks

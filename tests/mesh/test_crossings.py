@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from fracslice._native import Cells
-from fracslice.formulas import box, difference, sphere, torus, transform, union
+from fracslice.formulas import box, difference, mandelbulb, sphere, torus, transform, union
 from fracslice.kernel import reference
 from fracslice.mesh.crossings import Refiner
 from fracslice.volume import Bricks, plan, sample_scene
@@ -41,6 +41,18 @@ def test_crossings_lie_on_the_surface_and_normals_point_outward() -> None:
     ring = points * [1, 1, 0]
     truth = (points - ring / np.linalg.norm(ring, axis=1, keepdims=True)) / 0.3
     assert np.abs(exact.normals.T - truth).max() < 3e-5
+
+
+def test_crossings_of_a_rough_surface_are_sign_changes() -> None:
+    """Where float32 does not resolve the field, and float64 finds many of the roots."""
+    planned = plan(mandelbulb(iterations=10), 128)
+    bricks = sample_scene(planned)
+    cells, placement = cells_of(bricks), (bricks.origin, bricks.voxel)
+    t = Refiner(planned.root, cells, *placement).between(0, cells.crossings_before(len(bricks.index))).t
+    edges = segments_of(cells, bricks)
+    assert (t >= 0).all() and (t <= 1).all()
+    below, above = (reference(planned.root)(*(edges[:3] + s * edges[3:])) for s in (t - 1e-4, t + 1e-4))
+    assert np.mean(below * above < 0) > 0.972
 
 
 def test_crossings_layer_by_layer_are_those_of_all_at_once() -> None:

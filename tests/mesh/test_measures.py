@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fracslice._native import bounds, turned
+from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
 from fracslice.mesh.quantisation import placed
 
@@ -41,3 +42,10 @@ def test_turned() -> None:
     expected = np.flatnonzero((normals(points) * normals(placed(SOUP.vertices, frame))).sum(1) <= 0)
     assert 300 < len(expected) < 39000
     assert turned(SOUP.vertices, SOUP.triangles, frame).tolist() == expected.tolist()
+
+
+def test_rows_have_three_numbers() -> None:
+    with pytest.raises(MeshError, match=r"^vertices: expected an array .*, found one of shape \[9000, 2\]$"):
+        Mesh(SOUP.vertices[:, :2], SOUP.triangles)
+    with pytest.raises(MeshError, match="triangles"):
+        Mesh(SOUP.vertices, SOUP.triangles.reshape(-1, 4))

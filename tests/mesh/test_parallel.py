@@ -22,9 +22,9 @@ from fracslice._native import (
     touching,
 )
 from fracslice.mesh import Mesh
+from fracslice.mesh.model import joined
 from fracslice.mesh.nesting import nesting
 from fracslice.mesh.quantisation import placed, quantise
-from fracslice.mesh.reading import joined
 from fracslice.mesh.self_intersections import self_intersecting_triangles
 from fracslice.mesh.topology import component_sizes
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import struct
 import zipfile
 from pathlib import Path
 
@@ -9,6 +11,7 @@ import numpy as np
 import pytest
 
 from fracslice.errors import MeshError
+from fracslice.export import write
 from fracslice.mesh.check import check_mesh
 from fracslice.mesh.reading import read_mesh
 
@@ -63,6 +66,40 @@ def test_3mf_transforms_and_components(tmp_path: Path) -> None:
 def test_3mf_mirror_images_are_not_inside_out(tmp_path: Path) -> None:
     item = '<item objectid="1" transform="-1 0 0 0 1 0 0 0 1 0 0 0"/>'
     assert check_mesh(read_mesh(box(tmp_path / "mirror.3mf", build=item))).printable
+
+
+def test_3mf_components_in_other_files_of_the_package(tmp_path: Path) -> None:
+    inner = box(tmp_path / "inner.3mf", "inch", build="")
+    with zipfile.ZipFile(inner) as archive:
+        model = archive.read("3D/box.model")
+    component = '<component p:path="/3D/Objects/1.model" objectid="1" transform="1 0 0 0 2 0 0 0 1 0 0 0"/>'
+    more = f'<object id="2" xmlns:p="production"><components>{component}</components></object>'
+    whole = box(tmp_path / "whole.3mf", build='<item objectid="2"/>', more=more)
+    with zipfile.ZipFile(whole, "a") as archive:
+        archive.writestr("3D/Objects/1.model", model.replace(b'"10.0"', b'"5"'))
+    assert read_mesh(whole).size.tolist() == [5, 10, 5]
+
+
+@pytest.mark.parametrize("change", [{8: 1}, {6: 255}])
+def test_3mf_that_is_encrypted_or_of_a_later_version(tmp_path: Path, change: dict[int, int]) -> None:
+    path = box(tmp_path / "locked.3mf")
+    data = bytearray(path.read_bytes())
+    for at in (match.start() for match in re.finditer(rb"PK\x01\x02", data)):
+        for offset, value in change.items():
+            data[at + offset] = value
+    path.write_bytes(data)
+    with pytest.raises(MeshError, match=r"locked\.3mf: not a whole 3MF file"):
+        read_mesh(path)
+
+
+@pytest.mark.filterwarnings("error")
+def test_stl_of_a_signalling_nan(tmp_path: Path) -> None:
+    path = write(cube(), tmp_path / "nan.stl")
+    data = bytearray(path.read_bytes())
+    data[96:100] = struct.pack("<I", 0x7FA00000)
+    path.write_bytes(data)
+    with pytest.raises(MeshError, match="not a finite number"):
+        read_mesh(path)
 
 
 def second(content: str) -> dict[str, str]:
@@ -130,6 +167,21 @@ def test_ascii_stl(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    "change",
+    [
+        str.upper,
+        lambda text: f"\n  {text}",
+        lambda text: text + "\n" * 2000,
+        lambda text: text.replace("solid box", f"solid {'box' * 2000}"),
+    ],
+)
+def test_ascii_stl_of_other_programs(tmp_path: Path, change) -> None:  # type: ignore[no-untyped-def]
+    path = ascii_stl(tmp_path / "box.stl")
+    path.write_text(change(path.read_text()))
+    assert np.array_equal(read_mesh(path).corners, cube().corners)
+
+
+@pytest.mark.parametrize(
     "spoil",
     [lambda text: text[: len(text) // 2], lambda text: text.replace("vertex 0.000000e+00", "vertex zero", 1)],
 )
@@ -154,3 +206,66 @@ def test_nonsense_and_missing_files(tmp_path: Path, name: str) -> None:
 def test_unknown_kind(tmp_path: Path) -> None:
     with pytest.raises(MeshError, match=r"known are \.3mf"):
         read_mesh(tmp_path / "part.step")
+
+
+PRISM = [(x, y, z) for z in (0, 10) for x, y in ((0, 0), (10, 0), (10, 10), (5, 15), (0, 10))]
+PRISM_SIDES = [
+    (4, 3, 2, 1, 0),
+    (5, 6, 7, 8, 9),
+    *((k, (k + 1) % 5, (k + 1) % 5 + 5, k + 5) for k in range(5)),
+]
+
+
+def prism(kind: str) -> bytes:
+    """PLY of a prism of five sides, with faces of four and five corners, and a table that no mesh needs."""
+    head = (
+        f"ply\r\nformat {kind} 1.0\r\ncomment end_header is below\r\nelement note 1\r\n"
+        "property list uchar short text\r\nelement vertex 10\r\nproperty double x\r\nproperty double y\r\n"
+        "property double z\r\nelement face 7\r\nproperty list uchar int vertex_indices\r\n"
+        "property float quality\r\nend_header\r\n"
+    )
+    rows = [("Bhh", 2, 7, 8), *(("ddd", *corner) for corner in PRISM)]
+    rows += [(f"B{len(face)}if", len(face), *face, 0.5) for face in PRISM_SIDES]
+    if kind == "ascii":
+        return (head + "".join(" ".join(map(str, row[1:])) + "\n" for row in rows)).encode()
+    order = "<" if "little" in kind else ">"
+    return head.encode() + b"".join(struct.pack(order + str(row[0]), *row[1:]) for row in rows)
+
+
+KINDS = ["ascii", "binary_little_endian", "binary_big_endian"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_ply_of_faces_of_four_and_five_corners(tmp_path: Path, kind: str) -> None:
+    (tmp_path / "prism.ply").write_bytes(prism(kind))
+    report = check_mesh(read_mesh(tmp_path / "prism.ply"))
+    assert report.printable
+    assert (report.triangles, report.volume_mm3) == (16, pytest.approx(1250))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("rest", [0.97, 0.7, 0.5])
+def test_ply_that_is_cut_short(tmp_path: Path, kind: str, rest: float) -> None:
+    data = prism(kind)
+    (tmp_path / "cut.ply").write_bytes(data[: int(len(data) * rest)])
+    with pytest.raises(MeshError, match="not a whole PLY file"):
+        read_mesh(tmp_path / "cut.ply")
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (b"4 3 2 1 0", b"4 3 2 1 10"),
+        (b"5 4 3 2 1 0", b"-5 4 3 2 1 0"),
+        (b"face 7", b"face -7"),
+        (b"face 7", b"face 9999999999999"),
+        (b"4 3 2 1 0", b"4 3 2 1 nan"),
+        (b"property double x", b"property double w"),
+    ],
+)
+def test_ply_that_is_wrong(tmp_path: Path, old: bytes, new: bytes) -> None:
+    data = prism("ascii")
+    assert old in data
+    (tmp_path / "wrong.ply").write_bytes(data.replace(old, new, 1))
+    with pytest.raises(MeshError, match="PLY"):
+        read_mesh(tmp_path / "wrong.ply")

@@ -131,6 +131,19 @@ def test_flat_faces_and_sharp_edges_are_left_alone() -> None:
     assert len(fine.triangles) == len(mesh.triangles)
 
 
+@pytest.mark.parametrize("voxels", [2.5, 40])
+def test_a_chord_wider_than_walls_and_holes_changes_nothing(voxels: float) -> None:
+    planned, mesh = made(menger(level=3), 32)
+    fine, done = refine(planned.root, mesh, voxels * planned.voxel, planned.voxel)
+    assert len(fine.triangles) == len(mesh.triangles) and not done.notes
+
+
+def test_what_is_left_is_farther_off_than_the_chord() -> None:
+    planned, mesh = made(menger(level=3), 32)
+    done = refine(planned.root, mesh, planned.voxel / 2, planned.voxel)[1]
+    assert done.left and done.off_mm > done.chord_mm
+
+
 def test_a_rough_surface_stays_a_solid() -> None:
     planned, mesh = made(mandelbulb(iterations=6), 64)
     fine, _ = refine(planned.root, mesh, 0.02 * planned.voxel, planned.voxel)

@@ -35,6 +35,7 @@ from fracslice.formulas import (
 )
 from fracslice.printing import printable
 from fracslice.printing.limits import Limits
+from fracslice.printing.problems import Problem
 from fracslice.printing.samples import Samples
 from fracslice.printing.solid_checks import SolidReport, check_object
 from fracslice.printing.solid_components import components_of
@@ -91,6 +92,10 @@ def test_walls_of_known_thickness(root: Node, thick: float, longest: float | Non
     solid = distances(planned)
     result = walls(solid, 0.3, Work())
     assert np.quantile(result.width, (0.05, 0.5)) == pytest.approx([thick] * 2, abs=planned.voxel)
+
+
+def test_places_of_problems_have_no_negative_zero() -> None:
+    assert str(Problem("wall", "a wall", at=(-0.001, 0.004, -1.0))) == "a wall: at 0.00 0.00 -1.00 mm"
 
 
 def test_a_cube_has_no_thin_walls_at_its_edges() -> None:

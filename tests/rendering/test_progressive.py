@@ -15,6 +15,7 @@ from fracslice.formulas import material, menger, sphere, union
 from fracslice.rendering import Renderer, cpu, progressive
 from fracslice.rendering.accumulator import CHANNELS, COUNT, COVER, GOAL
 from fracslice.rendering.units.random import sample
+from fracslice.scene import library, read
 from fracslice.scene.view import Camera, Film, Light, View
 from fracslice.work import Work
 
@@ -127,7 +128,7 @@ def test_a_state_is_of_one_version(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     with open(tmp_path / "state.npz", "wb") as file:
         renderer().save(file)
     monkeypatch.setattr(progressive, "program", lambda: "another")
-    with pytest.raises(RenderError, match="another scene, view, size or version"):
+    with pytest.raises(RenderError, match="another scene, view, size, seed or version"):
         renderer().resume(tmp_path / "state.npz")
 
 
@@ -183,6 +184,25 @@ def test_a_cancelled_pass_keeps_its_samples_and_continues_to_the_same_picture(
     buffer = io.BytesIO()
     of.save(buffer)
     assert finished(of).tobytes() == finished(renderer()).tobytes()
+
+
+def test_a_pass_that_is_cancelled_in_its_last_tile_counts() -> None:
+    bulb, work = read(library.path("mandelbulb")), Work(threads=2)
+    of, again = (Renderer(bulb.root, bulb.view, (80, 60), work, "cpu") for _ in range(2))
+    tile = of.tracer._tile
+
+    def stopping(*arguments: object) -> None:
+        tile(*arguments)
+        *_, count, goal, _ = of.accumulator.host().channels.T
+        if of.accumulator.passes == 1 and (count >= goal).all():
+            work.cancel.set()
+
+    of.tracer._tile = stopping
+    with pytest.raises(Cancelled):
+        finished(of)
+    of.tracer._tile = tile
+    work.cancel.clear()
+    assert finished(of).tobytes() == finished(again).tobytes()
 
 
 def test_the_mean_does_not_depend_on_where_sampling_stopped() -> None:

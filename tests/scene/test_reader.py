@@ -56,6 +56,10 @@ def refused(text: str | bytes) -> str:
         ("<menger level='3.5'/>", 'f.xml:3: <menger> level="3.5": expected a whole number from 0 to 20'),
         ("<menger level='1_0'/>", 'f.xml:3: <menger> level="1_0": expected a whole number from 0 to 20'),
         ("<box size='1 2'/>", 'f.xml:3: <box> size="1 2": expected 3 numbers > 0'),
+        (
+            "<box size='1,2,3'/>",
+            'f.xml:3: <box> size="1,2,3": expected 3 numbers > 0, separated by spaces',
+        ),
         ("<mirror axis='w'><box/></mirror>", 'f.xml:3: <mirror> axis="w": expected x, y or z'),
         (
             "<repeat><box/></repeat>",

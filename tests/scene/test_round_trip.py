@@ -124,3 +124,8 @@ def test_what_makes_it_printable_is_content() -> None:
     for wrong in ('thickness="-1mm"', 'keep="some"', 'keep="largest" bridge="1mm"'):
         with pytest.raises(SceneError, match="<print>"):
             reads(text.replace('drain="0" thickness="0.8mm"', wrong))
+
+
+def test_a_shape_is_no_scene() -> None:
+    with pytest.raises(SceneError, match=r"^sphere\(\): expected a scene, such as Scene\(sphere\(\), 40\)$"):
+        to_xml(sphere())  # type: ignore[arg-type]

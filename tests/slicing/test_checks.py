@@ -76,6 +76,20 @@ def test_sealed_cavity() -> None:
     assert report.cavities[0].at == pytest.approx((0, 0), abs=0.05)
 
 
+def test_cavities_of_less_than_a_square_millimetre_are_no_problem() -> None:
+    report = checked(difference(CUBE, sphere(radius=0.05)))
+    assert report.cavities == [] and report.problems == []
+
+
+def test_a_body_of_few_pixels_is_a_speck() -> None:
+    """2 x 2 pixels, and 3 x 3, beside a cube."""
+    for side, bodies in ((0.2, 1), (0.3, 2)):
+        beside = at(box(size=(side / 10, side / 10, 1)), 0.9, 0, 0)
+        sides = SliceJob(size=(1.4 + side / 20) * 10, layer=0.5, pixel=0.1)
+        report = check_layers(plan_stack(union(CUBE, beside), sides))
+        assert len(report.bodies) == bodies and (report.specks > 0) == (bodies == 1)
+
+
 def test_cup_that_is_open_above_and_trap_that_is_open_below() -> None:
     """Above in the scene is below on the printer: what is open above drains but sucks; what is open below
     does both.

@@ -174,6 +174,13 @@ def test_outlines_that_move_beyond_the_bed_are_refused() -> None:
         Screen(stack, SMALL, compensation=0.1)
 
 
+def test_a_compensation_that_leaves_nothing_is_refused() -> None:
+    stack = stack_of(box(size=(6, 1.5, 3)))
+    assert picture(Screen(stack, compensation=-0.5)).any()
+    with pytest.raises(SliceError, match=r"nothing is left of an object 1\.5 mm wide"):
+        Screen(stack, compensation=-0.75)
+
+
 def test_compensation_of_a_straight_edge_is_exact() -> None:
     image = np.zeros((9, 12), np.uint8)
     image[:, :5], image[:, 5] = 255, 128
