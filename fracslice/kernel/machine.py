@@ -1,7 +1,8 @@
 """Machine code as functions of NumPy arrays.
 
-This is the only place where an array becomes an address. Code and arrays are kept alive by the call, or by
-the native object that holds both (`fracslice/native/machine.h`), so neither can be freed while in use.
+This is the only place where an array becomes an address, beside calls of CUDA's driver (`cuda_memory`), which
+copy before they return. Code and arrays are kept alive by the call, or by the native object that holds both
+(`fracslice/native/machine.h`), so neither can be freed while in use.
 """
 
 from __future__ import annotations
