@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from fracslice.common.digits import counted, significant
+from fracslice.common.digits import counted, place, significant
 
 if TYPE_CHECKING:
     import numpy as np
@@ -101,7 +101,7 @@ class Closing:
             amount.append(f"cost {self.cost:.2f}")
         yield ", ".join(amount)
         if self.drains:
-            places = [" ".join(f"{round(x, 1) + 0.0:.1f}" for x in place) for place in self.drains]
+            places = [place(at, 1) for at in self.drains]
             where = f"{' and '.join(places)} mm"
             if len(places) > LISTED:
                 where = f"{places[0]} mm and at {len(places) - 1} other places"

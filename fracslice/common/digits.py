@@ -1,5 +1,9 @@
 """Numbers in messages."""
 
+from __future__ import annotations
+
+from collections.abc import Iterable
+
 
 def significant(value: float, digits: int = 3) -> str:
     """Format a number with a few significant digits, without an exponent where it is large.
@@ -21,6 +25,17 @@ def decimal(value: float) -> str:
     ('80.00', '0.10', '0.00041', '0.00')
     """
     return significant(value) if 0 < value < 0.1 else f"{value:.2f}"
+
+
+def place(at: Iterable[float], decimals: int = 2) -> str:
+    """Format coordinates with a few decimals, without negative zeros.
+
+    Examples
+    --------
+    >>> place([1.234, -0.001, 30])
+    '1.23 0.00 30.00'
+    """
+    return " ".join(f"{round(x, decimals) + 0.0:.{decimals}f}" for x in at)
 
 
 def counted(count: int, one: str, more: str = "") -> str:

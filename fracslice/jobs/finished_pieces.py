@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cluster import Contents, ResultFolder, packed, unpacked
-from ..mesh.model import Mesh
+from ..mesh.model import Mesh, joined
 
 
 def finished_mesh(mesh: Mesh) -> Contents:
@@ -82,12 +82,8 @@ def joined_pieces(meshes: Iterable[Mesh]) -> Mesh:
     Mesh
         The mesh, mm; its vertices are in the order of their first use.
     """
-    pieces = list(meshes)
-    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in pieces)], dtype=np.int32)
-    triangles = [mesh.triangles + start for mesh, start in zip(pieces, starts, strict=False)]
-    vertices = np.concatenate([mesh.vertices for mesh in pieces])
-    points, joined = welded(Mesh(vertices, np.concatenate(triangles)))
-    return Mesh(points.astype(np.float64), joined)
+    points, triangles = welded(joined(list(meshes)))
+    return Mesh(points.astype(np.float64), triangles)
 
 
 def piece_rows(starts: NDArray[np.int64], begin: int, end: int) -> Iterator[tuple[int, slice]]:

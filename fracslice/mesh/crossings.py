@@ -131,7 +131,7 @@ class Refiner:
             self._in_order: Callable[[Iterator[Crossings]], Iterator[Crossings]] = ahead
         else:
             self._search, self._in_order = LaneSearch(root, fast, exact, cells, origin, voxel), iter
-        self._memory: Memory = np.empty(0), np.empty((3, 0), np.float32)
+        self._memory = self._search.memory(0)
         self._first, self._end = 0, 0  # computed intersections: first in memory, one past the last
 
     def each(self, ranges: Iterable[tuple[int, int]]) -> Iterator[Crossings]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ..common.digits import place
+
 SUPPORTS = "supports in the slicer"
 
 Place = tuple[float, float, float]
@@ -42,7 +44,7 @@ class Problem:
         """The problem in one line."""
         where = [] if self.layer is None else [f"layer {self.layer}"]
         if self.at is not None:
-            where.append("at " + " ".join(f"{round(x, 2) + 0.0:.2f}" for x in self.at) + " mm")
+            where.append(f"at {place(self.at)} mm")
         flags = " ".join(f"--{name} {value}" for name, value in self.mend)
         hints = " or ".join(filter(None, [flags, self.advice]))
         return " ".join(filter(None, [f"{self.text}:" if where else self.text, ", ".join(where)])) + (

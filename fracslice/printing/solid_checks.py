@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..common.digits import counted, significant
+from ..common.digits import counted, place, significant
 from ..formulas import Box
 from ..formulas.box import Triple
 from ..kernel import Field
@@ -255,10 +255,10 @@ def _unseen(walls: Walls, finest: float, least: float, scale: float, middle: np.
     if area < least:
         return ""
     first = int(lost.width.argmin())
-    x, y, z = (scale * (lost.middle[first] - middle)).tolist()
+    at = place((scale * (lost.middle[first] - middle)).tolist())
     return (
         f"{significant(area)} mm2 of walls are thinner than {finest:.3g} mm and may be lost; "
-        f"the thinnest, {lost.width[first] * scale:.2g} mm, at {x:.2f} {y:.2f} {z:.2f} mm"
+        f"the thinnest, {lost.width[first] * scale:.2g} mm, at {at} mm"
     )
 
 

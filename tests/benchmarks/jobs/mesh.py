@@ -35,11 +35,16 @@ def rows(
                 yield job_row(run, Path(folder), name, resolution)
 
 
+def scene_text(name: str = "mandelbulb") -> str:
+    """XML of one of `SCENES`; the first is W1."""
+    return f'<scene version="1"><solid size="80mm">{SCENES[name][0]}</solid></scene>'
+
+
 def job_row(run: Run, folder: Path, name: str, resolution: int) -> Row:
     """The row of a scene at a resolution."""
-    element, peer = SCENES[name]
+    _, peer = SCENES[name]
     scene, stl, mesh = folder / "scene.xml", folder / "mesh.stl", folder / "mesh.bin"
-    scene.write_text(f'<scene version="1"><solid size="80mm">{element}</solid></scene>')
+    scene.write_text(scene_text(name))
     threads = "--threads", run.threads[0]
     command = [*COMMAND, "mesh", scene, "-o", stl, "--resolution", resolution, "--quiet", *threads]
     given = peer, resolution, mesh, "--track", 1, "--runs", 1, *threads

@@ -14,22 +14,12 @@ from pathlib import Path
 
 from ..runner import Figures, Row, Run, process
 from .command import COMMAND
+from .mesh import scene_text
 
-W1 = '<scene version="1"><solid size="80mm"><mandelbulb power="8" iterations="10"/></solid></scene>'
-JOBS: dict[str, tuple[str, ...]] = {
-    "mesh": ("{w1}", "--resolution"),
-    "slice": (
-        "mandelbulb",
-        "--printer",
-        "saturn-3-ultra",
-        "--exposure",
-        "2.5",
-        "30",
-        "--layer",
-        "0.05mm",
-        "--size",
-    ),
-    "render": ("mandelbulb", "--device", "cpu", "--samples", "64", "--size"),
+JOBS = {
+    "mesh": "{w1} --resolution",
+    "slice": "mandelbulb --printer saturn-3-ultra --exposure 2.5 30 --layer 0.05mm --size",
+    "render": "mandelbulb --device cpu --samples 64 --size",
 }
 ENDINGS = {"mesh": "stl", "slice": "goo", "render": "png"}
 RUNS, THREADS = 3, [1, 4, 16, 64]
@@ -57,9 +47,9 @@ def rows(
     for job in jobs:
         name, size = job.split("=")
         with tempfile.TemporaryDirectory() as folder:
-            (scene := Path(folder) / "w1.xml").write_text(W1)
+            (scene := Path(folder) / "w1.xml").write_text(scene_text())
             path = Path(folder) / f"out.{ENDINGS[name]}"
-            words = [name, *(word.format(w1=scene) for word in JOBS[name]), size]
+            words = [name, *(word.format(w1=scene) for word in JOBS[name].split()), size]
             measured = run.interleaved({str(p): partial(once, words, path, p) for p in run.threads})
         times = [measured.spread(str(p), "wall_s") for p in run.threads]
         share = serial_share(run.threads, [time.median for time in times])

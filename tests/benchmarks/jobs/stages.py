@@ -14,7 +14,7 @@ from pathlib import Path
 
 from ..runner import Figures, Measured, Row, Run, process
 from .command import COMMAND
-from .scaling import W1
+from .mesh import scene_text
 
 RUNS, THREADS = 3, [1, 16]
 SMALLEST = {"resolutions": (16,)}
@@ -24,7 +24,7 @@ REST = "start, flush, exit"
 def once(folder: Path, resolution: int, threads: int) -> Figures:
     """Seconds of each stage, of the rest and of the whole job."""
     scene, mesh, report = (folder / name for name in ("w1.xml", "out.stl", "report.json"))
-    scene.write_text(W1)
+    scene.write_text(scene_text())
     words = "mesh", scene, "--resolution", resolution, "--threads", threads, "--report", report, "--quiet"
     figures = process([*COMMAND, *words, "-o", mesh])
     mesh.unlink()
