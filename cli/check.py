@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -16,7 +16,7 @@ from .cluster import ClusterOptions
 from .inputs import BadInput, check_targets, is_model, load_model, load_scene, refuse_options
 from .layers import LAYER, PIXEL_MM, LayerOptions, layer_option, printer_option, write_page
 from .options import MeshOptions, argument, command, flag, option
-from .summary import figures, summary
+from .summary import figures, sizes, summary
 from .value_types import LENGTH, Name
 
 if TYPE_CHECKING:
@@ -35,6 +35,9 @@ SHARED = {"cluster", "shard", "store"}
 OF_LAYERS = {*SHARED, "pixel", "machine", "picture", "html", "fix", "material"}
 OF_MESHES = {"voxel", "resolution", "dust", "chord", "simplify", "proved"}
 OF_SCENES = {*OF_MESHES, *SHARED, "settings"}
+
+AXES = (0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0)
+"""Directions up that --fix tries."""
 
 ACROSS = 256
 """Layers of a model's longest side, if --layer is not given, unless they would be thinner than `LAYER`."""
@@ -56,7 +59,7 @@ class CheckOptions(LayerOptions, MeshOptions, ClusterOptions):
         'With layers: the printer that the object must fit; "list" shows all.'
     )
     picture: str | None = option(Name("FILE.png", ".png"), "With layers: draw the worst layers.")
-    fix: bool = flag("With layers: mend what can be mended, and check again.")
+    fix: bool = flag("With layers: try what would mend the problems, and keep what helps.")
     material: str = option(
         click.Choice(list(DENSITIES)),
         "With layers: resin by default. Filaments have no resin traps, suction cups and sealed cavities.",
@@ -158,6 +161,8 @@ def of_model(given: CheckOptions, work: Work) -> Checked:
     except MeshError as error:
         raise BadInput(f"{given.source}: {error}") from error
     line, numbers = f"{given.source}: {figures(report)}", report.as_dict()
+    if not report.problems:
+        line = f"{given.source}: {sizes(report)}"
     if not report.watertight or report.misoriented_edges or not report.volume_mm3:
         return numbers, [line], report.problems
     size, thinnest = longest(mesh), float(LAYER[:-2])
@@ -196,27 +201,91 @@ def longest(mesh: Mesh) -> float:
     return float((mesh.vertices.max(0) - mesh.vertices.min(0)).max())
 
 
-def of_layers(of: Scene | Field, size: Sizing, how: Print, given: CheckOptions, work: Work) -> Checked:
-    """Check the layers of an object; with --fix, mend it and check it again."""
-    from fracslice.printing.problems import mended
-    from fracslice.scene import Print
+@dataclass(frozen=True)
+class Attempt:
+    """An object with some settings, and what its layers show."""
 
+    flags: tuple[str, ...]
+    size: Sizing
+    how: Print
+    up: Triple
+    numbers: dict[str, Any]
+    text: str
+    problems: Sequence[Any]
+    shown: tuple[Stack, PrintReport] | None
+
+    @property
+    def severity(self) -> tuple[int, float]:
+        """See `fracslice.printing.problems.severity`."""
+        from fracslice.printing.problems import severity
+
+        return severity(self.problems)
+
+
+def of_layers(of: Scene | Field, size: Sizing, how: Print, given: CheckOptions, work: Work) -> Checked:
+    """Check the layers of an object; with --fix, try what mends its problems and keep what helps."""
     check_targets(given.source, given.picture, given.html)
-    numbers, lines, problems = examined(given.source, of, size, how, given, work)
-    settings = mended(problems) if given.fix else {}
-    if not settings:
-        return numbers, lines, problems
-    flags = " ".join(f"--{name} {value}" for name, value in settings.items())
-    if smaller := settings.pop("size", None):
-        size = replace(size, side=float(smaller[:-2]), unit=None)
-    values = {name: Print.kinds()[name].read(text) for name, text in settings.items()}
-    after, again, left = examined(f"with {flags}", of, size, replace(how, **values), given, work)
-    return {"before": numbers, "flags": flags, "after": after}, [*lines, *again], left
+    first = examined(of, size, how, given.up, (), given, work)
+    best, refused = mended_object(of, first, given, work) if given.fix else (first, [])
+    if best.shown and given.picture:
+        draw(*best.shown, given.picture, work)
+    if best.shown and given.html:
+        write_page(*best.shown, [figures_of(best.shown[1])], given.source, given.html, work)
+    lines = [f"{given.source}: {first.text}"]
+    if not refused and best is first:
+        return first.numbers, lines, first.problems
+    flags = " ".join(best.flags)
+    lines += [f"with {text}: no better, left out" for text in refused]
+    lines += [f"with {flags}: {best.text}"] if flags else []
+    return {"before": first.numbers, "flags": flags, "after": best.numbers}, lines, best.problems
+
+
+def mended_object(
+    of: Scene | Field, first: Attempt, given: CheckOptions, work: Work
+) -> tuple[Attempt, list[str]]:
+    """The best of the object and its mended forms, and the settings that made it no better.
+
+    All settings that the problems name are tried at once, then one by one; then other directions up.
+    """
+    from fracslice.printing.problems import mended
+
+    def tried(of_best: Attempt, settings: dict[str, str], up: Triple) -> Attempt:
+        size, values = of_best.size, dict(settings)
+        if smaller := values.pop("size", None):
+            size = replace(size, side=float(smaller[:-2]), unit=None)
+        kinds = type(of_best.how).kinds()
+        how = replace(of_best.how, **{name: kinds[name].read(text) for name, text in values.items()})
+        turned = () if up == of_best.up else ("--up " + " ".join(f"{c:g}" for c in up),)
+        flags = (*of_best.flags, *(f"--{name} {text}" for name, text in settings.items()), *turned)
+        return examined(of, size, how, up, flags, given, work)
+
+    settings, best, refused = mended(first.problems), first, list[str]()
+    choices = [settings] if settings else []
+    if len(settings) > 1:
+        choices += [{name: text} for name, text in settings.items()]
+    for choice in choices:
+        now = tried(best, choice, best.up)
+        if now.severity < best.severity:
+            best = now
+            if choice is settings:
+                break
+        elif len(choice) == 1 or len(choices) == 1:
+            refused.append(" ".join(f"--{name} {text}" for name, text in choice.items()))
+    if hasattr(of, "root") and any("--up" in problem.advice for problem in best.problems):
+        turns = [tried(best, {}, up) for up in AXES if up != best.up]
+        best = min([best, *turns], key=lambda attempt: attempt.severity)
+    return best, refused
 
 
 def examined(
-    name: str, of: Scene | Field, size: Sizing, how: Print, given: CheckOptions, work: Work
-) -> tuple[dict[str, Any], list[str], list[Any]]:
+    of: Scene | Field,
+    size: Sizing,
+    how: Print,
+    up: Triple,
+    flags: tuple[str, ...],
+    given: CheckOptions,
+    work: Work,
+) -> Attempt:
     """Check the layers of an object once."""
     from fracslice.scene import Scene
     from fracslice.slicing import SliceJob, adapted, plan_stack
@@ -224,26 +293,19 @@ def examined(
     from fracslice.slicing.layer_problems import misfit
 
     machine, (layer, most) = given.machine, given.layer
-    sides = size.side, layer, given.pixels, given.up, how, size.factors, size.unit
+    sides = size.side, layer, given.pixels, up, how, size.factors, size.unit
     job, root = SliceJob(*sides), of.root if isinstance(of, Scene) else of
-    stack = plan_stack(root, job, work)
+    stack, settings = plan_stack(root, job, work), (flags, size, how, up)
     if machine and (unfit := misfit(stack, machine)):
-        return (
-            {"size": stack.size, "fits": False, "problems": [str(unfit)]},
-            [f"{name}: would not print: {unfit}"],
-            [unfit],
-        )
+        numbers = {"size": stack.size, "fits": False, "problems": [str(unfit)]}
+        return Attempt(*settings, numbers, f"would not print: {unfit}", [unfit], None)
     if work.cluster and isinstance(of, Scene):
         stack, report = shared_check(of, job, given, work)
     else:
         stack = stack if most is None else adapted(stack, most, work)
         report = check_layers(stack, given.limits, machine, work)
     report = of_material(report, given.material)
-    if given.picture:
-        draw(stack, report, given.picture, work)
-    if given.html:
-        write_page(stack, report, [figures_of(report)], name, given.html, work)
-    return report.as_dict(), described(name, report), report.problems
+    return Attempt(*settings, report.as_dict(), described(report), report.problems, (stack, report))
 
 
 def shared_check(scene: Scene, job: SliceJob, given: CheckOptions, work: Work) -> tuple[Stack, PrintReport]:
@@ -266,16 +328,18 @@ def draw(stack: Stack, report: PrintReport, path: str, work: Work) -> None:
         worst_layers(stack, report.worst, file, work)
 
 
-def described(name: str, report: PrintReport) -> list[str]:
+def described(report: PrintReport) -> str:
     """Summary of a print report: figures, a line for each problem, and thin features that layers may miss."""
-    return [f"{name}: {figures_of(report)}, {judged(report.problems)}", report.solid.unseen]
+    lines = f"{figures_of(report)}, {judged(report.problems)}", report.solid.unseen
+    return os.linesep.join(filter(None, lines))
 
 
 def figures_of(report: PrintReport) -> str:
     """Layers, size, volume and weight of a print report."""
     size = " x ".join(map(decimal, report.size))
     ml, g = significant(report.volume / 1000), significant(report.weight_g)
-    return f"{counted(report.layers, 'layer')}, {size} mm, {ml} ml, {g} g"
+    parts = f"{len(report.bodies)} bodies, " if len(report.bodies) > 1 else ""
+    return f"{counted(report.layers, 'layer')}, {size} mm, {parts}{ml} ml, {g} g"
 
 
 def judged(problems: Sequence[object]) -> str:

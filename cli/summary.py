@@ -29,10 +29,15 @@ def summary(path: str, report: Report) -> str:
 
 def figures(mesh: MeshReport) -> str:
     """Figures and printability of a mesh, in one line."""
+    verdict = f"would not print: {', '.join(mesh.problems)}" if mesh.problems else "watertight, manifold"
+    return f"{sizes(mesh)}, {verdict}"
+
+
+def sizes(mesh: MeshReport) -> str:
+    """Triangles, size, volume and bodies of a mesh, in one line."""
     (x0, y0, z0), (x1, y1, z1) = mesh.bbox_mm
     size = " x ".join(map(decimal, (x1 - x0, y1 - y0, z1 - z0))) + " mm"
     triangles, bodies = counted(mesh.triangles, "triangle"), counted(mesh.components, "body", "bodies")
-    verdict = f"would not print: {', '.join(mesh.problems)}" if mesh.problems else "watertight, manifold"
     volume = mesh.volume_mm3
     amount = f"{decimal(volume / 1000)} cm3" if volume >= 1000 else f"{decimal(volume)} mm3"
-    return f"{triangles}, {size}, {amount}, {bodies}, {verdict}"
+    return f"{triangles}, {size}, {amount}, {bodies}"

@@ -31,6 +31,8 @@ class Problem:
         Print settings that mend it, by name; empty if none does.
     advice : str
         What else helps.
+    count : int
+        Number of features, such as traps.
     """
 
     kind: str
@@ -39,6 +41,7 @@ class Problem:
     at: Place | None = None
     mend: tuple[tuple[str, str], ...] = ()
     advice: str = ""
+    count: int = 1
 
     def __str__(self) -> str:
         """The problem in one line."""
@@ -64,6 +67,23 @@ def verdict(problems: Sequence[object]) -> str:
         return "would print"
     held = all(isinstance(problem, Problem) and SUPPORTS in problem.advice for problem in problems)
     return "would print with supports" if held else "would not print"
+
+
+WEIGHTS = {"fit": 1000.0, "bodies": 100.0, "cavities": 10.0, "cups": 10.0, "traps": 10.0}
+"""What a feature of a kind counts among problems; 1 by default."""
+
+
+def severity(problems: Sequence[object]) -> tuple[int, float]:
+    """How bad problems are: the rank of their verdict, then a weighted count of what is wrong.
+
+    Parameters
+    ----------
+    problems : sequence
+        Problems of its layers, as `Problem`, and of its mesh.
+    """
+    rank = ["would print", "would print with supports", "would not print"].index(verdict(problems))
+    own = [problem for problem in problems if isinstance(problem, Problem)]
+    return rank, 1000.0 * (len(problems) - len(own)) + sum(WEIGHTS.get(p.kind, 1.0) * p.count for p in own)
 
 
 def flat_base(height: float) -> str:

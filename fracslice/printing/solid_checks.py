@@ -288,7 +288,7 @@ def _off_rims(thin: Walls, drains: Sequence[Drain], near: float) -> Walls:
 
 
 def loose(count: int, **where: Any) -> Problem:
-    """Problem of several bodies.
+    """Problem of bodies that nothing holds.
 
     Parameters
     ----------
@@ -297,4 +297,11 @@ def loose(count: int, **where: Any) -> Problem:
     **where
         Fields of `Problem`.
     """
-    return Problem("bodies", f"{count} loose bodies", mend=BRIDGE, advice="--keep largest", **where)
+    return Problem(
+        "bodies",
+        counted(count, "loose body", "loose bodies"),
+        mend=BRIDGE,
+        advice="--keep largest",
+        count=count,
+        **where,
+    )

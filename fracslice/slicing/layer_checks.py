@@ -254,7 +254,7 @@ class _Collector:
             walls=widths_of(*np.concatenate(walls).T),
             gaps=widths_of(*np.concatenate(gaps).T),
             overhang=max(far, key=lambda o: o.reach, default=None),
-            neck=weakest(solid, stack.pixel, stack.shape, limits.heavy),
+            neck=weakest(solid, stack.pixel, stack.shape, limits.heavy, speck),
             worst=_worst(overhang, real, far),
             solid=self.solid,
         )

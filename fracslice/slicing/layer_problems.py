@@ -65,14 +65,19 @@ def problems_of(report: PrintReport, stack: Stack, limits: Limits) -> list[Probl
         return {"layer": layer, "at": (*feature.at, _bottom(stack, layer))}
 
     problems = []
-    if len(report.bodies) > 1:
-        problems.append(loose(len(report.bodies), **where(report.bodies[1])))
+    lowest = min(
+        (body.layers[0] for body in report.bodies), default=0
+    )  # several on the plate are as many parts
+    if hanging := [body for body in report.bodies if body.layers[0] > lowest]:
+        problems.append(loose(len(hanging), **where(hanging[0])))
     if report.islands:
         largest = max(report.islands, key=lambda i: i.area)
         first = min(i.layers[0] for i in report.islands)
         text = f"{counted(len(report.islands), 'island')} in the air, the first from layer {first} on"
         text += f", the largest of {significant(largest.area)} mm2"
-        problems.append(Problem("islands", text, advice=SUPPORTS, **where(largest)))
+        problems.append(
+            Problem("islands", text, advice=SUPPORTS, count=len(report.islands), **where(largest))
+        )
     if report.overhang:
         far = report.overhang
         text = f"a flat overhang reaches {far.reach:.3g} mm, {significant(far.area)} mm2 of it too far"
@@ -83,7 +88,9 @@ def problems_of(report: PrintReport, stack: Stack, limits: Limits) -> list[Probl
     if report.cavities:
         sealed = counted(len(report.cavities), "sealed cavity", "sealed cavities")
         text = f"{sealed} with {significant(sum(c.volume for c in report.cavities))} mm3 of resin"
-        problems.append(Problem("cavities", text, mend=FILL, **where(report.cavities[0])))
+        problems.append(
+            Problem("cavities", text, mend=FILL, count=len(report.cavities), **where(report.cavities[0]))
+        )
     for kind, noun, hollows in (("cups", "suction cup", report.cups), ("traps", "resin trap", report.traps)):
         remaining = [hollow for hollow in hollows if hollow not in report.cavities]
         if remaining:
@@ -91,7 +98,8 @@ def problems_of(report: PrintReport, stack: Stack, limits: Limits) -> list[Probl
             volume = significant(sum(h.volume for h in remaining))
             text = f"{counted(len(remaining), noun)} with {volume} mm3 of resin"
             text += f", the largest {significant(largest.area)} mm2"
-            problems.append(Problem(kind, text, advice="--up, or a drain hole", **where(largest)))
+            advice, count = "--up, or a drain hole", len(remaining)
+            problems.append(Problem(kind, text, advice=advice, count=count, **where(largest)))
     return [*problems, *report.solid.thin]
 
 
@@ -101,7 +109,7 @@ def _narrow_neck(neck: Neck, stack: Stack, limits: Limits) -> Problem:
     if neck.layer == 0:
         text = f"it stands on {significant(neck.area, 2)} mm2 and is {significant(neck.carried)} mm2 wide"
         base = flat_base(stack.size[2])
-        return Problem("necks", text, 0, at, mend=(("base", base),), advice="--raft 1mm")
+        return Problem("necks", text, 0, at, mend=(("base", base),), advice=f"--raft 1mm, or {SUPPORTS}")
     text = f"{significant(neck.carried)} mm2 hang on {significant(neck.area, 2)} mm2"
     width = 1.2 * math.sqrt(4 / math.pi * neck.carried / limits.neck)
     return Problem("necks", text, neck.layer, at, mend=(("thickness", f"{width:.2g}mm"),), advice=SUPPORTS)

@@ -16,6 +16,12 @@ from ..common.compiled import compiled
 from ..common.disjoint import find
 from .feature_graph import Graph
 
+FOOT = 1.0
+"""Cross-section from which a component must stand firmly on the plate, mm^2: else the film peels it off."""
+
+FAINT = 0.5
+"""Area of a node without a whole pixel, such as a tip on the plate, pixels."""
+
 
 @dataclass(frozen=True)
 class Neck:
@@ -44,8 +50,12 @@ class Neck:
         return self.carried / self.area
 
 
-def weakest(graph: Graph, pixel: tuple[float, float], shape: tuple[int, int], least: float) -> Neck | None:
+def weakest(
+    graph: Graph, pixel: tuple[float, float], shape: tuple[int, int], least: float, speck: float
+) -> Neck | None:
     """Find the cross-section that is smallest for the component of the object that it carries.
+
+    Components that begin in the air carry nothing, and are islands; one that begins as a speck is a tip.
 
     Parameters
     ----------
@@ -56,23 +66,30 @@ def weakest(graph: Graph, pixel: tuple[float, float], shape: tuple[int, int], le
     shape : tuple of int
         Rows and columns of a layer.
     least : float
-        Components whose cross-sections are all smaller are not considered, mm^2.
+        Components whose cross-sections are all smaller are not considered, mm^2; on the plate, `FOOT`.
+    speck : float
+        Area of an island that is reported as one, mm^2.
 
     Returns
     -------
     Neck or None
-        None if no component is as large as `least`.
+        None if no component is as large.
     """
     if not graph.count:
         return None
-    square, nodes, feet = pixel[0] * pixel[1], graph.nodes, len(graph.layers[0].area)
-    # The plate holds the first layer as a layer with the same components below it would.
-    area = np.concatenate([nodes.area[:feet], nodes.area])
+    square, nodes = pixel[0] * pixel[1], graph.nodes
+    # The plate holds the first layer that is not empty as a layer with the same components below it would.
+    feet = next(len(layer.area) for layer in graph.layers if len(layer.area))
+    size = np.maximum(nodes.area, FAINT)
+    area = np.concatenate([size[:feet], size])
     edges = np.concatenate([np.arange(feet)[:, None] + [0, feet], graph.edges + feet])
     below = np.concatenate([np.zeros(feet, np.int64), 1 + graph.layer[graph.edges[:, 0]]])
     starts = np.searchsorted(below, np.arange(len(graph.layers) + 1))
-    firm = np.where(_held(edges, feet, len(area)), area, 0)
-    contact, carried, cut, node = _weakest(area, firm, edges, starts, least / square)
+    tips = feet + np.flatnonzero(graph.islands() & (size * square < speck))
+    firm = np.where(_held(edges, np.append(np.arange(feet), tips), len(area)), area, 0)
+    contact, carried, cut, node = _weakest(
+        area, firm, edges, starts, min(FOOT, least) / square, least / square
+    )
     if node < 0:
         return None
     x, y = (nodes.middle[max(node - feet, 0) if cut else node] - np.array(shape[::-1]) / 2) * pixel
@@ -80,24 +97,25 @@ def weakest(graph: Graph, pixel: tuple[float, float], shape: tuple[int, int], le
 
 
 @compiled
-def _held(edges, feet, count):  # type: ignore[no-untyped-def]
-    """True for nodes that grow from the plate; islands do not."""
-    held = np.arange(count) < feet
+def _held(edges, roots, count):  # type: ignore[no-untyped-def]
+    """True for nodes that grow from some nodes."""
+    held = np.zeros(count, np.bool_)
+    held[roots] = True
     for below, above in edges:
         held[above] |= held[below]
     return held
 
 
 @compiled
-def _weakest(area, firm, edges, starts, least):  # type: ignore[no-untyped-def]
+def _weakest(area, firm, edges, starts, foot, least):  # type: ignore[no-untyped-def]
     """Contact area, carried area, cut and largest node of the weakest cross-section; node -1 if none.
 
-    area, firm: of nodes, and 0 for islands. edges: pairs (below, above), those of cut k from `starts[k]` to
-    `starts[k + 1]`.
+    area, firm: of nodes, and 0 for islands. foot, least: carried areas that count on the plate, and above it.
+    edges: pairs (below, above), those of cut k from `starts[k]` to `starts[k + 1]`.
     """
     parent, largest = np.arange(len(area)), area.copy()
-    contact, widest = np.zeros(len(area), np.int64), np.full(len(area), -1)
-    ratio, result = 0.0, (0, 0, 0, -1)
+    contact, widest = np.zeros(len(area)), np.full(len(area), -1)
+    ratio, result = 0.0, (0.0, 0.0, 0, -1)
     for cut in range(len(starts) - 2, -1, -1):
         cut_edges, seen = edges[starts[cut] : starts[cut + 1]], {(-1, -1)}
         for node, above in cut_edges:
@@ -109,7 +127,11 @@ def _weakest(area, firm, edges, starts, least):  # type: ignore[no-untyped-def]
                     widest[root] = node
         for _, above in cut_edges:
             root = find(parent, above)
-            if contact[root] and largest[root] >= least and largest[root] > ratio * contact[root]:
+            if (
+                contact[root]
+                and largest[root] >= (least if cut else foot)
+                and largest[root] >= ratio * contact[root]
+            ):
                 ratio = largest[root] / contact[root]
                 result = (contact[root], largest[root], cut, widest[root])
         for _, above in cut_edges:

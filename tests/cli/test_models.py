@@ -105,6 +105,25 @@ def test_a_problem_has_its_place_and_fix_mends_it(tmp_path: Path, capfd: pytest.
     assert "bodies" not in [p["kind"] for p in report["after"]["problems"]]
 
 
+def test_fix_leaves_out_what_does_not_help(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "ball.xml").write_text('<scene version="1"><solid size="20mm"><sphere/></solid></scene>')
+    command = [
+        "check",
+        str(tmp_path / "ball.xml"),
+        *["--layer", "0.1mm", "--pixel", "0.2mm", "--fix", "--json", "-q"],
+    ]
+    assert run(command) == 0
+    assert json.loads(capfd.readouterr().out)["flags"].startswith("--base")
+    monkeypatch.setattr(
+        "fracslice.printing.problems.severity", lambda problems: (1, 0.0)
+    )  # nothing is better
+    assert run(command) == 1
+    report = json.loads(capfd.readouterr().out)
+    assert report["flags"] == "" and report["after"] == report["before"]
+
+
 def test_options_of_scenes_are_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     box(PLATE).export(tmp_path / "box.stl")
     assert run(["check", str(tmp_path / "box.stl"), "--voxel", "1mm"]) == 2
@@ -117,7 +136,7 @@ def test_a_page_holds_figures_problems_pictures_and_the_cross_section(
     page, out = balls.with_name("balls.html"), balls.with_name("layers")
     assert run(["slice", str(balls), "-o", str(out), *COARSE, "--html", str(page)]) == 0
     text = page.read_text()
-    assert "ml" in text and "<h2>Would not print</h2>" in text and "<li>2 loose bodies: layer" in text
+    assert "ml" in text and "<h2>Would not print</h2>" in text and "<li>1 loose body: layer" in text
     picture = base64.b64decode(text.partition("base64,")[2].partition('"')[0])
     assert Image.open(io.BytesIO(picture)).size[0] > 40
     root = Tree.fromstring(text[text.index("<svg") : text.index("</svg>") + 6])

@@ -9,8 +9,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fracslice.formulas import Node, box, cylinder, difference, menger, sphere, transform, union
+from fracslice.formulas import (
+    Node,
+    box,
+    cone,
+    cylinder,
+    difference,
+    intersection,
+    menger,
+    sphere,
+    transform,
+    union,
+)
 from fracslice.printing.limits import Limits
+from fracslice.printing.problems import Problem, verdict
 from fracslice.scene import Print
 from fracslice.slicing import SliceJob, Slicer, plan_stack
 from fracslice.slicing.feature_graph import Graph
@@ -20,6 +32,7 @@ from fracslice.slicing.overhangs import farthest, unsupported
 from fracslice.slicing.printers import PRINTERS
 from fracslice.slicing.runs import Runs, layer_components, overlaps
 from fracslice.slicing.thickness import widths
+from fracslice.volume import extent
 from fracslice.work import Work
 
 
@@ -157,12 +170,35 @@ def test_cantilevers_are_measured_by_the_limit_with_any_pixel(pixel: float) -> N
     assert reaches(12)
 
 
-def test_loose_bodies() -> None:
-    report = checked(union(at(box(size=(0.4, 0.4, 1)), -0.5, 0, 0), at(box(size=(0.4, 0.4, 1)), 0.5, 0, 0)))
+def test_bodies_that_stand_on_the_plate_are_parts_and_others_are_loose() -> None:
+    parts = [at(box(size=(0.4, 0.4, 1)), -0.5, 0, 0), at(box(size=(0.4, 0.4, 1)), 0.5, 0, 0)]
+    report = checked(union(*parts))
     assert len(report.bodies) == 2
-    assert [p.kind for p in report.problems] == ["bodies"]
+    assert report.problems == []
+    assert "bodies" in [
+        p.kind for p in checked(union(*parts, at(box(size=(0.4, 0.4, 0.2)), 0, 0.5, 0.2))).problems
+    ]
     assert report.gaps is not None
     assert report.gaps.smallest == pytest.approx(0.6 * 10 / 1.4, abs=0.06)
+
+
+@pytest.mark.parametrize(("radius", "height"), [(10, 20), (10, 5), (3, 3), (2, 10), (1, 6)])
+def test_a_cone_on_its_point_needs_supports_or_a_base(radius: float, height: float) -> None:
+    cut = transform(cone(radius=radius, height=height), rotate=(1, 0, 0, 180))
+
+    def problems(root: Node) -> list[Problem]:
+        size = max(extent(root, 64).box.size)
+        return check_layers(plan_stack(root, SliceJob(size, 0.1, (0.1, 0.1)))).problems
+
+    assert verdict(problems(cut)) == "would print with supports"
+    assert [p.kind for p in problems(cut)] == ["necks"]
+    foot = at(box(size=(3 * radius, 3 * radius, height)), 0, 0, 0.4 * height)  # a foot of 0.4 of the radius
+    assert verdict(problems(intersection(cut, foot))) == "would print"
+
+
+def test_a_ball_on_the_plate_would_print_with_supports() -> None:
+    report = checked(sphere())
+    assert verdict(report.problems) == "would print with supports"
 
 
 @pytest.mark.parametrize("width", [0.008, 0.016, 0.05])
