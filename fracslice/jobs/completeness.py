@@ -1,13 +1,14 @@
-"""Completeness of a mesh or stack of layers: its volume against that of the field."""
+"""Completeness of a mesh or stack of layers: its size and volume against those of the field."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..common.digits import decimal
 from ..formulas import Box
 from ..formulas.algebra import dot
 from ..formulas.box import Triple
@@ -48,6 +49,38 @@ class Amount:
     error: float
     made: float
     off: float
+
+
+def lost_size(
+    name: str, box: Sequence[float], made: Sequence[float], whole: Sequence[float], spacing: Sequence[float]
+) -> tuple[Triple, tuple[str, ...]]:
+    """Compare the size of a mesh or layers with that of the object.
+
+    Parameters
+    ----------
+    name : str
+        What was made, with its verb.
+    box, made, whole : sequence of float
+        Sizes of the object, of what was made, and of that with the bodies that were removed, mm.
+    spacing : sequence of float
+        Spacing of the samples, mm.
+
+    Returns
+    -------
+    tuple of float
+        Length that is missing along each axis, mm.
+    tuple of str
+        A note on the axis along which most samples are missing, if it is more than one.
+    """
+    x, y, z = lost = [max(of - own, 0.0) for of, own in zip(box, made, strict=True)]
+    samples = [mm / step for mm, step in zip(lost, spacing, strict=True)]
+    axis = samples.index(max(samples))
+    if samples[axis] <= 1:
+        return (x, y, z), ()
+    removed = whole[axis] - made[axis] > lost[axis] / 2
+    reason = "bodies that were removed" if removed else "tips or walls finer than the samples"
+    along = f"{name} {decimal(made[axis])} mm of {decimal(box[axis])} mm along {'xyz'[axis]}"
+    return (x, y, z), (f"{along}: {reason} reach farther",)
 
 
 def mesh_amount(planned: Plan, made: float, scale: float, work: Work) -> tuple[Amount, tuple[str, ...]]:

@@ -11,6 +11,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..background import in_background
 from ..common.memory import peak_rss_mb
 from ..errors import SceneError, SharedError, TooLargeError, keeping
@@ -192,17 +194,15 @@ class _Job:
         """Finished mesh and report."""
         from ..kernel.depth import shallower
         from ..mesh.touching import touching_note
-        from .completeness import mesh_amount
+        from .completeness import lost_size, mesh_amount
 
-        what, clock, size, refined = self.what, self.clock, self.size, None
+        what, clock, scale, refined = self.what, self.clock, sized.scale, None
         planned, signs, thin = surface.planned, surface.signs, surface.thin
         if what.chord_mm is not None:
-            unit = sized.scale or size.scale(planned.box)
-            surface, done = surfaces.refined(surface, what.chord_mm / unit, clock)
-            refined = done.scaled(unit)
+            surface, done = surfaces.refined(surface, what.chord_mm / scale, clock)
+            refined = done.scaled(scale)
         with clock("finishing"):
-            finish = Finish(surface, sized.left, what.dust, size, sized.scale, clock)
-        scale = finish.place.scale
+            finish = Finish(surface, sized.left, what.dust, scale, clock)
         measure = partial(mesh_amount, planned, finish.volume, scale, clock.work)
         with in_background(measure, clock.work.threads) as measured:
             made = Writing(self.scene, what, clock, self.path).made(surface, finish)
@@ -210,13 +210,16 @@ class _Job:
             with written, clock("checking"):
                 amount, off = measured()
         fell = f"{thin}; expected a smaller voxel, or a thickness of {2 * scale * planned.voxel:.2g} mm"
+        low, high = made.report.bbox_mm
+        sides = [scale * side for side in planned.box.size], np.subtract(high, low).tolist(), finish.size
+        lost, shorter = lost_size("the mesh is", *sides, spacing=[scale * planned.voxel] * 3)
         near = finish.near.count
         settings = shallower(planned.root.tree, planned.voxel) if near and planned.root.tree else ()
         report = Report(
             scene=self.scene.name,
             scene_hash=self.scene.hash,
             version=__version__,
-            size_mm=size.longest,
+            size_mm=self.size.longest,
             voxel_mm=planned.voxel * scale,
             mesh=made.report,
             removed=finish.removed,
@@ -233,6 +236,7 @@ class _Job:
             simplified=made.simplified,
             notes=(
                 *planned.notes,
+                *shorter,
                 *([fell] if thin and not near else ()),
                 *(refined.notes if refined else ()),
                 *touching_note(near, planned.voxel * scale, settings, off),
@@ -240,5 +244,6 @@ class _Job:
             depths=planned.depths,
             contact_mm2=float(f"{made.contact:.9g}"),  # sums over pieces differ in the last digit
             cavities_mm3=float(f"{finish.cavities + 0.0:.9g}"),
+            lost_mm=lost,
         )
         return MeshResult(report, finish.place, planned, made.whole, clock.work)

@@ -130,6 +130,8 @@ class Report:
         Share of the space without samples whose sign is proved; the rest relies on a measured bound.
     measured : tuple of str
         Formulas by whose measured bound space was skipped.
+    lost_mm : tuple of float
+        Length along x, y and z by which the mesh is shorter than the object, mm.
     """
 
     scene: str
@@ -154,6 +156,7 @@ class Report:
     cavities_mm3: float = 0.0
     proved: float | None = None
     measured: tuple[str, ...] = ()
+    lost_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "seconds", MappingProxyType(dict(self.seconds)))

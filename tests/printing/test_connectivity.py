@@ -166,7 +166,7 @@ def test_a_mesh_in_pieces_does_not_tell_which_body_is_the_largest(contoured: lis
     for result in (whole, kept):
         note = result.report.notes[0]
         assert "tips and walls thinner than the voxel of 0.42mm" in note
-        assert f"--thickness {3 * 20 / 48:.2g}mm" in note
+        assert f"--thickness {3 * result.report.voxel_mm:.2g}mm" in note
 
 
 @pytest.mark.parametrize("thickness", [0.4, 0.8, 1.25, 2.5])
