@@ -91,9 +91,9 @@ def extent(root: Field, work: Work | None = None) -> Extent:
 
     The Lipschitz bound of the field proves that nothing is farther than a `FINENESS`th of the longest side
     outside the box. Where that proof is too expensive (the bound is far too large, the feature is as thin as
-    paper) the outer box is larger. Smooth faces, edges and tips are located to 1e-6 of the longest side. The box that the
-    formulas state is doubled while the object leaves it: an offset or smooth union of a field that
-    underestimates distances can.
+    paper) the outer box is larger. Smooth faces, edges and tips are located to 1e-6 of the longest side. The
+    box that the formulas state is doubled while the object leaves it: an offset or smooth union of a field
+    that underestimates distances can.
 
     Parameters
     ----------
