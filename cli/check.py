@@ -218,8 +218,10 @@ def examined(
     name: str, of: Scene | Field, size: Sizing, how: Print, given: CheckOptions, work: Work
 ) -> tuple[dict[str, Any], list[str], list[Any]]:
     """Check the layers of an object once."""
+    from fracslice.jobs.completeness import layers_amount
+    from fracslice.printing.problems import Problem
     from fracslice.scene import Scene
-    from fracslice.slicing import SliceJob, adapted, plan_stack
+    from fracslice.slicing import SliceJob, Slicer, adapted, plan_stack
     from fracslice.slicing.layer_checks import check_layers
     from fracslice.slicing.layer_problems import misfit
 
@@ -238,6 +240,8 @@ def examined(
     else:
         stack = stack if most is None else adapted(stack, most, work)
         report = check_layers(stack, given.limits, machine, work)
+    if lost := layers_amount(Slicer(stack, work), work).problems:
+        report = replace(report, problems=[*(Problem("lost", text) for text in lost), *report.problems])
     report = of_material(report, given.material)
     if given.picture:
         draw(stack, report, given.picture, work)
