@@ -26,6 +26,7 @@ from fracslice.scene import Print, Scene, scene
 from fracslice.scene.reader import reads
 from fracslice.scene.writer import to_xml
 from fracslice.volume import extent
+from fracslice.volume.extent import _kept
 from fracslice.volume.sizing import Sizing, sizing
 
 BORE = 17.0
@@ -101,6 +102,7 @@ def test_a_unit_of_the_scene_is_as_long_in_every_mesh_and_layer(root: Node) -> N
     """Specks that the voxel or the dust takes away do not change the scale, and what they held is said."""
     part, expected = scene(root, size=30), 30 / max(extent(root).box.size)
     for resolution, dust in ((32, None), (64, 0.0), (64, None)):
+        _kept.clear()
         made = mesh_of(part, MeshJob(resolution=resolution, dust_mm3=dust))
         assert made.place.scale == pytest.approx(expected, rel=1e-6)
         size, report = np.array(extent(root).box.size) * expected, made.report
@@ -108,6 +110,7 @@ def test_a_unit_of_the_scene_is_as_long_in_every_mesh_and_layer(root: Node) -> N
         said = any(note.startswith("the mesh is ") and " mm of " in note for note in report.notes)
         assert said == (max(report.lost_mm) > report.voxel_mm)
     for pixel in (0.5, 0.2):
+        _kept.clear()
         assert slice_layers(part, pixel, pixel=pixel).stack.scale == pytest.approx(expected, rel=1e-6)
 
 
