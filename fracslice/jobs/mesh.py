@@ -269,7 +269,9 @@ class _Job:
             contact_mm2=float(f"{made.contact:.9g}"),  # sums over pieces differ in the last digit
             cavities_mm3=float(f"{finish.cavities + 0.0:.9g}"),
             lost_mm=lost,
-            missing_volume_share=complete.amount.missing,
+            missing_volume_share=round(
+                complete.amount.missing, 9
+            ),  # sums over pieces differ in the last digit
             lost=complete.problems,
         )
         return MeshResult(report, finish.place, planned, made.whole, clock.work), complete.cure

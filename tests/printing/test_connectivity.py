@@ -147,8 +147,9 @@ THIN = scene(union(shell(sphere(), thickness=0.01), BALL), size="20mm")
 
 @pytest.fixture
 def contoured(monkeypatch: pytest.MonkeyPatch) -> list[object]:
-    """Calls of the mesher."""
+    """Calls of the mesher, of the voxel that was asked for."""
     calls: list[object] = []
+    monkeypatch.setattr("fracslice.jobs.mesh.RAISED", 0)
     monkeypatch.setattr(
         extract, "contour_pieces", lambda *those: calls.append(those) or contour_pieces(*those)
     )
