@@ -287,8 +287,10 @@ def examined(
     work: Work,
 ) -> Attempt:
     """Check the layers of an object once."""
+    from fracslice.jobs.completeness import layers_amount
+    from fracslice.printing.problems import Problem
     from fracslice.scene import Scene
-    from fracslice.slicing import SliceJob, adapted, plan_stack
+    from fracslice.slicing import SliceJob, Slicer, adapted, plan_stack
     from fracslice.slicing.layer_checks import check_layers
     from fracslice.slicing.layer_problems import misfit
 
@@ -304,6 +306,8 @@ def examined(
     else:
         stack = stack if most is None else adapted(stack, most, work)
         report = check_layers(stack, given.limits, machine, work)
+    if lost := layers_amount(Slicer(stack, work), work).problems:
+        report = replace(report, problems=[*(Problem("lost", text) for text in lost), *report.problems])
     report = of_material(report, given.material)
     return Attempt(*settings, report.as_dict(), described(report), report.problems, (stack, report))
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -25,6 +24,7 @@ from .value_types import AMOUNT, NUMBER, Name, Parsed, Whole
 if TYPE_CHECKING:
     from fracslice.export.jobs import SliceRun
     from fracslice.export.resins import Resin
+    from fracslice.jobs.completeness import Completeness
     from fracslice.jobs.slice_recipe import SliceRecipe
     from fracslice.scene import Scene
     from fracslice.slicing import SliceJob, Stack
@@ -106,7 +106,8 @@ def slice_(given: SliceOptions) -> int:
     """Cut SCENE into the layers of a print, straight from its field.
 
     No supports are added: fracslice check says whether the object needs them. An interrupted job
-    resumes when it is started again.
+    resumes when it is started again. Exit status: 1 if layers and pixels are too coarse for the object;
+    the file is written.
 
     Examples
     --------
@@ -128,7 +129,6 @@ def slice_(given: SliceOptions) -> int:
         refuse_to_send(output, kind, given.address)
     check_targets(given.source, None if Path(output).is_dir() else output, given.preview, given.html)
     scene = load_scene(given.source, given.settings)
-    notes: tuple[str, ...] = ()
     last: list[str] = []
     with given.working(KEPT) as work:
         run = recipe(given, scene, kind, resin, work).run(work, scene)
@@ -137,17 +137,17 @@ def slice_(given: SliceOptions) -> int:
             if given.preview:
                 write_preview(run.stack, given.preview, work)
             sent = uploaded(output, given.address, work)
+            complete = layers_amount(run.slicer, work)
             if not given.quiet or given.html:
-                notes = layers_amount(run.slicer, work)[1]
                 last = list(of_layers(run, given.price).lines())
             if given.html:
                 from fracslice.jobs.slice_checks import check_run
 
                 write_page(run.stack, check_run(run), last, output, given.html, work)
     if not given.quiet:
-        lines = described(run, output, notes)
+        lines = described(run, output, complete)
         click.echo(os.linesep.join([*lines, *last, *([sent] if sent else [])]))
-    return 0
+    return 1 if complete.problems else 0
 
 
 def recipe(given: SliceOptions, scene: Scene, kind: str, resin: Resin | None, work: Work) -> SliceRecipe:
@@ -173,7 +173,7 @@ def recipe(given: SliceOptions, scene: Scene, kind: str, resin: Resin | None, wo
     )
 
 
-def described(run: SliceRun, output: str, notes: Sequence[str]) -> list[str]:
+def described(run: SliceRun, output: str, complete: Completeness) -> list[str]:
     """Lines on the layers, with notes of the stack, on missing volume and on the printer's file."""
     from fracslice.export.layer_files import printers_file
 
@@ -182,7 +182,8 @@ def described(run: SliceRun, output: str, notes: Sequence[str]) -> list[str]:
     rows, columns = screen.shape
     first = f"{output}: {counted(len(stack.z), 'layer')} of {columns} x {rows} pixels, {size} mm"
     other = printers_file(screen.printer, output) if screen.printer else ""
-    return [first, *stack.notes, *notes, *([other] if other else [])]
+    lost = [f"would not print: {', '.join(complete.problems)}"] if complete.problems else []
+    return [first, *lost, *stack.notes, *complete.notes, *([other] if other else [])]
 
 
 def resin_of(given: SliceOptions) -> Resin | None:

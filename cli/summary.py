@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from fracslice.common.digits import counted, decimal
@@ -20,16 +21,17 @@ def summary(path: str, report: Report) -> str:
         fewer = f"simplified from {done.from_triangles:,} triangles, at most {off:.3g} mm off\n"
     notes = "".join(f"{note}\n" for note in report.notes)
     return (
-        f"{path}: {figures(report.mesh)}\n{notes}"
+        f"{path}: {figures(report.mesh, report.problems)}\n{notes}"
         f"{fewer}vertices {error.mean * 1000:.2g} um from the surface (99 %: {error.p99 * 1000:.2g} um), "
         f"the surface {back.mean:.2g} mm from the mesh (at most {back.max:.2g} mm), "
         f"voxel {report.voxel_mm:.3g} mm, {report.seconds['total']:.1f} s, {report.peak_rss_mb:.0f} MB"
     )
 
 
-def figures(mesh: MeshReport) -> str:
-    """Figures and printability of a mesh, in one line."""
-    verdict = f"would not print: {', '.join(mesh.problems)}" if mesh.problems else "watertight, manifold"
+def figures(mesh: MeshReport, problems: Sequence[str] | None = None) -> str:
+    """Figures and printability of a mesh, in one line; by default, the problems are the mesh's own."""
+    problems = mesh.problems if problems is None else problems
+    verdict = f"would not print: {', '.join(problems)}" if problems else "watertight, manifold"
     return f"{sizes(mesh)}, {verdict}"
 
 

@@ -31,9 +31,13 @@ from fracslice.formulas import (
 )
 from fracslice.jobs import surfaces
 from fracslice.jobs.mesh import import_ahead
-from fracslice.scene import Print, scene
+from fracslice.scene import Print, read, scene
 
 BALL = scene(sphere(radius=3), size="40mm", name="ball")
+
+
+LANTERN = read("scenes/gallery/lantern.xml")
+"""A plate of 0.27 mm under a ball of gyroid, 80 mm long."""
 
 
 def moved(node, *by):
@@ -248,7 +252,7 @@ def test_what_is_thinner_than_a_voxel_and_missing_is_reported():
     report = make_mesh(dust, MeshJob(resolution=48)).report
     amount = report.amount_mm3
     assert amount.off < -0.2 and amount.made == pytest.approx((1 + amount.off) * amount.object)
-    assert f"{-amount.off:.1%} of the object's volume is finer than the samples" in report.notes[-1]
+    assert f"{-amount.off:.1%} of the object's volume is finer than the samples" in report.problems[-1]
     assert json.loads(json.dumps(report.as_dict()))["amount_mm3"]["off"] == amount.off
     assert report.measured == ("julia",)
 
@@ -266,3 +270,32 @@ def test_small_triangles_around_a_lowest_vertex_are_not_folded_onto_the_bed() ->
 
 def test_modules_of_later_stages_are_there() -> None:
     import_ahead()
+
+
+def test_a_job_that_lost_its_object_samples_finer_and_says_so(tmp_path):
+    report = make_mesh(LANTERN, MeshJob(resolution=144), path=tmp_path / "lantern.stl").report
+    assert report.voxel_mm < 80 / 144 / 1.9 and report.problems == ()
+    assert report.mesh.volume_mm3 == pytest.approx(report.amount_mm3.object, rel=0.02)
+    assert report.notes[0].startswith("voxel 0.278 mm instead of 0.556 mm: ")
+    assert "100.0% of the object's volume is finer than the samples and missing" in report.notes[0]
+
+
+def test_a_lost_object_is_no_success(monkeypatch):
+    """Where finer samples are too many, the report says how much is missing, and which voxel would do."""
+    monkeypatch.setattr("fracslice.jobs.mesh.RAISED", 0)
+    report = make_mesh(LANTERN, MeshJob(resolution=144)).report
+    assert report.missing_volume_share > 0.99 and report.problems == report.lost
+    assert "of the object's volume is finer than the samples and missing: a voxel of" in report.problems[-1]
+    plain = report.as_dict()
+    assert plain["printable"] is False and plain["problems"] == list(report.problems)
+    assert plain["missing_volume_share"] > 0.99
+
+
+@pytest.mark.parametrize("tube", [0.006, 0.02], ids=["no sample", "crumbs"])
+def test_an_element_that_vanished_is_named_however_small(tube, monkeypatch):
+    monkeypatch.setattr("fracslice.jobs.mesh.RAISED", 0)
+    ring = scene(union(sphere(), torus(radius=1.5, tube=tube)), size=30)
+    (problem,) = make_mesh(ring, MeshJob(resolution=32)).report.problems
+    assert "of <torus> is finer than the samples and missing: a voxel of" in problem
+    report = make_mesh(ring, MeshJob(resolution=32, printing=Print(keep="largest"))).report
+    assert report.problems == (), "what is left out on purpose is not missing"

@@ -1,18 +1,19 @@
-"""Completeness of a mesh or stack of layers: its volume against that of the field."""
+"""Completeness of a mesh or stack of layers: its size and volume against those of the field."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..formulas import Box
+from ..common.digits import decimal
+from ..formulas import Box, Node
 from ..formulas.algebra import dot
 from ..formulas.box import Triple
 from ..volume import Lattice, Plan
-from ..volume.amount import FINER, amount, finer
+from ..volume.amount import FINER, MARGIN, SCATTERED, SURE, amount, finer, lost_share, scattered
 from ..work import Work
 
 if TYPE_CHECKING:
@@ -23,6 +24,12 @@ Grid = tuple[Triple, Triple, Callable[[float], str]]
 """Origin and spacing of the samples, scene units, and a function that names samples of a fraction of the
 spacing.
 """
+
+LOST = 0.05
+"""Share of an object's volume without which it is no success."""
+
+RAISED = 2, 4
+"""Refinements of the samples that a job tries by itself."""
 
 SLABS = 6
 """Slabs of a stack that are measured, evenly distributed."""
@@ -49,8 +56,72 @@ class Amount:
     made: float
     off: float
 
+    @property
+    def missing(self) -> float:
+        """Share of the object's volume that is missing; 0 if that is not significant."""
+        return -min(self.off, 0.0) + 0.0
 
-def mesh_amount(planned: Plan, made: float, scale: float, work: Work) -> tuple[Amount, tuple[str, ...]]:
+    @property
+    def lost(self) -> bool:
+        """True if more than `LOST` of the object is missing, whatever the error of its estimate."""
+        return self.missing > 0 and self.missing - SURE * self.error / self.object > LOST
+
+
+class Completeness(NamedTuple):
+    """What of an object is not in its mesh or layers.
+
+    Attributes
+    ----------
+    amount
+        Both volumes.
+    notes
+        Volume that is missing or too much, as text.
+    problems
+        The same where the object is lost: more than `LOST` of it, or a whole element of the scene.
+    cure
+        Refinement of the samples after which it is probably not lost, of `RAISED`; 1 if there is no need or
+        none suffices.
+    """
+
+    amount: Amount
+    notes: tuple[str, ...] = ()
+    problems: tuple[str, ...] = ()
+    cure: int = 1
+
+
+def lost_size(
+    name: str, box: Sequence[float], made: Sequence[float], whole: Sequence[float], spacing: Sequence[float]
+) -> tuple[Triple, tuple[str, ...]]:
+    """Compare the size of a mesh or layers with that of the object.
+
+    Parameters
+    ----------
+    name : str
+        What was made, with its verb.
+    box, made, whole : sequence of float
+        Sizes of the object, of what was made, and of that with the bodies that were removed, mm.
+    spacing : sequence of float
+        Spacing of the samples, mm.
+
+    Returns
+    -------
+    tuple of float
+        Length that is missing along each axis, mm.
+    tuple of str
+        A note on the axis along which most samples are missing, if it is more than one.
+    """
+    x, y, z = lost = [max(of - own, 0.0) for of, own in zip(box, made, strict=True)]
+    samples = [mm / step for mm, step in zip(lost, spacing, strict=True)]
+    axis = samples.index(max(samples))
+    if samples[axis] <= 1:
+        return (x, y, z), ()
+    removed = whole[axis] - made[axis] > lost[axis] / 2
+    reason = "bodies that were removed" if removed else "tips or walls finer than the samples"
+    along = f"{name} {decimal(made[axis])} mm of {decimal(box[axis])} mm along {'xyz'[axis]}"
+    return (x, y, z), (f"{along}: {reason} reach farther",)
+
+
+def mesh_amount(planned: Plan, made: float, scale: float, whole: bool, work: Work) -> Completeness:
     """Compare the volume of a mesh with that of its field.
 
     Parameters
@@ -61,15 +132,15 @@ def mesh_amount(planned: Plan, made: float, scale: float, work: Work) -> tuple[A
         Volume of the mesh, removed bodies included, mm3.
     scale : float
         mm per scene unit.
+    whole : bool
+        True if no body was left out on purpose.
     work : Work
         Threads and cancellation.
 
     Returns
     -------
-    Amount
-        Both volumes.
-    tuple of str
-        A note if they differ.
+    Completeness
+        What is missing.
 
     Raises
     ------
@@ -82,10 +153,11 @@ def mesh_amount(planned: Plan, made: float, scale: float, work: Work) -> tuple[A
         return f"a voxel of {voxel * planned.voxel * scale:.2g} mm"
 
     spacing = planned.voxel, planned.voxel, planned.voxel
-    return _compared(planned.root, [planned.outer], made, scale, (lattice.origin, spacing, sampling), work)
+    grid = lattice.origin, spacing, sampling
+    return _compared(planned.root, [planned.outer], made, scale, grid, whole, work)
 
 
-def layers_amount(slicer: Slicer, work: Work) -> tuple[Amount, tuple[str, ...]]:
+def layers_amount(slicer: Slicer, work: Work) -> Completeness:
     """Compare the volume of some slabs of a stack with that of its field.
 
     Parameters
@@ -97,10 +169,8 @@ def layers_amount(slicer: Slicer, work: Work) -> tuple[Amount, tuple[str, ...]]:
 
     Returns
     -------
-    Amount
-        Both volumes.
-    tuple of str
-        A note if they differ.
+    Completeness
+        What is missing.
 
     Raises
     ------
@@ -127,26 +197,48 @@ def layers_amount(slicer: Slicer, work: Work) -> tuple[Amount, tuple[str, ...]]:
         return f"pixels of {share * min(stack.pixel):.2g} mm and layers of {share * least:.2g} mm"
 
     grid = (x0, y0, float(stack.z[0])), (dx, dy, least / stack.scale), sampling
-    return _compared(stack.root, boxes, dot(areas, stack.heights[layers]), stack.scale, grid, work)
+    made = dot(areas, stack.heights[layers])
+    return _compared(stack.root, boxes, made, stack.scale, grid, len(chosen) == len(starts), work)
 
 
 def _compared(
-    root: Field,
-    boxes: list[Box],
-    made: float,
-    scale: float,
-    grid: Grid,
-    work: Work,
-) -> tuple[Amount, tuple[str, ...]]:
-    """Compare the volume of the field in boxes, scene units, with `made`, mm3."""
-    true = amount(root, boxes, work)
+    root: Field, boxes: list[Box], made: float, scale: float, grid: Grid, whole: bool, work: Work
+) -> Completeness:
+    """Compare the volume of the field in boxes, scene units, with `made`, mm3; with `whole`, look for the
+    elements of the scene, too.
+    """
+    true, (origin, spacing, name) = amount(root, boxes, work), grid
     off, unit = true.off(made / scale**3), scale**3
     compared = Amount(true.volume * unit, true.error * unit, made, off)
+
+    def missed(points: np.ndarray, times: float = 1.0) -> float:
+        return lost_share(root, points, origin, spacing, times, work)
+
+    def would(times: int | None) -> str:
+        return (
+            f"{name(1 / times)} would show it" if times else f"{name(1 / FINER[-1])} would not show it either"
+        )
+
+    notes, problems, cures = list[str](), list[str](), [1]
+    for part, points, share in scattered(root, true, origin, spacing, work) if whole else ():
+        times = next((t for t in FINER if missed(points, t / MARGIN) < SCATTERED), None)
+        element = f"<{part.formula.name}>{of(part)}"
+        problems.append(f"{share:.0%} of {element} is finer than the samples and missing: {would(times)}")
+        cures.append(next((t for t in RAISED if missed(points, t) < SCATTERED), 0))
     if off > 0:
-        return compared, (f"{off:.1%} more volume than the object has: the samples are too coarse for it",)
-    if off == 0:
-        return compared, ()
-    origin, spacing, name = grid
-    times = finer(root, true, off, origin, spacing, work)
-    would = f"{name(1 / times)} would show it" if times else f"{name(1 / FINER[-1])} would not show it either"
-    return compared, (f"{-off:.1%} of the object's volume is finer than the samples and missing: {would}",)
+        notes.append(f"{off:.1%} more volume than the object has: the samples are too coarse for it")
+    if off < 0:
+        text = f"{-off:.1%} of the object's volume is finer than the samples and missing"
+        (problems if compared.lost else notes).append(
+            f"{text}: {would(finer(root, true, off, origin, spacing, work))}"
+        )
+    if compared.lost:
+        points = true.some()
+        most = LOST * missed(points) / -off
+        cures.append(next((t for t in RAISED if missed(points, t) < most), 0))
+    return Completeness(compared, tuple(notes), tuple(problems), max(cures) if all(cures) else 1)
+
+
+def of(part: Node) -> str:
+    """Where an element was read, if it was."""
+    return f" of {part.place}" if part.place else ""

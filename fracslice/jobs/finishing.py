@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from ..mesh.quantisation import Frame
     from ..mesh.tally import Tally
     from ..volume import Plan, SignBricks
-    from ..volume.sizing import Sizing
     from .surfaces import Surface
 
 FLAT = 0.1
@@ -90,10 +89,8 @@ class Finish:
         Choice of bodies and cavities.
     dust : callable
         Maps the volume of the object and that of crumbs to the volume below which a body is removed, mm3.
-    size : Sizing
-        Size of the remaining bodies.
-    scale : float or None
-        mm per scene unit; None to derive it from the size.
+    scale : float
+        mm per scene unit.
     clock : Clock
         Threads, progress, cancellation and timing.
 
@@ -108,33 +105,29 @@ class Finish:
         surface: Surface,
         how: Print,
         dust: Callable[[float, float], float],
-        size: Sizing,
-        scale: float | None,
+        scale: float,
         clock: Clock,
     ) -> None:
         from ..mesh.components import choose
         from ..mesh.touching import NearBodies
-        from ..volume.rest import box_of_the_rest
 
         planned, pieces, shells = surface.planned, surface.pieces, surface.shells
         self.planned, self.pieces, self.shells, self.clock = planned, pieces, shells, clock
-        unit = (scale or size.scale(planned.box)) ** 3
+        unit = scale**3
         nested, self.misplaced = surface.nested(how.cavities == "fill", clock.work.threads)
         sized = replace(nested, volumes=nested.volumes * unit)
         limit = dust(float(sized.volumes.sum()), largest_crumb(sized.volumes, planned.voxel**3 * unit))
         self.stays, removed = choose(sized, keep=how.bodies, dust_mm3=limit, cavities=how.cavities)
-        rest = shells.bounds(self.stays)
-        tips = shells.tips(self.stays)
-        box = box_of_the_rest(planned, shells.bounds(), rest, tips, clock.work)
-        exact = scale or size.scale(box)
-        x, y, _ = box.centre
-        self.place = Placement(exact, (-exact * x, -exact * y, -exact * float(rest[0, 2])))
+        (x, y, _), lowest = planned.box.centre, float(shells.bounds(self.stays)[0, 2])
+        self.place = Placement(scale, (-scale * x, -scale * y, -scale * lowest))
         self.removed: Removed = removed
-        self.volume = float(nested.volumes[self.stays].sum()) * exact**3
+        self.size: list[float] = (scale * np.ptp(shells.bounds(), axis=0)).tolist()
+        """Size of all bodies, removed ones included, mm."""
+        self.volume = float(nested.volumes[self.stays].sum()) * unit
         """Volume of all bodies, removed ones included, mm3."""
         self.volume += removed.bodies_mm3 - removed.filled_mm3
         volumes = nested.volumes[self.stays]
-        self.cavities = -float(volumes[volumes < 0].sum()) * exact**3
+        self.cavities = -float(volumes[volumes < 0].sum()) * unit
         """Volume of the cavities that stay, mm3."""
         self.near = NearBodies(shells, self.stays, planned.voxel, clock.work.threads)
         """Bodies that nearly touch, complete after the last piece."""

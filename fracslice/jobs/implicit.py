@@ -80,8 +80,7 @@ def make_implicit(
     made = planned(scene, what, size, clock)
     plan = made.planned
     assert plan.root.tree is not None
-    scale = made.scale or size.scale(plan.box)
-    x, y, _ = plan.box.centre
+    (x, y, _), scale = plan.box.centre, made.scale
     place = Placement(scale, (-scale * x, -scale * y, -scale * plan.box.lo[2]))
     box, outer = (Box.around(map(tuple, place.mm(np.array([b.lo, b.hi])))) for b in (plan.box, plan.outer))
     operations = graph(plan.root.tree, place.scale, place.offset)

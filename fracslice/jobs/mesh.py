@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from ..background import in_background
 from ..common.memory import peak_rss_mb
@@ -67,8 +69,13 @@ def make_mesh(
     """
     job = _Job(scene, what or MeshJob(), Clock(work or Work()), None if path is None else Path(path))
     job.refuse()
-    with job.aside() as aside, in_background(import_ahead, job.clock.work.threads):
-        return job.result(*job.surface(aside))
+    result, finer = first, _ = job.made()
+    with suppress(TooLargeError):  # what was made is returned, and says what it lacks
+        for _ in range(TRIES):
+            if finer is None:
+                break
+            result, finer = finer.made()
+    return result if result is first else result.instead_of(first)
 
 
 LATER = "halo", "missed", "self_intersections", "tally", "tip_triangles", "tips", "topology", "touching"
@@ -79,6 +86,13 @@ def import_ahead() -> None:
     """Import modules of later stages, while native code samples and contours."""
     for module in ("export", *(f"mesh.{name}" for name in LATER)):
         import_module(f"fracslice.{module}")
+
+
+TRIES = 2
+"""How many times a job that lost its object samples finer."""
+
+RAISED = 1024
+"""Greatest number of voxels along the longest side that a job chooses by itself: seconds, and a gigabyte."""
 
 
 @dataclass(frozen=True)
@@ -96,6 +110,17 @@ class _Job:
         from ..volume.sizing import sizing
 
         return sizing(self.scene, self.what.size_mm, self.what.scale, self.clock.work)
+
+    def made(self) -> tuple[MeshResult, _Job | None]:
+        """Result, and the job of finer samples that has the object if this one lost it; None if there is no
+        need, or it would be too large.
+        """
+        with self.aside() as aside, in_background(import_ahead, self.clock.work.threads):
+            result, cure = self.result(*self.surface(aside))
+        voxels = cure * self.what.voxels(self.size.longest)
+        if cure == 1 or voxels > RAISED or self.clock.work.cluster is not None:
+            return result, None
+        return result, replace(self, what=replace(self.what, voxel_mm=None, resolution=voxels))
 
     def refuse(self) -> None:
         """Raise the errors of invalid arguments before any work is done."""
@@ -188,35 +213,37 @@ class _Job:
         folder = aside() if aside and most < len(signs) else None
         return sized, surfaces.surface_of(sized.planned, signs, most, folder, self.clock)
 
-    def result(self, sized: Sized, surface: Surface) -> MeshResult:
-        """Finished mesh and report."""
+    def result(self, sized: Sized, surface: Surface) -> tuple[MeshResult, int]:
+        """Finished mesh and report, and the refinement of the samples that does not lose the object."""
         from ..kernel.depth import shallower
         from ..mesh.touching import touching_note
-        from .completeness import mesh_amount
+        from .completeness import lost_size, mesh_amount
 
-        what, clock, size, refined = self.what, self.clock, self.size, None
+        what, clock, scale, refined = self.what, self.clock, sized.scale, None
         planned, signs, thin = surface.planned, surface.signs, surface.thin
         if what.chord_mm is not None:
-            unit = sized.scale or size.scale(planned.box)
-            surface, done = surfaces.refined(surface, what.chord_mm / unit, clock)
-            refined = done.scaled(unit)
+            surface, done = surfaces.refined(surface, what.chord_mm / scale, clock)
+            refined = done.scaled(scale)
         with clock("finishing"):
-            finish = Finish(surface, sized.left, what.dust, size, sized.scale, clock)
-        scale = finish.place.scale
-        measure = partial(mesh_amount, planned, finish.volume, scale, clock.work)
+            finish = Finish(surface, sized.left, what.dust, scale, clock)
+        whole = what.how(self.scene).bodies is None
+        measure = partial(mesh_amount, planned, finish.volume, scale, whole, clock.work)
         with in_background(measure, clock.work.threads) as measured:
             made = Writing(self.scene, what, clock, self.path).made(surface, finish)
             written = nullcontext() if self.path is None else keeping(f"{self.path} is written")
             with written, clock("checking"):
-                amount, off = measured()
+                complete = measured()
         fell = f"{thin}; expected a smaller voxel, or a thickness of {2 * scale * planned.voxel:.2g} mm"
+        low, high = made.report.bbox_mm
+        sides = [scale * side for side in planned.box.size], np.subtract(high, low).tolist(), finish.size
+        lost, shorter = lost_size("the mesh is", *sides, spacing=[scale * planned.voxel] * 3)
         near = finish.near.count
         settings = shallower(planned.root.tree, planned.voxel) if near and planned.root.tree else ()
         report = Report(
             scene=self.scene.name,
             scene_hash=self.scene.hash,
             version=__version__,
-            size_mm=size.longest,
+            size_mm=self.size.longest,
             voxel_mm=planned.voxel * scale,
             mesh=made.report,
             removed=finish.removed,
@@ -228,17 +255,23 @@ class _Job:
             bricks=len(signs),
             seconds=clock.seconds,
             peak_rss_mb=peak_rss_mb(),
-            amount_mm3=amount,
+            amount_mm3=complete.amount,
             refined=refined,
             simplified=made.simplified,
             notes=(
                 *planned.notes,
+                *shorter,
                 *([fell] if thin and not near else ()),
                 *(refined.notes if refined else ()),
-                *touching_note(near, planned.voxel * scale, settings, off),
+                *touching_note(near, planned.voxel * scale, settings, complete.notes),
             ),
             depths=planned.depths,
             contact_mm2=float(f"{made.contact:.9g}"),  # sums over pieces differ in the last digit
             cavities_mm3=float(f"{finish.cavities + 0.0:.9g}"),
+            lost_mm=lost,
+            missing_volume_share=round(
+                complete.amount.missing, 9
+            ),  # sums over pieces differ in the last digit
+            lost=complete.problems,
         )
-        return MeshResult(report, finish.place, planned, made.whole, clock.work)
+        return MeshResult(report, finish.place, planned, made.whole, clock.work), complete.cure

@@ -47,6 +47,18 @@ class MeshResult:
         """Pickle and copy all but the threads and callbacks of the job."""
         return MeshResult, (self.report, self.place, self.planned, self.whole)
 
+    def instead_of(self, coarse: MeshResult) -> MeshResult:
+        """The result with a note that it was made in place of a coarser one, and why.
+
+        Parameters
+        ----------
+        coarse : MeshResult
+            The result that lost the object.
+        """
+        report, asked = self.report, coarse.report
+        text = f"voxel {report.voxel_mm:.3g} mm instead of {asked.voxel_mm:.3g} mm: {', '.join(asked.lost)}"
+        return replace(self, report=replace(report, notes=(text, *report.notes)))
+
     @property
     def mesh(self) -> Mesh:
         """The mesh in mm, standing on z = 0, quantised to float32.

@@ -26,14 +26,14 @@ class Sized:
     ----------
     planned : Plan
         Field and voxel.
-    scale : float or None
-        mm per scene unit; None if it is not yet known.
+    scale : float
+        mm per scene unit.
     left : Print
         Choice of bodies and cavities that is made in the mesh.
     """
 
     planned: Plan
-    scale: float | None
+    scale: float
     left: Print
 
 
@@ -69,7 +69,7 @@ def planned(scene: Scene, what: MeshJob, size: Sizing, clock: Clock) -> Sized:
             made = framed(made, size, how.bodies, clock.work)
     if not how.whole:
         return edited(made, scene, what, size, clock)
-    return Sized(made.strict if what.proved else made, None, how)
+    return Sized(made.strict if what.proved else made, size.scale(made.box), how)
 
 
 @contextmanager

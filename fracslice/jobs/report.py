@@ -130,6 +130,12 @@ class Report:
         Share of the space without samples whose sign is proved; the rest relies on a measured bound.
     measured : tuple of str
         Formulas by whose measured bound space was skipped.
+    lost_mm : tuple of float
+        Length along x, y and z by which the mesh is shorter than the object, mm.
+    missing_volume_share : float
+        Share of the object's volume that the mesh lacks; 0 if that is not significant.
+    lost : tuple of str
+        What makes the mesh another object: more than 5 % of the volume, or an element, that is missing.
     """
 
     scene: str
@@ -154,6 +160,9 @@ class Report:
     cavities_mm3: float = 0.0
     proved: float | None = None
     measured: tuple[str, ...] = ()
+    lost_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    missing_volume_share: float = 0.0
+    lost: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "seconds", MappingProxyType(dict(self.seconds)))
@@ -169,8 +178,8 @@ class Report:
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """Defects that make the mesh unprintable, tuple of str; empty if there are none."""
-        return self.mesh.problems
+        """Defects that make the mesh unprintable, and what is lost, tuple of str; empty if there are none."""
+        return (*self.mesh.problems, *self.lost)
 
     def as_dict(self) -> dict[str, Any]:
         """Report as plain JSON; the fields of the mesh are merged with the others.
@@ -181,7 +190,8 @@ class Report:
             All fields.
         """
         own = {f.name: _plain(getattr(self, f.name)) for f in fields(self) if f.name != "mesh"}
-        return {**own, **self.mesh.as_dict()}
+        verdict = {"printable": not self.problems, "problems": list(self.problems)}
+        return {**own, **self.mesh.as_dict(), **verdict}
 
 
 def _plain(value: Any) -> Any:

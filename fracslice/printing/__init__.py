@@ -22,9 +22,9 @@ def printable(planned: Plan, size: Sizing, how: Print, work: Work | None = None)
     Parameters
     ----------
     planned : Plan
-        The scene.
+        The scene, around the bodies that stay; see `framed`.
     size : Sizing
-        Size of the bodies that stay, measured on the field before anything is cut off or added.
+        Size of that, before anything is cut off or added.
     how : Print
         Changes to make.
     work : Work, optional
@@ -44,8 +44,9 @@ def printable(planned: Plan, size: Sizing, how: Print, work: Work | None = None)
     Cancelled
         When the work is cancelled.
     """
+    scale = size.scale(planned.box)
     if how == Print():
-        return planned, size.scale(planned.box)
+        return planned, scale
     from .make import edited  # most objects are printed as they are
 
-    return edited(planned, size, how, work or Work())
+    return edited(planned, size, how, scale, work or Work()), scale

@@ -96,5 +96,5 @@ def _kept(planned: Plan, components: SolidComponents, count: int, work: Work) ->
 def _edited(planned: Plan, kept: Field, voxel: float, work: Work) -> Plan:
     """Plan of the part of a scene inside another field."""
     root = edited_field(planned.root, "keep", kept)
-    extents = extent(root, max(planned.box.size) / voxel, work)
+    extents = extent(root, work)
     return replace(planned, root=root, box=extents.box, outer=extents.outer, tips=extents.tips, voxel=voxel)

@@ -31,20 +31,20 @@ REPEATS = 4
 """Maximum number of times that fragments are joined."""
 
 
-def edited(planned: Plan, size: Sizing, how: Print, work: Work) -> tuple[Plan, float]:
+def edited(planned: Plan, size: Sizing, how: Print, scale: float, work: Work) -> Plan:
     """Make the changes of a `Print`; see `fracslice.printing.printable`."""
     for name in ("bridge", "gap", "thickness", "hollow", "drain", "base", "raft"):
         if (length := getattr(how, name)) > size.longest and (name != "drain" or how.hollow):
             raise VolumeError(
                 f"{name} {length:g} mm: expected at most the object's size, {size.longest:g} mm"
             )
-    job = _Edits(planned, size, how, work)
+    job = _Edits(planned, size, how, work, scale)
     for stage, change in job.changes():
         job.work.check()
         job.work.progress(stage, 0.0)
         job.put(change())
         job.work.progress(stage, 1.0)
-    return standing(job.planned, how, job.scale, job.work), job.scale
+    return standing(job.planned, how, job.scale, job.work)
 
 
 class _Edits(Preparation):
@@ -65,7 +65,6 @@ class _Edits(Preparation):
             yield "keeping the largest", self.largest
             if self.root is not before:
                 self.bound()
-        self.scale = self.sizing.scale(self.planned.box)
         if how.gap:
             yield "closing gaps", self.closed
         if how.thickness:

@@ -38,8 +38,8 @@ class Preparation:
     sizing: Sizing
     how: Print
     work: Work
-    scale: float = 1.0
-    """mm per scene unit, set once the bodies that stay are known."""
+    scale: float
+    """mm per scene unit."""
     known: SolidComponents | None = None
     """Components, once computed."""
 
@@ -59,7 +59,7 @@ class Preparation:
 
     def bound(self) -> None:
         """Recompute the extent of the object."""
-        extents = extent(self.root, max(self.planned.box.size) / self.planned.voxel, self.work)
+        extents = extent(self.root, self.work)
         self.planned = replace(self.planned, box=extents.box, outer=extents.outer, tips=extents.tips)
 
     def enlarged(self) -> None:

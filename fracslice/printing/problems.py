@@ -20,7 +20,8 @@ class Problem:
     Attributes
     ----------
     kind : str
-        "bodies", "islands", "overhangs", "necks", "cavities", "cups", "traps", "walls", "floors" or "fit".
+        "bodies", "islands", "overhangs", "necks", "cavities", "cups", "traps", "walls", "floors",
+        "fit" or "lost".
     text : str
         Description with the size.
     layer : int or None

@@ -52,7 +52,7 @@ def standing(made: Plan, how: Print, scale: float, work: Work) -> Plan:
         if z0 >= z1:
             raise VolumeError(f"a base of {base * scale:g} mm leaves nothing of the object")
         root = edited_field(root, "keep", plane(normal=(0, 0, -1), offset=-z0))
-        left = extent(root, max(extents.size) / made.voxel, work).box  # the widest part may be cut off
+        left = extent(root, work).box  # the widest part may be cut off
         (x0, y0, _), (x1, y1, _) = left.lo, left.hi
         extents = Box((x0, y0, z0), (x1, y1, z1))
     if raft:

@@ -51,11 +51,6 @@ _SAMPLING = {
 }
 """Modules of what samples, by name: layers and pictures need a plan alone."""
 
-COARSE = 64
-"""Voxels along the longest side for the first estimate of the size, accurate to a quarter of a voxel, from
-which depths follow.
-"""
-
 
 def __getattr__(name: str) -> Any:
     """Load what samples at its first use."""
@@ -159,7 +154,7 @@ def plan(root: Field, resolution: float, work: Work | None = None) -> Plan:
     tree = root.tree
     known = with_depths(tree, work) if tree else None
     with advised(known or root.tree, max(root.bounds.box.size) / resolution):
-        extents = extent(known or root, resolution, work)
+        extents = extent(known or root, work)
     voxel = max(extents.box.size) / resolution
     planned = Plan(known or root, extents.box, extents.outer, extents.tips, voxel)
     if tree is None or known is None:
@@ -200,7 +195,7 @@ def with_depths(root: Node, work: Work | None = None) -> Node:
     known = resolve_depths(root, size / RESOLUTION)
     # A deeper solid is smaller and needs finer detail; iterate until the depths are stable.
     while known is not root:
-        size = min(size, max(extent(known, COARSE, work).box.size))
+        size = min(size, max(extent(known, work).box.size))
         deeper = resolve_depths(root, size / RESOLUTION)
         if deeper == known:
             break

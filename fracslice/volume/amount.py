@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..formulas import Box
+from ..formulas import Box, Node
 from ..formulas.algebra import length
 from ..formulas.field import Bounds
 from ..kernel import Field, Kernel
 from ..kernel.cells import possible_cells
+from ..meshjob import DUST
 from ..work import Work, chunks
 from .evaluation import values_at
 
@@ -38,6 +39,15 @@ SEEN = 1 << 11
 
 FINER = 2, 4, 8, 16, 32
 """Refinement factors to choose from."""
+
+SCATTERED = 0.5
+"""Fraction of the points of an element without samples beside them from which it is lost."""
+
+PARTS = 32
+"""Largest number of elements that are looked for one by one."""
+
+FEWEST, EACH = 8, 64
+"""Number of interior points of an element below which it has random points of its own, and number tested."""
 
 MARGIN = 1.5
 """Required ratio of wall thickness to sample spacing: below it, a slanted wall is sampled only here and
@@ -79,6 +89,10 @@ class VolumeEstimate:
         """
         sure = abs(made - self.volume) > max(SURE * self.error, TOLERANCE * self.volume)
         return made / self.volume - 1 if sure and self.volume else 0.0
+
+    def some(self, count: int = SEEN) -> np.ndarray:
+        """Interior points drawn at random, always the same ones, with repetitions, float64 [3, count]."""
+        return self.inside[:, np.random.default_rng(1).integers(self.inside.shape[1], size=count)]
 
 
 def amount(root: Field, boxes: list[Box], work: Work | None = None) -> VolumeEstimate:
@@ -176,18 +190,92 @@ def finer(
     int
         Factor from `FINER`; None if none suffices.
     """
-    kernel, rng = root.kernel(), np.random.default_rng(1)
-    points = estimate.inside[:, rng.integers(estimate.inside.shape[1], size=SEEN)]
+    points = estimate.some()
 
     def lost(times: float) -> float:
-        step = np.array(spacing)[:, None, None] / times
-        start = np.array(origin)[:, None, None]
-        corners = np.indices((2, 2, 2)).reshape(3, 1, 8)
-        samples = start + step * (np.floor((points[:, :, None] - start) / step) + corners)
-        outside = values_at(kernel, samples.reshape(3, -1), work or Work()) >= 0
-        return float(outside.reshape(-1, 8).all(axis=1).mean())
+        return lost_share(root, points, origin, spacing, times, work)
 
     now = lost(1)
     if now < abs(off) / 4:
         return next((times for times in FINER if abs(off) < TOLERANCE * times**2), None)
     return next((times for times in FINER if lost(times / MARGIN) * abs(off) < TOLERANCE * now), None)
+
+
+def lost_share(
+    root: Field,
+    points: np.ndarray,
+    origin: tuple[float, float, float],
+    spacing: tuple[float, float, float],
+    times: float = 1.0,
+    work: Work | None = None,
+) -> float:
+    """Return the fraction of interior points whose eight surrounding samples are all outside.
+
+    Parameters
+    ----------
+    root
+        Field.
+    points
+        Interior points, float64 [3, n], scene units.
+    origin, spacing
+        As for `finer`.
+    times
+        Refinement of the samples.
+    work
+        Execution settings.
+    """
+    step = np.array(spacing)[:, None, None] / times
+    start = np.array(origin)[:, None, None]
+    corners = np.indices((2, 2, 2)).reshape(3, 1, 8)
+    samples = start + step * (np.floor((points[:, :, None] - start) / step) + corners)
+    outside = values_at(root.kernel(), samples.reshape(3, -1), work or Work()) >= 0
+    return float(outside.reshape(-1, 8).all(axis=1).mean())
+
+
+def scattered(
+    root: Field,
+    estimate: VolumeEstimate,
+    origin: tuple[float, float, float],
+    spacing: tuple[float, float, float],
+    work: Work | None = None,
+) -> list[tuple[Node, np.ndarray, float]]:
+    """Find the elements of a scene of several that samples miss: at most of their points.
+
+    Parameters
+    ----------
+    root
+        Field.
+    estimate
+        Volume estimate of the object.
+    origin, spacing
+        As for `finer`.
+    work
+        Execution settings.
+
+    Returns
+    -------
+    list of tuple
+        Each such element larger than dust, interior points of it, float64 [3, n], scene units, and the
+        fraction of them that samples miss.
+    """
+    found = []
+    for part in parts(root.tree) if root.tree else ():
+        low, high = (np.array(corner)[:, None] for corner in (part.bounds.box.lo, part.bounds.box.hi))
+        near = estimate.inside[:, ((estimate.inside >= low) & (estimate.inside <= high)).all(axis=0)]
+        own = replace(estimate, inside=near[:, values_at(part.kernel(), near, work or Work()) < 0])
+        if own.inside.shape[1] < FEWEST:
+            own = amount(part, [part.bounds.box], work)
+            if own.volume < DUST * estimate.volume or not own.inside.size:
+                continue
+        points = own.some(EACH)
+        if (missed := lost_share(root, points, origin, spacing, 1.0, work)) >= SCATTERED:
+            found.append((part, points, missed))
+    return found
+
+
+def parts(node: Node) -> list[Node]:
+    """Elements of sharp unions, if they are at most `PARTS`."""
+    if node.formula.name != "union" or node["smooth"]:
+        return []
+    children = [part for child in node.fields for part in parts(child) or [child]]
+    return children if len(children) <= PARTS else []

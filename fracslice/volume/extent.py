@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,9 +34,9 @@ BOLD = 0.15, 0.4
 the search for tips before anything is proven.
 """
 
-SHARE = 0.25
-"""Accuracy of the proven sides in voxels, if `MOST` columns suffice; refined by `FINER` while `LITTLE`
-suffice.
+FINENESS = 4096
+"""Accuracy of the proven sides, parts of the longest side, if `MOST` columns suffice; refined by `FINER`
+while `LITTLE` suffice. The same for every use of the field: its size does not depend on a voxel.
 """
 
 FINER = 16
@@ -79,28 +80,32 @@ class Extent:
     tips: np.ndarray
 
 
-def extent(root: Field, resolution: float, work: Work | None = None) -> Extent:
-    """Compute the bounds of the points where a field is negative.
+KEPT = 8
+"""Number of formula trees whose extents are kept: jobs measure a scene for its size, depths and grid."""
 
-    The Lipschitz bound of the field proves that nothing is farther than a quarter of a voxel outside the box.
-    Where that proof is too expensive (the bound is far too large, the feature is as thin as paper) the outer
-    box is larger. Smooth faces, edges and tips are located to 1e-6 of the longest side. The box that the
-    formulas state is doubled while the object leaves it: an offset or smooth union of a field that
-    underestimates distances can.
+_kept: OrderedDict[Node, Extent] = OrderedDict()
+
+
+def extent(root: Field, work: Work | None = None) -> Extent:
+    """Compute the bounds of the points where a field is negative, a property of the field alone.
+
+    The Lipschitz bound of the field proves that nothing is farther than a `FINENESS`th of the longest side
+    outside the box. Where that proof is too expensive (the bound is far too large, the feature is as thin as
+    paper) the outer box is larger. Smooth faces, edges and tips are located to 1e-6 of the longest side. The
+    box that the formulas state is doubled while the object leaves it: an offset or smooth union of a field
+    that underestimates distances can.
 
     Parameters
     ----------
     root
         Field.
-    resolution
-        Voxels along the longest side.
     work
         Execution settings.
 
     Returns
     -------
     Extent
-        Bounds and outermost points.
+        Bounds and outermost points; kept for the last formula trees.
 
     Raises
     ------
@@ -111,6 +116,17 @@ def extent(root: Field, resolution: float, work: Work | None = None) -> Extent:
     Cancelled
         If the job was cancelled.
     """
+    if not isinstance(root, Node):
+        return _measured(root, work)
+    result = _kept.pop(root, None) or _measured(root, work)
+    _kept[root] = result
+    while len(_kept) > KEPT:
+        _kept.popitem(last=False)
+    return result
+
+
+def _measured(root: Field, work: Work | None) -> Extent:
+    """See `extent`."""
     box, result = root.bounds.box, None
     if box.empty:
         raise VolumeError("the scene is empty: its elements have no point in common")
@@ -122,7 +138,7 @@ def extent(root: Field, resolution: float, work: Work | None = None) -> Extent:
         raise _endless(root.tree).fail(message) if root.tree else VolumeError(f"the field {message}")
     search = _Search(root, work or Work())
     for _ in range(TURNS):
-        result = search.extent(box, resolution)
+        result = search.extent(box)
         if result and max(result.outer.size) > max(box.size) / 2:
             return result
         box = result.outer if result else box.grown(max(box.size) / 2)
@@ -207,7 +223,7 @@ class _Search:
         """Move the tips of all sides outwards."""
         sides.learn(climb(self.kernel, sides.best, STEPS, first, exact, self.work))
 
-    def extent(self, box: Box, resolution: float) -> Extent | None:
+    def extent(self, box: Box) -> Extent | None:
         """Extent of the object if `box` contains it, else None."""
         longest = max(box.size) or 1.0
         sides = self.sides(box.grown(MARGIN * longest))
@@ -215,7 +231,7 @@ class _Search:
         points = np.array(box.lo)[:, None] + cells * np.array(box.size)[:, None]
         _learn(sides, points[:, self.inside(points)])
         step, exact = longest / FIRST, EXACT * longest
-        aim, finest, most = SHARE * longest / resolution, PROVEN * longest, MOST
+        aim, finest, most = longest / FINENESS, PROVEN * longest, MOST
         for share in () if self.far else BOLD:
             self.climb(sides, step, exact)
             sides.guess(share, exact, LITTLE)

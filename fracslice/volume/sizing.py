@@ -14,7 +14,6 @@ from ..formulas.algebra import length
 from ..formulas.box import Box, Triple
 from ..formulas.transforms import affine
 from ..kernel import Field
-from ..meshjob import RESOLUTION
 from ..scene import Scene
 from ..work import Work
 from . import with_depths
@@ -98,7 +97,7 @@ def sizing(
     side, unit = size_mm or scene.size_mm, None if size_mm else scene.unit_mm
     if side is None or unit is not None:
         assert unit is not None
-        side = unit * max(extent(with_depths(scene.root, work), RESOLUTION, work).box.size)
+        side = unit * max(extent(with_depths(scene.root, work), work).box.size)
     return Sizing(side, unit, factors)
 
 

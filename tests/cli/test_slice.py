@@ -216,3 +216,17 @@ def test_an_edited_scene_begins_afresh_and_says_so(
     assert run(["slice", str(scene), *map(str, options)]) == 0
     assert target.read_bytes() == edited
     assert capfd.readouterr().err == ""
+
+
+def test_layers_that_lost_the_object_are_no_success(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "sheet.xml"
+    path.write_text(
+        '<scene version="1"><solid size="30mm"><union><sphere radius="0.1"/><transform rotate="1 2 3 50">'
+        '<box size="1 1 0.002"/></transform></union></solid></scene>'
+    )
+    assert run(["slice", str(path), "-o", str(tmp_path / "l.svg"), "--pixel=0.6mm", "--layer=0.6mm"]) == 1
+    assert "sheet.xml:1 is finer than the samples and missing: pixels of" in capsys.readouterr().out
+    assert run(["check", str(path), "--pixel=0.6mm", "--layer=0.6mm"]) == 1
+    assert "is finer than the samples and missing: pixels of" in capsys.readouterr().out

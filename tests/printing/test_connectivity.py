@@ -147,8 +147,9 @@ THIN = scene(union(shell(sphere(), thickness=0.01), BALL), size="20mm")
 
 @pytest.fixture
 def contoured(monkeypatch: pytest.MonkeyPatch) -> list[object]:
-    """Calls of the mesher."""
+    """Calls of the mesher, of the voxel that was asked for."""
     calls: list[object] = []
+    monkeypatch.setattr("fracslice.jobs.mesh.RAISED", 0)
     monkeypatch.setattr(
         extract, "contour_pieces", lambda *those: calls.append(those) or contour_pieces(*those)
     )
@@ -166,7 +167,7 @@ def test_a_mesh_in_pieces_does_not_tell_which_body_is_the_largest(contoured: lis
     for result in (whole, kept):
         note = result.report.notes[0]
         assert "tips and walls thinner than the voxel of 0.42mm" in note
-        assert f"--thickness {3 * 20 / 48:.2g}mm" in note
+        assert f"--thickness {3 * result.report.voxel_mm:.2g}mm" in note
 
 
 @pytest.mark.parametrize("thickness", [0.4, 0.8, 1.25, 2.5])

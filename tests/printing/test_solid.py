@@ -34,6 +34,7 @@ from fracslice.formulas import (
     union,
 )
 from fracslice.printing import printable
+from fracslice.printing.framing import framed
 from fracslice.printing.limits import Limits
 from fracslice.printing.problems import Problem
 from fracslice.printing.samples import Samples
@@ -62,7 +63,10 @@ def distances(planned: Plan) -> Samples:
 
 def made(root: Node, **printing: float | str) -> tuple[Samples, float]:
     """The distances of a printable object of 20 mm on 0.2 mm samples, and its scale."""
-    thing, scale = printable(plan(root, 100), Sizing(SIZE), Print(**printing))  # type: ignore[arg-type]
+    how, planned = Print(**printing), plan(root, 100)  # type: ignore[arg-type]
+    if how.bodies is not None:
+        planned = framed(planned, Sizing(SIZE), how.bodies, Work())
+    thing, scale = printable(planned, Sizing(SIZE), how)
     return distances(thing), scale
 
 

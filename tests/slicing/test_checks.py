@@ -187,7 +187,7 @@ def test_a_cone_on_its_point_needs_supports_or_a_base(radius: float, height: flo
     cut = transform(cone(radius=radius, height=height), rotate=(1, 0, 0, 180))
 
     def problems(root: Node) -> list[Problem]:
-        size = max(extent(root, 64).box.size)
+        size = max(extent(root).box.size)
         return check_layers(plan_stack(root, SliceJob(size, 0.1, (0.1, 0.1)))).problems
 
     assert verdict(problems(cut)) == "would print with supports"

@@ -49,7 +49,7 @@ def above(node: Node) -> Node:
 
 def examined(root: Node, layer: float | None = None, **printing: float) -> PrintReport:
     """One scene unit is 1 mm."""
-    size = max(extent(root, 64).box.size)
+    size = max(extent(root).box.size)
     height = layer or size / 100
     job = SliceJob(size, height, (height, height), printing=Print(**printing))  # type: ignore[arg-type]
     return check_layers(plan_stack(root, job))

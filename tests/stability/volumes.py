@@ -65,7 +65,7 @@ def volumes(root: Node, resolution: float) -> Volumes:
     stack = plan_stack(root, SliceJob(SIZE, report.voxel_mm, (report.voxel_mm,) * 2), work)
     areas = np.array(list(Slicer(stack, work).map(lambda layer: layer.area)))
     of_layers = float(areas @ stack.heights) / stack.scale**3
-    of_stack, note = layers_amount(Slicer(stack, work), work)
+    of_stack, note, lost, _ = layers_amount(Slicer(stack, work), work)
     if stack.root != made.root:
         faults.append(f"the mesh is of {made.root}, the layers are of {stack.root}")
     quantised = tuple(line for line in stack.notes if line.startswith("whole layers"))
@@ -73,7 +73,10 @@ def volumes(root: Node, resolution: float) -> Volumes:
     for name, is_, reported in (("mesh", of_mesh, amount.off), ("layers", of_layers, lacks)):
         if abs(is_ - volume) > max(TOLERANCE * volume, 5 * error) and not reported:
             faults.append(f"the volume of the {name} is {is_:.4g}, not {volume:.4g} +- {error:.2g}")
-    reported = tuple(line for line in (*report.notes, *note) if line not in stack.notes) + quantised
+    reported = (
+        tuple(line for line in (*report.notes, *report.lost, *note, *lost) if line not in stack.notes)
+        + quantised
+    )
     if abs(of_layers / of_mesh - 1) > BETWEEN and not reported:
         faults.append(f"the volume of the layers is {of_layers:.4g}, of the mesh {of_mesh:.4g}")
     return Volumes(tuple(faults), reported, of_mesh / volume - 1, of_layers / volume - 1)

@@ -15,7 +15,7 @@ PLATE = transform(box(size=(2, 2, 0.02)), translate=(0, 0, 0.0123), rotate=(1, 0
 
 
 def of(root: Node) -> VolumeEstimate:
-    return amount(root, [extent(root, 64).outer])
+    return amount(root, [extent(root).outer])
 
 
 @pytest.mark.parametrize(

@@ -35,7 +35,7 @@ from fracslice.kernel.arrays import ArrayField
 from fracslice.scene import Print, scene
 from fracslice.slicing import SliceJob, plan_stack
 from fracslice.volume import extent, plan
-from fracslice.volume.extent import LITTLE, PROVEN
+from fracslice.volume.extent import LITTLE, PROVEN, _kept
 from fracslice.work import Work
 
 PLATE = box(size=(60, 40, 2))
@@ -53,6 +53,11 @@ def thing(seed: int) -> Node:
     return union(PLATE, transform(shapes[seed % 3], rotate=turn, translate=tuple(rng.uniform(-20, 20, 3))))
 
 
+@pytest.fixture(autouse=True)
+def nothing_kept() -> None:
+    _kept.clear()
+
+
 def errors(result: Box, true: Box) -> np.ndarray:
     return np.abs(np.subtract([result.lo, result.hi], [true.lo, true.hi]))
 
@@ -60,7 +65,7 @@ def errors(result: Box, true: Box) -> np.ndarray:
 @pytest.mark.parametrize("seed", range(12))
 def test_walls_rods_and_plates_at_random_places(seed: int) -> None:
     root = thing(seed)
-    result = extent(root, VOXELS)
+    result = extent(root)
     longest = max(result.box.size)
     if seed % 3 != 1:  # of boxes, the box that formulas promise is exact, however they are turned
         assert errors(result.box, root.bounds.box).max() < 2e-5 * longest
@@ -75,7 +80,7 @@ def test_walls_rods_and_plates_at_random_places(seed: int) -> None:
 @pytest.mark.parametrize("thick", [0.2, 0.1, 0.01])
 def test_a_wall_on_a_plate_has_its_height(x: float, thick: float) -> None:
     root = union(PLATE, transform(box(size=(thick, 30, 20)), translate=(x, 0, 10)))
-    assert errors(extent(root, 1200).box, Box((-30, -20, -1), (30, 20, 20))).max() < 1e-4
+    assert errors(extent(root).box, Box((-30, -20, -1), (30, 20, 20))).max() < 1e-4
 
 
 def test_a_wall_is_sliced_to_its_top() -> None:
@@ -86,14 +91,14 @@ def test_a_wall_is_sliced_to_its_top() -> None:
 
 def test_what_is_thinner_than_can_be_found_is_within_the_outer_box() -> None:
     root = union(PLATE, transform(box(size=(1e-5, 30, 20)), translate=(0, 0, 10)))
-    assert extent(root, VOXELS).outer.hi[2] >= 20
+    assert extent(root).outer.hi[2] >= 20
 
 
 @pytest.mark.parametrize("root", [octahedron(radius=3), cone(radius=2, height=5)], ids=["octahedron", "cone"])
 @pytest.mark.parametrize("turn", [0.0, 31.0])
 def test_tips_are_found_exactly(root: Node, turn: float) -> None:
     turned = transform(root, rotate=(1, 2, 0.5, turn))
-    result, field = extent(turned, 100), compile_scene(turned, "float64")
+    result, field = extent(turned), compile_scene(turned, "float64")
     assert errors(result.outer, result.box).max() < 1e-3
     assert (np.abs(field.points(*result.tips)) < 2e-5).all()
     if not turn:
@@ -102,7 +107,7 @@ def test_tips_are_found_exactly(root: Node, turn: float) -> None:
 
 def test_an_offset_of_a_fractal_is_found_beyond_the_box_that_is_promised() -> None:
     root = offset(mandelbulb(iterations=4), distance=0.2)
-    result, points = extent(root, 64), np.random.default_rng(0).uniform(-2, 2, (3, 200_000))
+    result, points = extent(root), np.random.default_rng(0).uniform(-2, 2, (3, 200_000))
     inside = points[:, compile_scene(root).points(*points.astype(np.float32)) < 0]
     assert (inside.min(1) >= result.box.lo).all() and (inside.max(1) <= result.box.hi).all()
 
@@ -110,21 +115,21 @@ def test_an_offset_of_a_fractal_is_found_beyond_the_box_that_is_promised() -> No
 def test_what_is_much_smaller_than_promised_is_as_exact() -> None:
     """A corner of a large box: the tolerance is the corner's own."""
     root = difference(box(size=(200, 200, 200)), plane(normal=(1, 1, 1), offset=172))
-    result = extent(root, VOXELS)
+    result = extent(root)
     assert max(result.box.size) < 5
     assert errors(result.outer, result.box).max() < 0.5 * max(result.box.size) / VOXELS
 
 
 def test_an_object_that_ends_nowhere_says_so() -> None:
     with pytest.raises(SceneError, match="<plane> has no end along x, y and z; put <bounds> around it"):
-        extent(union(sphere(), plane()), 64)
+        extent(union(sphere(), plane()))
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2, 4])
 def test_walls_are_meshed_and_sliced_alike(seed: int) -> None:
     """Both have the size of the field, and both have the wall."""
     root = thing(seed)
-    own, voxel = extent(root, 128).box, 0.4
+    own, voxel = extent(root).box, 0.4
     size = max(own.size)
     mesh = make_mesh(scene(root, size=f"{size}mm"), MeshJob(voxel_mm=voxel)).mesh
     assert np.abs(mesh.size - own.size).max() < 2 * voxel
@@ -196,8 +201,10 @@ class _Interpreted(Kernel):
 
 @pytest.mark.parametrize("root", [mandelbulb(iterations=3), thing(1)], ids=["exterior only", "distances"])
 def test_the_extent_is_the_same_for_any_threads_and_without_machine_code(root: Node) -> None:
-    alone, many = extent(root, 48, Work(threads=1)), extent(root, 48, Work(threads=6))
-    interpreted = extent(Interpreted(root), 48, Work(threads=2))
+    alone = extent(root, Work(threads=1))
+    _kept.clear()
+    many = extent(root, Work(threads=6))
+    interpreted = extent(Interpreted(root), Work(threads=2))
     for other in (many, interpreted):
         assert (other.box, other.outer) == (alone.box, alone.outer)
         assert np.array_equal(other.tips, alone.tips)
@@ -207,7 +214,7 @@ def test_planning_stops_when_it_is_cancelled() -> None:
     work = Work(threads=2)
     work.cancel.set()
     with pytest.raises(Cancelled):
-        extent(thing(0), 48, work)
+        extent(thing(0), work)
 
 
 @pytest.mark.parametrize("root", [sphere(), torus()], ids=["sphere", "torus"])
@@ -219,6 +226,6 @@ def test_a_smooth_tip_is_proven_by_few_columns(root: Node, monkeypatch: pytest.M
         return searched[-1]
 
     monkeypatch.setattr(sys.modules["fracslice.volume.extent"], "Sides", kept)
-    found = extent(root, 64, Work(1))
+    found = extent(root, Work(1))
     assert max(sides.spent.max() for sides in searched) < LITTLE
     assert max(found.outer.hi) - max(found.box.hi) < 2 * PROVEN * max(found.box.size)

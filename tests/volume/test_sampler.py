@@ -132,7 +132,7 @@ def test_a_pocket_breaks_no_bound() -> None:
 def test_the_voxel_is_that_of_the_object() -> None:
     """One step less and this one is 20 times as large."""
     planned = plan(mandelbulb(power=2, bailout=5e5), 64)
-    own = extent(planned.root, 64).box
+    own = extent(planned.root).box
     assert max(own.size) / planned.voxel == pytest.approx(64, rel=0.05)
 
 

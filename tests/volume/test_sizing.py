@@ -7,12 +7,26 @@ import pytest
 
 from fracslice import make_mesh, slice_layers
 from fracslice.errors import SceneError
-from fracslice.formulas import Node, box, cylinder, difference, menger, transform, union
+from fracslice.formulas import (
+    Node,
+    box,
+    cylinder,
+    difference,
+    julia,
+    mandelbulb,
+    menger,
+    quaternion_mandelbrot,
+    sphere,
+    transform,
+    union,
+)
 from fracslice.jobs.mesh import make_mesh as mesh_of
 from fracslice.meshjob import MeshJob
 from fracslice.scene import Print, Scene, scene
 from fracslice.scene.reader import reads
 from fracslice.scene.writer import to_xml
+from fracslice.volume import extent
+from fracslice.volume.extent import _kept
 from fracslice.volume.sizing import Sizing, sizing
 
 BORE = 17.0
@@ -73,6 +87,42 @@ def test_the_body_that_stays_does_not_change_the_unit() -> None:
     two = scene(union(box(), transform(box(), scale=(0.5,), translate=(3, 0, 0))), unit=10)
     mesh = mesh_of(two, MeshJob(resolution=40, printing=Print(keep="largest"))).mesh
     assert mesh.size.tolist() == pytest.approx([10, 10, 10])
+
+
+FRACTALS = {
+    "mandelbulb of power 3": mandelbulb(power=3, iterations=10),
+    "disconnected Julia set": julia(c=(-0.4969, 0.3651, 0.6223, 0.4209), iterations=12),
+    "quaternion Mandelbrot set": quaternion_mandelbrot(iterations=12),
+    "mandelbulb of power 8": mandelbulb(power=8, iterations=10),
+}
+
+
+@pytest.mark.parametrize("root", FRACTALS.values(), ids=FRACTALS)
+def test_a_unit_of_the_scene_is_as_long_in_every_mesh_and_layer(root: Node) -> None:
+    """Specks that the voxel or the dust takes away do not change the scale, and what they held is said."""
+    part, expected = scene(root, size=30), 30 / max(extent(root).box.size)
+    for resolution, dust in ((32, None), (64, 0.0), (64, None)):
+        _kept.clear()
+        made = mesh_of(part, MeshJob(resolution=resolution, dust_mm3=dust))
+        assert made.place.scale == pytest.approx(expected, rel=1e-6)
+        size, report = np.array(extent(root).box.size) * expected, made.report
+        assert np.array(report.lost_mm) == pytest.approx(np.maximum(size - made.mesh.size, 0), abs=1e-4)
+        said = any(note.startswith("the mesh is ") and " mm of " in note for note in report.notes)
+        assert said == (max(report.lost_mm) > report.voxel_mm)
+    for pixel in (0.5, 0.2):
+        _kept.clear()
+        assert slice_layers(part, pixel, pixel=pixel).stack.scale == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_speck_that_is_removed_changes_no_size() -> None:
+    """The ball stays at its place and size, and the note says that the speck reached farther."""
+    two = scene(union(sphere(), transform(sphere(radius=0.02), translate=(1.98, 0, 0))), size=30)
+    with_speck, without = (mesh_of(two, MeshJob(resolution=150, dust_mm3=dust)) for dust in (0.0, 1.0))
+    assert without.place.scale == pytest.approx(10, rel=1e-6) == with_speck.place.scale
+    assert without.mesh.size == pytest.approx([20] * 3, abs=5e-3)
+    assert without.mesh.vertices[:, 0].min() == pytest.approx(with_speck.mesh.vertices[:, 0].min())
+    note = "the mesh is 20.00 mm of 30.00 mm along x: bodies that were removed reach farther"
+    assert note in without.report.notes and note not in with_speck.report.notes
 
 
 def test_a_unit_is_written_measured_and_overridden() -> None:

@@ -19,7 +19,7 @@ SHOWN = [name for name, root in EXAMPLES.items() if root.bounds.box.finite]
 
 def picture(root: Node) -> Image.Image:
     """The solid in the box that it fills."""
-    box = extent(with_depths(root), 64).box
+    box = extent(with_depths(root)).box
     near = box.grown(0.005 * max(box.size))
     shown = render(bounds(root, min=near.lo, max=near.hi), size=SIZE, samples=SAMPLES)
     return Image.fromarray(np.asarray(shown)[..., :3])
