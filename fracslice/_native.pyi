@@ -316,7 +316,9 @@ class Contouring:
             If crossings are missing.
         """
 
-    def finish(self) -> tuple[NDArray[float64], NDArray[int32], int, NDArray[uint8], NDArray[float32]]:
+    def finish(
+        self,
+    ) -> tuple[NDArray[float64], NDArray[int32], int, NDArray[uint8], NDArray[float32], NDArray[float64]]:
         """Finished surface.
 
         Returns
@@ -333,6 +335,8 @@ class Contouring:
         to_means : ndarray of float32, shape (n - count, 3)
             Vector from each feature vertex to the mean of the crossings around it, voxels; zero where the
             tangent planes are axis-aligned.
+        blunt : ndarray of float64, shape (k, 3)
+            Middles of cells that an edge or corner of the surface should be in but is not.
 
         Raises
         ------

@@ -43,6 +43,13 @@ SCENES = {
     "corners": scene(menger(level=2), size="30mm", name="sponge"),
     "nested": scene(HOLLOW, size="40mm", name="nested"),
     "tips": scene(union(octahedron(radius=0.5), moved(cone(radius=0.3, height=1.2), 0.9, 0, 0)), size="40mm"),
+    "sharp": scene(
+        union(
+            transform(box(size=(1, 0.7, 0.8)), rotate=(1, 2, 3, 40)),
+            moved(transform(octahedron(radius=0.5), rotate=(1, 2, 3, 37)), 1.2, 0, 0),
+        ),
+        size="40mm",
+    ),
     "touching": scene(flake(solid="tetrahedron", level=2), size="40mm"),
     "thin": scene(shell(sphere(), thickness=0.01), size="40mm"),
 }
@@ -54,7 +61,7 @@ JOBS = {
     "base": MeshJob(resolution=48, printing=Print(base=2, raft=2)),
 }
 CASES = [
-    *((name, "plain") for name in ("fractal", "corners", "nested", "tips", "touching")),
+    *((name, "plain") for name in ("fractal", "corners", "nested", "tips", "sharp", "touching")),
     *(("nested", job) for job in JOBS if job != "plain"),
     ("thin", "filled"),
 ]

@@ -109,6 +109,7 @@ class Finish:
         clock: Clock,
     ) -> None:
         from ..mesh.components import choose
+        from ..mesh.quantisation import placed
         from ..mesh.touching import NearBodies
 
         planned, pieces, shells = surface.planned, surface.pieces, surface.shells
@@ -132,6 +133,8 @@ class Finish:
         self.near = NearBodies(shells, self.stays, planned.voxel, clock.work.threads)
         """Bodies that nearly touch, complete after the last piece."""
         self._planes, self._frame = placing(planned, surface.signs, self.place)
+        self.tips = placed(surface.tips, self._frame)
+        """The vertices `surface.tips` of the finished mesh, mm."""
 
     def report(self, tally: Tally) -> MeshReport:
         """Report on the whole mesh.

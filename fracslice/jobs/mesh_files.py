@@ -47,7 +47,7 @@ class StoredPieces(MeshPieces):
 
     def anew(self) -> StoredPieces:
         """Return an empty collection with other names; see `Pieces.anew`."""
-        return StoredPieces(self.store, self.job, self.halo, "tipped-")
+        return StoredPieces(self.store, self.job, self.halo, f"tipped-{self.prefix}")
 
     def add(self, piece: Piece, fresh: int = 0) -> None:
         """Append a piece; see `Pieces.add`."""

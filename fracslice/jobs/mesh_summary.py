@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cluster import Contents, Files, packed
+from ..mesh.contouring import BLUNT
 from ..mesh.model import Mesh
 from ..mesh.pointed_vertices import Pointed, PointedPiece
 from ..mesh.survey import PieceComponents, joined_components
@@ -31,12 +32,15 @@ class Summary:
         Connected components.
     pointed : PointedPiece
         Pointed vertices.
+    blunt : ndarray of float64, shape (n, 3)
+        Middles of blunt cells; if there are more than `BLUNT`, some of them.
     """
 
     ends: NDArray[np.float64]
     triangles: NDArray[np.int64]
     components: PieceComponents
     pointed: PointedPiece
+    blunt: NDArray[np.float64]
 
     def packed(self) -> Contents:
         """Contents of a file."""
@@ -45,7 +49,12 @@ class Summary:
             for side in SEAMS
             for part in ("vertices", "triangles")
         }
-        about = {"ends": self.ends, "counted": self.triangles, "pointed": self.pointed.points}
+        about = {
+            "ends": self.ends,
+            "counted": self.triangles,
+            "pointed": self.pointed.points,
+            "blunt": self.blunt,
+        }
         return packed(**about, **seams, **vars(self.components))
 
     @classmethod
@@ -60,7 +69,7 @@ class Summary:
         head, tail = (Mesh(files[f"{side}_vertices"], files[f"{side}_triangles"]) for side in SEAMS)
         whole = PieceComponents(**{name: files[name] for name in PieceComponents.__dataclass_fields__})
         sharp = PointedPiece(files["pointed"], head, tail)
-        return cls(files["ends"], files["counted"], whole, sharp)
+        return cls(files["ends"], files["counted"], whole, sharp, files["blunt"])
 
 
 def joined_summary(ranges: Sequence[Summary], voxel: float, threads: int = 0) -> Summary:
@@ -88,4 +97,5 @@ def joined_summary(ranges: Sequence[Summary], voxel: float, threads: int = 0) ->
         np.concatenate([one.triangles for one in ranges]),
         joined_components([one.components for one in ranges]),
         sharp.before(ranges[0].pointed.head),
+        np.concatenate([one.blunt for one in ranges])[: BLUNT + 1],
     )

@@ -97,7 +97,7 @@ class ContourTask(MeshTask):
         stored.put(self.number, piece.mesh, start, piece.end)
         stored.label(self.number, labels)
         counted = np.array([len(piece.mesh.triangles)])
-        return Summary(np.array([piece.end]), counted, sums, sharp).packed()
+        return Summary(np.array([piece.end]), counted, sums, sharp, piece.blunt).packed()
 
 
 @dataclass(frozen=True)

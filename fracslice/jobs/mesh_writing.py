@@ -84,7 +84,7 @@ class Writing:
         with self.clock("checking"):
             back = surface_to_mesh(planned, surface.pieces.meshes, 1.0, work)
         check = Check(finish, len(surface.signs))
-        whole, simplified = self._written(finish, check, finish.place.mm(surface.tips))
+        whole, simplified = self._written(finish, check, finish.tips)
         return Made(whole, simplified, check.mesh, check.errors, back, check.contact)
 
     def _joined(self, surface: Surface, finish: Finish) -> Made | None:

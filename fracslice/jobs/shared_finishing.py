@@ -117,7 +117,7 @@ def finished(surface: SharedSurface, finish: Finish) -> tuple[SharedCheck, Itera
         stays=finish.stays[surface.shells.of_label],
         placed=np.array([place.scale, *place.offset]),
         points=points,
-        tips=place.mm(surface.tips),
+        tips=finish.tips,
         stride=np.array(stride(len(surface.signs))),
     )
     pool.pieces.write(surface.job, CHOICE, choice)

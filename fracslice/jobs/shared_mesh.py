@@ -15,6 +15,7 @@ from ..errors import SharedError
 from ..mesh.components import Shells
 from ..mesh.nesting import Nesting
 from ..mesh.pointed_vertices import Pointed
+from ..mesh.ridges import with_ridges
 from ..mesh.survey import groups, levels, survey
 from ..mesh.tips import with_tips
 from ..volume import Plan, SignBricks
@@ -142,7 +143,7 @@ def shared_surface(
     Returns
     -------
     SharedSurface
-        The surface with tips.
+        The surface with tips and sharp edges.
     """
     pieces, work = cuts(signs), clock.work
     own = samples_key(recipe, planned.root.key, signs)
@@ -159,6 +160,7 @@ def shared_surface(
         sharp = Pointed(planned.voxel, work.threads)
         sharp.join(summary.pointed, np.inf)
         tipped, tips = with_tips(planned, stored, sharp.points, work)
+        tipped, tips = with_ridges(planned, tipped, summary.blunt, tips, work)
         shells = (
             summary.components.shells() if tipped is stored else survey(tipped, planned.voxel, work.threads)
         )

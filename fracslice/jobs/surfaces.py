@@ -54,7 +54,7 @@ class Surface:
     shells : WholeShells
         Shells of the mesh.
     tips : ndarray of float64, shape (k, 3)
-        Tips that were added.
+        Vertices that were added at tips, and at sharp edges that samples cut off.
     """
 
     planned: Plan
@@ -189,27 +189,30 @@ def surface_of(planned: Plan, signs: SignBricks, most: int, folder: Path | None,
     Returns
     -------
     Surface
-        The surface with tips, labelled.
+        The surface with tips and sharp edges, labelled.
     """
-    from ..mesh.contouring import Piece
-    from ..mesh.extract import contour, contour_pieces
+    from ..mesh.contouring import BLUNT
+    from ..mesh.extract import contour_pieces, contour_whole
     from ..mesh.pieces import Pieces
     from ..mesh.pointed_vertices import Pointed
+    from ..mesh.ridges import with_ridges
     from ..mesh.survey import survey
     from ..mesh.tips import with_tips
 
     work, pieces = clock.work, Pieces(folder)
-    pointed = Pointed(planned.voxel, work.threads)
+    pointed, blunt = Pointed(planned.voxel, work.threads), np.empty((0, 3))
     with clock("meshing"):
         if most >= len(signs):
-            made = iter([Piece(contour(planned.root, signs, work), np.inf)])
+            made = iter([contour_whole(planned.root, signs, work)])
         else:
             made = ahead(contour_pieces(planned.root, signs, work, most))  # while the one before is stored
         for piece in made:
             pieces.add(piece)
             pointed.add(piece)
+            blunt = np.concatenate([blunt, piece.blunt])[: BLUNT + 1]
             work.progress("meshing", min((piece.end - planned.outer.lo[0]) / planned.outer.size[0], 1.0))
         pieces, tips = with_tips(planned, pieces, pointed.points, work)
+        pieces, tips = with_ridges(planned, pieces, blunt, tips, work)
         return Surface(planned, signs, pieces, survey(pieces, planned.voxel, work.threads), tips)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from .._native import corners_by_vertex
 from .fit import OFF, UPRIGHT, Fit
 from .model import Mesh
-from .pieces import rows
+from .pieces import Pieces, rows
 
 ANGLES = 0.6, 0.3, 0.1
 """Minimum sines of the elevation of a tip above the planes of the triangles it replaces."""
@@ -234,13 +235,23 @@ def best(caps: list[Cap], gain: float, mesh: Mesh, fit: Fit, voxel: float) -> Ca
     olds, rims = (np.cumsum([0, *map(len, sets)])[:-1] for sets in zip(*caps, strict=True))
     before, after = np.maximum.reduceat(old[:, OFF], olds), np.maximum.reduceat(new[:, OFF], rims)
     good = after <= np.maximum(before, min(gain, fit.reach))
-    fine = (new[:, UPRIGHT] > 0) & (_heights(corners) > THIN * voxel)
+    fine = (new[:, UPRIGHT] > 0) & (heights(corners) > THIN * voxel)
     good &= np.minimum.reduceat(fine, rims)
     return caps[int(np.where(good, after, np.inf).argmin())] if good.any() else None
 
 
-def _heights(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Smallest height of each triangle, float64 [m]."""
+def heights(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Smallest height of triangles.
+
+    Parameters
+    ----------
+    corners : ndarray of float64, shape (m, 3, 3)
+        Corners.
+
+    Returns
+    -------
+    ndarray of float64, shape (m,)
+    """
     sides = corners - np.roll(corners, 1, axis=1)
     area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
     result: NDArray[np.float64] = area / np.linalg.norm(sides, axis=2).max(axis=1)
@@ -293,3 +304,31 @@ def capped(mesh: Mesh, caps: list[Cap]) -> Mesh:
     vertices = np.concatenate([mesh.vertices, corners[tips]])
     triangles = np.concatenate([mesh.triangles[keep], fans])
     return Mesh(vertices, triangles).compact()
+
+
+def spans(caps: list[Cap], pieces: Pieces, near: float) -> Iterator[tuple[int, int]]:
+    """Consecutive pieces that a fan, or the triangles it replaces, spans: these are joined.
+
+    Parameters
+    ----------
+    caps : list of Cap
+        Caps; triangle indices count from the first piece on.
+    pieces : Pieces
+        The pieces.
+    near : float
+        Distance from a seam at which a fan counts as on both sides.
+
+    Yields
+    ------
+    tuple of int
+        First and last piece, last excluded; all pieces, in order.
+    """
+    x = np.array([(cap.fan[..., 0].min() - near, cap.fan[..., 0].max() + near) for cap in caps])
+    old = np.array([(cap.old.min(), cap.old.max()) for cap in caps])
+    own = np.searchsorted(pieces.ends, x), np.searchsorted(pieces.starts, old, side="right") - 1
+    firsts, lasts = np.minimum(*own)[:, 0], np.maximum(*own)[:, 1]
+    begin = 0
+    for number in range(1, len(pieces) + 1):
+        if not ((firsts < number) & (number <= lasts)).any():
+            yield begin, number
+            begin = number

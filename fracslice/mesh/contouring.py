@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import MeshError
 from ..kernel import Field
@@ -20,6 +21,9 @@ from .projection import project
 if TYPE_CHECKING:
     from .._native import Cells
 
+BLUNT = 1 << 14
+"""Blunt cells above which a surface is rough: it has any number of sharp edges."""
+
 
 @dataclass(frozen=True, eq=False)
 class Piece:
@@ -31,10 +35,14 @@ class Piece:
         Triangles, scene units; open at the seams. Adjacent pieces have bitwise equal points at their seam.
     end : float
         x at which the piece ends; infinite for the last one.
+    blunt : ndarray of float64, shape (n, 3)
+        Middles of its blunt cells: a sharp edge or corner of the surface should pass, but does not. Some of
+        them if there are more than `BLUNT`.
     """
 
     mesh: Mesh
     end: float
+    blunt: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
 
 
 class SurfaceContours:
@@ -104,7 +112,7 @@ class SurfaceContours:
         needed = [(before(min(begin, last - 1)), before(end + 1)) for begin, end in batches]
         for (_, end), known in zip(batches, refiner.each(needed), strict=True):
             called(surface.advance, end, known.first, known.t, known.normals)
-        vertices, triangles, count, cases, to_means = surface.finish()
+        vertices, triangles, count, cases, to_means, blunt = surface.finish()
         features = vertices[count:]
 
         def regions(which: np.ndarray, inside: np.ndarray) -> np.ndarray:
@@ -115,7 +123,7 @@ class SurfaceContours:
         if last < len(signs.index):  # Unused vertices belong to the next piece.
             mesh = mesh.compact()
             border = signs.origin[0] + signs.voxel * BRICK * last
-        return Piece(mesh, border)
+        return Piece(mesh, border, blunt[: BLUNT + 1])
 
 
 def _batches(cells: Cells, first: int, last: int, least: int) -> Iterator[tuple[int, int]]:

@@ -1,4 +1,4 @@
-"""New vertices on sharp edges."""
+"""New vertices on sharp edges and at corners."""
 
 from __future__ import annotations
 
@@ -16,6 +16,9 @@ edge.
 ANGLE = 0.05
 """Minimum sine between two planes; below it they count as one."""
 
+
+LEAST = 0.1
+"""Minimum determinant of the normals of three sides that meet in a corner."""
 
 SAME = 0.95
 """Minimum cosine between the normals of one side, far from the sharp edge and near it."""
@@ -65,6 +68,58 @@ def on_creases(
         points = there[:, None] + spacing[:, None, None] * directions
     result = ((first * normals).sum(axis=2) > SAME).all(axis=1) & (size < NEAREST / 4 * length)
     result &= np.linalg.norm(there - middles, axis=1) < REACH * length
+    return there, result
+
+
+def on_three(
+    fit: Fit, corners: NDArray[np.float64], size: float
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Corners of the surface near triangles, where three of its sides meet.
+
+    As `on_creases`, with the three of the tangent planes near the triangle that differ most.
+
+    Parameters
+    ----------
+    fit : Fit
+        Tangent planes of the field.
+    corners : ndarray of float64, shape (n, 3, 3)
+        Corners of the triangles.
+    size : float
+        Size of the triangles, scene units.
+
+    Returns
+    -------
+    ndarray of float64, shape (n, 3)
+        Points.
+    ndarray of bool, shape (n,)
+        True where three sides meet in the point.
+    """
+    there = corners.mean(axis=1)
+    around = np.concatenate(
+        [0.9 * corners + 0.1 * there[:, None], (corners + np.roll(corners, 1, axis=1)) / 2], 1
+    )
+    normals, each = fit.planes(around.reshape(-1, 3))[:, :3].reshape(-1, 6, 3), np.arange(len(corners))
+    second = (normals * normals[:, :1]).sum(axis=2).argmin(axis=1)
+    across = np.cross(normals[:, 0], normals[each, second])
+    third = np.abs((normals * across[:, None]).sum(axis=2)).argmax(axis=1)
+    points = np.stack([around[:, 0], around[each, second], around[each, third]], axis=1)
+    result = np.ones(len(corners), bool)
+    first: NDArray[np.float64] = np.empty(0)
+    moved = spacing = np.full(len(corners), size / 4, np.float64)
+    for step in range(STEPS):
+        planes = fit.planes(points.reshape(-1, 3)).reshape(-1, 3, 4)
+        normals = planes[..., :3]
+        first = normals if step == 0 else first
+        result &= np.abs(np.linalg.det(normals)) > LEAST
+        points = points - planes[..., 3:] * normals
+        off = ((points - there[:, None]) * normals).sum(axis=2)
+        move = np.linalg.solve(np.where(result[:, None, None], normals, np.eye(3)), off[..., None])[..., 0]
+        there, moved = there + move, np.linalg.norm(move, axis=1)
+        directions = points - there[:, None]
+        directions /= np.maximum(np.linalg.norm(directions, axis=2, keepdims=True), 1e-300)
+        spacing = np.clip(2 * moved, NEAREST * size, spacing / 2)
+        points = there[:, None] + spacing[:, None, None] * directions
+    result &= ((first * normals).sum(axis=2) > SAME).all(axis=1) & (moved < NEAREST / 4 * size)
     return there, result
 
 

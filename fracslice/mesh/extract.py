@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from ..kernel import Field
 from ..store import Arrays, stored
 from ..volume.bricks import Bricks, SignBricks
@@ -73,15 +75,20 @@ def contour(root: Field, bricks: Bricks | SignBricks, work: Work | None = None) 
     Cancelled
         If the work is cancelled.
     """
+    return contour_whole(root, bricks, work).mesh
+
+
+def contour_whole(root: Field, bricks: Bricks | SignBricks, work: Work | None = None) -> Piece:
+    """Exact surface of a scene as one piece; see `contour`."""
     work, signs = work or Work(), bricks.signs if isinstance(bricks, Bricks) else bricks
 
     def made() -> Arrays:
         (piece,) = contour_pieces(root, signs, work, len(bricks))
-        return {"vertices": piece.mesh.vertices, "triangles": piece.mesh.triangles}
+        return {"vertices": piece.mesh.vertices, "triangles": piece.mesh.triangles, "blunt": piece.blunt}
 
-    parts = ("surface", work.device, bricks.origin, bricks.voxel, bricks.index, bricks.ijk, signs.signs)
+    parts = ("contours", work.device, bricks.origin, bricks.voxel, bricks.index, bricks.ijk, signs.signs)
     arrays = stored(work.store, parts, root, made)
-    return Mesh(arrays["vertices"], arrays["triangles"])
+    return Piece(Mesh(arrays["vertices"], arrays["triangles"]), np.inf, arrays["blunt"])
 
 
 def contour_pieces(

@@ -43,6 +43,11 @@ class Pieces:
     def __len__(self) -> int:
         return len(self.ends)
 
+    @property
+    def triangles(self) -> int:
+        """Number of all triangles."""
+        return self._count
+
     def anew(self) -> Pieces:
         """Return an empty collection in the same place, whose pieces replace those of this one."""
         return Pieces(self.folder)

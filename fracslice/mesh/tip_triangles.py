@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .model import Mesh
+from .pieces import rows
 
 
 def tips_last(meshes: Iterable[Mesh], tips: NDArray[np.float64]) -> Iterator[Mesh]:
@@ -18,7 +19,7 @@ def tips_last(meshes: Iterable[Mesh], tips: NDArray[np.float64]) -> Iterator[Mes
     meshes : iterable of Mesh
         Pieces, mm, quantised.
     tips : ndarray of float64, shape (k, 3)
-        Tips, mm, not rounded.
+        Tips, mm, placed as the mesh is.
 
     Yields
     ------
@@ -43,7 +44,7 @@ def at_tips(mesh: Mesh, tips: NDArray[np.float64]) -> NDArray[np.int64]:
     mesh : Mesh
         A piece, mm, quantised.
     tips : ndarray of float64, shape (k, 3)
-        Tips, mm, not rounded.
+        Tips, mm, placed as the mesh is.
 
     Returns
     -------
@@ -76,3 +77,30 @@ def by_tip(triangles: list[tuple[int, NDArray[np.float64]]]) -> Mesh:
     corners = np.array([corners for _, corners in sorted(triangles, key=lambda pair: pair[0])])
     count = 3 * len(corners)
     return Mesh(corners.reshape(-1, 3), np.arange(count, dtype=np.int32).reshape(-1, 3))
+
+
+def tips_to_end(mesh: Mesh, tips: NDArray[np.float64]) -> tuple[Mesh, NDArray[np.int64], int]:
+    """Move the triangles at tips to the end of a piece, tip after tip.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        A piece, scene units.
+    tips : ndarray of float64, shape (k, 3)
+        Tips, scene units.
+
+    Returns
+    -------
+    Mesh
+        The piece.
+    ndarray of int64, shape (m,)
+        Former index of each triangle.
+    int
+        Number of triangles at tips.
+    """
+    _, known, here = np.intersect1d(rows(tips), rows(mesh.vertices), return_indices=True)
+    of_vertex = np.full(len(mesh.vertices), -1)
+    of_vertex[here] = known
+    of = of_vertex[mesh.triangles].max(axis=1, initial=-1)
+    order = np.argsort(of, kind="stable")
+    return Mesh(mesh.vertices, mesh.triangles[order]), order, int(np.count_nonzero(of >= 0))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import product
 from typing import NamedTuple
 
@@ -13,7 +12,7 @@ from ..volume import Plan
 from ..volume.climbing import SLANTS, climb
 from ..volume.evaluation import values_at
 from ..work import Work
-from .caps import Cap, Rings, best, capped, disjoint
+from .caps import Cap, Rings, best, capped, disjoint, spans
 from .contouring import Piece
 from .fit import Fit
 from .model import Mesh
@@ -81,7 +80,7 @@ def with_tips(
     if not caps:
         return pieces, np.empty((0, 3))
     made, near = pieces.anew(), planned.voxel / 2
-    for first, last in _spans(caps, pieces, near):
+    for first, last in spans(caps, pieces, near):
         mesh, start = pieces.together(first, last, near), pieces.starts[first]
         own = [Cap(c.old - start, c.fan) for c in caps if 0 <= c.old[0] - start < len(mesh.triangles)]
         fresh = sum(len(cap.fan) for cap in own)
@@ -120,19 +119,6 @@ def _crossing(mesh: Mesh, caps: list[Cap], work: Work) -> set[int]:
     as_written = quantise(made, used(made), threads=work.threads).mesh
     crossing = self_intersecting_triangles(as_written, threads=work.threads, among=of_cap >= 0)
     return set(of_cap[crossing].tolist()) - {-1}
-
-
-def _spans(caps: list[Cap], pieces: Pieces, near: float) -> Iterator[tuple[int, int]]:
-    """Pieces first to last - 1 that are joined: those that a fan, or the triangles it replaces, spans."""
-    x = np.array([(cap.fan[..., 0].min() - near, cap.fan[..., 0].max() + near) for cap in caps])
-    old = np.array([(cap.old.min(), cap.old.max()) for cap in caps])
-    own = np.searchsorted(pieces.ends, x), np.searchsorted(pieces.starts, old, side="right") - 1
-    firsts, lasts = np.minimum(*own)[:, 0], np.maximum(*own)[:, 1]
-    begin = 0
-    for number in range(1, len(pieces) + 1):
-        if not ((firsts < number) & (number <= lasts)).any():
-            yield begin, number
-            begin = number
 
 
 class Tip(NamedTuple):

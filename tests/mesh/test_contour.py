@@ -258,7 +258,7 @@ def test_a_solid_for_any_crossings_and_normals(seed: int) -> None:
     normals = (normals / np.linalg.norm(normals, axis=0)).astype(np.float32)
     made = contouring(cells)
     made.advance(3, 0, t, normals)
-    vertices, triangles, crossings, cases, to_means = made.finish()
+    vertices, triangles, crossings, cases, to_means, _ = made.finish()
     assert n == crossings and len(cases) > 0 and len(vertices) == crossings + len(cases)
     cells = np.floor(vertices[crossings:])
     means = vertices[crossings:] + to_means

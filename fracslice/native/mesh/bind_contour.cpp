@@ -87,9 +87,12 @@ class Surfacing {
     nb::tuple finish() {
         Contour surface = made_.finish();
         size_t n = surface.vertices.rows, m = surface.triangles.rows, k = surface.cases.rows;
+        size_t b = surface.blunt.size() / 3;
+        Array<double> blunt(b, 3);
+        std::copy(surface.blunt.begin(), surface.blunt.end(), blunt.data.get());
         return nb::make_tuple(to_numpy(std::move(surface.vertices), {n, 3}), to_numpy(std::move(surface.triangles), {m, 3}),
                               surface.crossings, to_numpy(std::move(surface.cases), {k}),
-                              to_numpy(std::move(surface.to_means), {k, 3}));
+                              to_numpy(std::move(surface.to_means), {k, 3}), to_numpy(std::move(blunt), {b, 3}));
     }
 
   private:

@@ -57,7 +57,7 @@ size_t crossings_of(const CellGrid& cells, Layers layers) {
 // Space for at most these numbers. A crossing is in the loops of four cells. A loop has one tip, no more corners, each shared with
 // another loop, than crossings, and twice as many triangles; three crossings at least.
 Contour space(size_t crossings, size_t known) {
-    Contour space{{crossings + known * 10 / 3, 3}, {8 * known, 3}, {known * 10 / 3, 3}, {known * 10 / 3, 1}, crossings};
+    Contour space{{crossings + known * 10 / 3, 3}, {8 * known, 3}, {known * 10 / 3, 3}, {known * 10 / 3, 1}, crossings, {}};
     space.triangles.rows = space.cases.rows = 0;
     return space;
 }
@@ -126,6 +126,25 @@ void Contouring::write_layer(int layer) {
     assert(result_.triangles.rows <= 8 * known_);
     if (result_.triangles.rows > kMostElements) throw std::length_error("the surface has more than 2^31 triangles");
     for_each_brick(bricks, [&](size_t i) { write_triangles(i); });
+    put_blunt(layer);
+}
+
+void Contouring::put_blunt(int layer) {
+    LayerBricks bricks = cells_.bricks_of({layer, layer + 1});
+    for (size_t k = 0; k < bricks.size(); ++k) {
+        const size_t i = bricks.brick(k);
+        const BrickPlace place = cells_.place(i);
+        const Signs& blunt = features_.of(i).blunt;
+        for (int x = 0; x < kSide; ++x) {
+            for (BitPlane bits = blunt[x]; bits; bits &= bits - 1) {
+                const int bit = std::countr_zero(bits), at[] = {x, bit / kSide, bit % kSide};
+                for (int j = 0; j < 3; ++j) {
+                    double middle = double(place[j] * kSide + at[j]) + 0.5;
+                    result_.blunt.push_back(placement_.origin[j] + placement_.voxel * middle);
+                }
+            }
+        }
+    }
 }
 
 void Contouring::put(size_t vertex, const Vec3& point) {

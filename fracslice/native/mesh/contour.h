@@ -11,6 +11,7 @@ struct Contour {
     Array<float> to_means;     // [features, 3], from each to the mean of the crossings around it, in voxels
     Array<uint8_t> cases;      // [features], of their cells, or of the upper cells at their faces: bits dx + 2 dy + 4 dz
     size_t crossings;
+    std::vector<double> blunt;  // middles of cells that an edge or corner of the surface should be in but is not, x, y, z
 };
 
 // The surface between the samples < 0 and the others with its edges and corners kept, after Ho, Wu, Chen, Chuang and
@@ -52,6 +53,7 @@ class Contouring {
     void write_vertices(size_t i, const Hermite& data);
     void write_triangles(size_t i);
     void put(size_t vertex, const Vec3& point);
+    void put_blunt(int layer);
     void put(size_t vertex, const Feature& feature);
 
     const CellGrid& cells_;

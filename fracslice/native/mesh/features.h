@@ -49,6 +49,7 @@ struct Features {
     std::array<Signs, 3> corners{};
     Signs lined{};     // cells that lie in two planes, so that two corners say all that a tip would
     Signs straight{};  // cells whose two corners do say it
+    Signs blunt{};     // cells whose normals differ, but where the edge or corner of the surface is not within
     std::array<std::array<uint16_t, kSide>, 3> rank{};  // corners of this brick before that plane
     std::array<Feature*, 4> result{};  // in lower faces along each axis, then one a cell, in order
     std::array<uint32_t, 4> counts{};

@@ -55,17 +55,21 @@ class Finder {
         seen_.near.for_each([&](const Cell& cell) {
             const Case& type = kCases[cell.number];
             Vec3 tip;
-            if (!type.loop_length || !bent(cell) || !meet(cell, tip)) {
+            bool sharp = type.loop_length && bent(cell);
+            if (!sharp || !meet(cell, tip)) {
                 own.loops += type.triangles;
+                if (sharp) own.blunt[cell.x] |= cell.bit();
                 return;
             }
             assert(inside(tip));
+            if (moved(tip)) own.blunt[cell.x] |= cell.bit();
             own.loops += type.loop_length;
             own.cells[cell.x] |= cell.bit();
             own.add(3, {cell.lower + tip, to_mean(tip, 0, length_), cell.number});
             for (int axis = 0; axis < 3; ++axis) {
                 Vec3 corner;
                 if (!corner_in(cell, axis, corner)) continue;
+                if (moved(corner)) own.blunt[cell.x] |= cell.bit();
                 assert(corner[axis] == 0 && inside(corner, axis));
                 own.corners[axis][cell.x] |= cell.bit();
                 own.add(size_t(axis), {cell.lower + corner, to_mean(corner, kFaces[cell.number].lower[axis], 2), cell.number});
@@ -118,6 +122,11 @@ class Finder {
         bool within = true;
         for (int k = 0; k < 3; ++k) within &= k == face || (p[k] > 0 && p[k] < 1);
         return within;
+    }
+
+    // Whether a point was moved to the border of its cell or face.
+    bool moved(const Vec3& p) const {
+        return std::any_of(p.begin(), p.end(), [&](double x) { return x == margin_ || x == 1 - margin_; });
     }
 
     // The way from a point to the mean of `count` crossings of the loop from number `first` on.

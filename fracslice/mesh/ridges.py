@@ -1,0 +1,537 @@
+"""Sharp edges and corners of a solid beyond its last samples, where the sampled mesh is blunt.
+
+Edges of the mesh whose ends lie on different sides of a sharp edge are split at it (Attene, Falcidieno,
+Rossignac and Spagnuolo 2005, "Sharpen&Bend"); triangles that turn over are replaced, with their neighbours,
+by fans.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._native import connected_components
+from ..volume import Plan
+from ..volume.evaluation import values_at
+from ..work import Work
+from .caps import Cap, capped, heights, spans
+from .contouring import BLUNT, Piece
+from .creases import on_creases, on_three
+from .fit import OFF, UPRIGHT, Fit
+from .model import Mesh
+from .pieces import Pieces, rows
+from .quantisation import quantise, used
+from .self_intersections import self_intersecting_triangles
+from .subdivision import Edges, cut, edges_of
+from .tip_triangles import tips_to_end
+from .topology import component_sizes
+
+LARGE = 1 << 24
+"""Triangles above which a surface stays as it is: pieces that sharp edges span are joined, in memory."""
+
+SAMPLE, MOSTLY = 64, 0.5
+"""Blunt cells that are examined first, and the least share of their edges that must lead to a sharp edge. On
+solids nearly all do, on fractals fewer than one in six.
+"""
+
+CUBE = 4.0
+"""Edge of the cubes that are remeshed, those with blunt cells and those beside them, voxels."""
+
+CRUMB, WITHIN = 0.5, 1.0
+"""Volume of a body beside a sharp edge below which it is taken for its end, cubic voxels (as for dust), and
+its greatest distance from what is added there, voxels.
+"""
+
+GAP = 0.01
+"""Distance of the middle of a mesh edge from the surface, voxels, above which it is examined."""
+
+BESIDE = 0.02
+"""Distance from the ends of a mesh edge at which its sides are examined, relative to its length."""
+
+WIDE, FAR = 1.5, 2.0
+"""Least length that is taken for a mesh edge, and greatest distance of a corner from its triangle; voxels."""
+
+SHARP = 0.9
+"""Maximum cosine between the normals on both sides of a sharp edge."""
+
+UP, THIN = 0.875, 0.005
+"""Minimum cosine between the normals of a new triangle and of the field (29 degrees), and minimum height,
+voxels.
+"""
+
+LOOSE, SLACK = 0.03, 1.05
+"""Distance from the surface, voxels, up to which a fan may be farther off than what it replaces; beyond that,
+the factor.
+"""
+
+NEAR, GROWTH = 0.05, 2.0
+"""Distance from a triangle that is wrong within which no point is added in the next attempt, voxels, and the
+factor by which it grows.
+"""
+
+MOST, TURNS, RETRIES = 250, 6, 8
+"""Maximum triangles that a fan replaces, rounds of fans, and attempts."""
+
+
+def with_ridges(
+    planned: Plan, pieces: Pieces, blunt: NDArray[np.float64], tips: NDArray[np.float64], work: Work
+) -> tuple[Pieces, NDArray[np.float64]]:
+    """Extend a surface to the sharp edges and corners that samples cut off.
+
+    The surface stays closed and free of self-intersections: what would cause one is left as it is. A rough
+    surface, for example of a fractal, is not changed, nor one of more than `LARGE` triangles. The new
+    triangles are the last ones of their pieces; pieces that they span are joined.
+
+    Parameters
+    ----------
+    planned : Plan
+        Sampled field.
+    pieces : Pieces
+        Pieces of a closed, oriented 2-manifold with vertices on the zero set of the field, scene units.
+    blunt : ndarray of float64, shape (n, 3)
+        Middles of its blunt cells.
+    tips : ndarray of float64, shape (k, 3)
+        Tips that were added to it; their triangles are the last ones.
+    work : Work
+        Threads and cancellation.
+
+    Returns
+    -------
+    Pieces
+        The surface with sharp edges.
+    ndarray of float64, shape (j, 3)
+        The tips, then the new vertices, scene units.
+
+    Raises
+    ------
+    Cancelled
+        If the work is cancelled.
+    """
+    if not 0 < len(blunt) <= BLUNT or pieces.triangles > LARGE:
+        return pieces, tips
+    if not _creased(planned, pieces, blunt, tips, work):
+        return pieces, tips
+    mesh, numbers = _around(planned, pieces, blunt, tips, CUBE)
+    crumb = _crumbs(mesh, planned.voxel)
+    whole = Mesh(mesh.vertices, mesh.triangles[crumb < 0]).in_order()
+    made = _Sharpening(planned, whole, tips, work).made()
+    if made is None:
+        return pieces, tips
+    caps = [Cap(numbers[crumb < 0][cap.old], cap.fan) for cap in made.caps()]
+    for one in np.unique(crumb[crumb >= 0]):
+        _take_in(caps, Cap(numbers[crumb == one], mesh.corners[crumb == one]), WITHIN * planned.voxel)
+    points = np.concatenate([tips, made.new_vertices()])
+    result, near = pieces.anew(), planned.voxel / 2
+    for first, last in spans(caps, pieces, near):
+        part, start = pieces.together(first, last, near), pieces.starts[first]
+        own = [Cap(c.old - start, c.fan) for c in caps if 0 <= c.old[0] - start < len(part.triangles)]
+        part, _, fresh = tips_to_end(capped(part, own) if own else part, points)
+        result.add(Piece(part, pieces.ends[last - 1]), fresh)
+    return result, points
+
+
+def _creased(
+    planned: Plan, pieces: Pieces, blunt: NDArray[np.float64], tips: NDArray[np.float64], work: Work
+) -> bool:
+    """Whether most of the mesh edges that have two sides, at some blunt cells, lead to a sharp edge."""
+    some = blunt[np.linspace(0, len(blunt) - 1, min(SAMPLE, len(blunt))).astype(np.int64)]
+    mesh, _ = _around(planned, pieces, some, tips, 1.0)
+    missed = _Missed(planned, work).of(mesh, edges_of(mesh.triangles), SAMPLE)
+    return len(missed.edges) > MOSTLY * missed.sided
+
+
+def _around(
+    planned: Plan, pieces: Pieces, blunt: NDArray[np.float64], tips: NDArray[np.float64], size: float
+) -> tuple[Mesh, NDArray[np.int64]]:
+    """Triangles in cubes of some voxels with blunt cells, and in those beside them, the same for any pieces,
+    and their indices.
+    """
+    low, edge = np.asarray(planned.outer.lo), size * planned.voxel
+
+    def cubes(points: NDArray[np.float64]) -> NDArray[np.int64]:
+        cubes: NDArray[np.int64] = np.floor((points - low) / edge).astype(np.int64)
+        return cubes
+
+    def keys(cubes: NDArray[np.int64]) -> NDArray[np.int64]:
+        keys: NDArray[np.int64] = ((cubes + (1 << 20)) << np.array([42, 21, 0])).sum(axis=-1)
+        return keys
+
+    mesh, numbers = pieces.near(blunt, 2 * edge + planned.voxel)
+    around = cubes(blunt)[:, None] + np.array(list(product((-1, 0, 1), repeat=3)))
+    inner = np.isin(keys(cubes(mesh.corners.mean(axis=1))), np.unique(keys(around)))
+    part, order, _ = tips_to_end(Mesh(mesh.vertices, mesh.triangles[inner]), tips)
+    return part.in_order(), numbers[inner][order]
+
+
+def _crumbs(mesh: Mesh, voxel: float) -> NDArray[np.int64]:
+    """Number of the crumb that each triangle is of, or -1. Crumbs are small bodies, of samples in the thin
+    end of a wedge.
+    """
+    labels, count = connected_components(mesh.triangles, len(mesh.vertices))
+    sizes = component_sizes(mesh.vertices, mesh.triangles, labels, count)
+    edges, of = edges_of(mesh.triangles), labels[mesh.triangles[:, 0]]
+    rim = np.bincount(edges.sides.ravel(), minlength=len(edges.ends)) == 1
+    small = (sizes.volumes > 0) & (sizes.volumes < CRUMB * voxel**3)
+    small[of[rim[edges.sides].any(axis=1)]] = False
+    return np.where(small[of], of, -1).astype(np.int64)
+
+
+def _take_in(caps: list[Cap], crumb: Cap, reach: float) -> None:
+    """Remove a crumb with the nearest of the caps, if that is within reach; the sharp edge holds it then."""
+    middle = crumb.fan.mean(axis=(0, 1))
+    away = [np.linalg.norm(cap.fan.reshape(-1, 3) - middle, axis=1).min() for cap in caps]
+    nearest = int(np.argmin(away))
+    if away[nearest] < reach:
+        old = np.union1d(caps[nearest].old, crumb.old)
+        caps[nearest] = Cap(old, caps[nearest].fan)
+
+
+Disk = tuple[list[int], list[tuple[int, int, int]]]
+"""Triangles, and the fan that may replace them."""
+
+
+@dataclass(frozen=True)
+class _Points:
+    """Points of sharp edges for some mesh edges, of `sided` examined ones that have two sides."""
+
+    edges: NDArray[np.int64]
+    points: NDArray[np.float64]
+    sided: int
+
+
+class _Missed:
+    """Finds the points of sharp edges and the corners that a mesh lacks."""
+
+    def __init__(self, planned: Plan, work: Work) -> None:
+        self._kernel, self._voxel, self._work = planned.root.kernel("cpu", "float64"), planned.voxel, work
+        self.fit = Fit(planned.root, 2 * GAP * planned.voxel, planned.voxel, work)
+
+    def of(self, mesh: Mesh, edges: Edges, most: int = 1 << 62) -> _Points:
+        """Points for edges whose ends are on different sides; among `most` edges that are off the surface."""
+        ends = mesh.vertices[edges.ends]
+        value = np.abs(values_at(self._kernel, np.ascontiguousarray(ends.mean(axis=1).T), self._work))
+        far = np.flatnonzero(value > GAP * self._voxel / 4)
+        far = far[:: -(-len(far) // most) or 1]
+        far = far[np.abs(self.fit.planes(ends[far].mean(axis=1))[:, 3]) > GAP * self._voxel]
+        near = np.array([[1 - BESIDE, BESIDE], [BESIDE, 1 - BESIDE]]) @ ends[far]
+        normals = self.fit.planes(near.reshape(-1, 3))[:, :3].reshape(-1, 2, 3)
+        sided = (normals[:, 0] * normals[:, 1]).sum(axis=1) < SHARP
+        far, near = far[sided], near[sided]
+        points, found = on_creases(self.fit, self._widened(ends[far]), near)
+        far, points = far[found], points[found]
+        on = self._on_surface(points)
+        return _Points(far[on], points[on], int(sided.sum()))
+
+    def corners(self, mesh: Mesh, which: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Corners of the surface near triangles, each once and with its nearest triangle; no vertices."""
+        corners = mesh.corners[which]
+        points, found = on_three(self.fit, corners, self._voxel)
+        away = np.linalg.norm(points - corners.mean(axis=1), axis=1)
+        found &= away < FAR * self._voxel
+        which, points, away = which[found], points[found], away[found]
+        on = self._on_surface(points)
+        which, points, away = which[on], points[on], away[on]
+        kept: list[int] = []
+        apart, taken = 2 * GAP * self._voxel, set[int]()
+        for k in np.argsort(away, kind="stable").tolist():
+            known = np.concatenate([mesh.vertices, points[kept]])
+            if which[k] not in taken and np.linalg.norm(known - points[k], axis=1).min() > apart:
+                kept.append(k)
+                taken.add(int(which[k]))
+        return which[kept], points[kept]
+
+    def _on_surface(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Whether points are on the surface: planes also meet outside of what a third one cuts off."""
+        on: NDArray[np.bool_] = np.abs(self.fit.planes(points)[:, 3]) < 1e-3 * self._voxel
+        return on
+
+    def _widened(self, ends: NDArray[np.float64]) -> NDArray[np.float64]:
+        """End points of edges, at least `WIDE` apart."""
+        middles, along = ends.mean(axis=1), ends[:, 1] - ends[:, 0]
+        length = np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
+        half = along / length * np.maximum(length, WIDE * self._voxel) / 2
+        return np.stack([middles - half, middles + half], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class _Sharpened:
+    """A remeshed part of a surface.
+
+    Attributes
+    ----------
+    old, mesh : Mesh
+        The part before and after; the first vertices are the same.
+    parents : ndarray of int64, shape (m,)
+        Triangle of `old` that each one is; -1 for new ones.
+    measured : ndarray of float64, shape (m, 8)
+        Measures of the new triangles; of others, their own normals and no distance.
+    """
+
+    old: Mesh
+    mesh: Mesh
+    parents: NDArray[np.int64]
+    measured: NDArray[np.float64]
+
+    @classmethod
+    def plain(cls, old: Mesh, mesh: Mesh, parents: NDArray[np.int64]) -> _Sharpened:
+        """A part without measures."""
+        sizes = np.maximum(np.linalg.norm(mesh.normals, axis=1, keepdims=True), 1e-300)
+        rest = np.zeros((len(mesh.triangles), 5))
+        rest[:, 0] = 1
+        return cls(old, mesh, parents, np.column_stack([mesh.normals / sizes, rest]))
+
+    def measured_at(self, which: NDArray[np.int64], fit: Fit) -> _Sharpened:
+        """The same with measures of some triangles."""
+        measured = self.measured.copy()
+        measured[which] = fit.triangles(self.mesh.corners[which])
+        return replace(self, measured=measured)
+
+    def fanned(self, gone: list[int], fans: NDArray[np.int32], measured: NDArray[np.float64]) -> _Sharpened:
+        """The same with fans, and their measures, in place of some triangles."""
+        keep = np.ones(len(self.parents), bool)
+        keep[gone] = False
+        mesh = Mesh(self.mesh.vertices, np.concatenate([self.mesh.triangles[keep], fans]))
+        parents = np.concatenate([self.parents[keep], np.full(len(fans), -1)])
+        return _Sharpened(self.old, mesh, parents, np.concatenate([self.measured[keep], measured]))
+
+    def bad(self, voxel: float, least: float = UP) -> NDArray[np.int64]:
+        """New triangles whose cosine with the surface is too small, or which are too thin."""
+        new = np.flatnonzero(self.parents < 0)
+        thin = heights(self.mesh.corners[new]) < THIN * voxel
+        bad: NDArray[np.int64] = new[thin | (self.measured[new, UPRIGHT] < least)]
+        return bad
+
+    def new_vertices(self) -> NDArray[np.float64]:
+        """Vertices that were added and are used, [k, 3]."""
+        taken = np.unique(self.mesh.triangles)
+        return self.mesh.vertices[taken[taken >= len(self.old.vertices)]]
+
+    def caps(self) -> list[Cap]:
+        """What is replaced by what; connected parts apart."""
+        new = self.mesh.triangles[self.parents < 0]
+        gone = np.setdiff1d(np.arange(len(self.old.triangles)), self.parents)
+        both = np.concatenate([new, self.old.triangles[gone]])
+        labels, _ = connected_components(both, len(self.mesh.vertices))
+        of_new, of_old = labels[new[:, 0]], labels[self.old.triangles[gone, 0]]
+        corners = self.mesh.vertices[new]
+        return [Cap(gone[of_old == one], corners[of_new == one]) for one in np.unique(of_old)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Cornered:
+    """A part of a surface with some corners.
+
+    Attributes
+    ----------
+    corners : ndarray of int64, shape (k,)
+        Numbers of the corners, which are the last vertices.
+    mesh : Mesh
+        The part.
+    parents : ndarray of int64, shape (m,)
+        Triangle that each one was; -1 for new ones.
+    edges : Edges
+        Its edges.
+    missed : _Points
+        Points of sharp edges that it lacks, for edges with two triangles.
+    """
+
+    corners: NDArray[np.int64]
+    mesh: Mesh
+    parents: NDArray[np.int64]
+    edges: Edges
+    missed: _Points
+
+
+class _Sharpening:
+    """Attempts to add points of sharp edges to a part of a surface."""
+
+    def __init__(self, planned: Plan, mesh: Mesh, tips: NDArray[np.float64], work: Work) -> None:
+        self._mesh, self._voxel, self._work, self._missed = mesh, planned.voxel, work, _Missed(planned, work)
+        self._fit, self._tips = self._missed.fit, np.isin(rows(mesh.vertices), rows(tips))
+
+    def made(self) -> _Sharpened | None:
+        """The part with as many of the points as there can be; None for none."""
+        mesh = self._mesh
+        edges = edges_of(mesh.triangles)
+        sided = np.zeros(len(edges.ends), bool)
+        sided[self._missed.of(mesh, edges).edges] = True
+        hosts, corners = self._missed.corners(mesh, np.flatnonzero(sided[edges.sides].any(axis=1)))
+        banned, reach, given = np.empty((0, 3)), NEAR * self._voxel, None
+        stays = np.ones(len(corners), bool)
+        for _ in range(RETRIES):
+            self._work.check()
+            if given is None or not stays[given.corners].all():
+                given = self._given(hosts, corners, np.flatnonzero(stays))
+            splits = _away(given.missed.points, banned, reach)
+            if not splits.any() and not stays.any():
+                return None
+            result = self._with(given, splits)
+            wrong = self._wrong(result)
+            if not len(wrong):
+                return result
+            at = np.unique(result.mesh.triangles[wrong])
+            new = result.mesh.vertices[at[at >= len(mesh.vertices)]]
+            banned = np.concatenate([banned, new, result.mesh.corners[wrong].mean(axis=1)])
+            reach *= GROWTH
+            stays = _away(corners, banned, reach)
+        return None
+
+    def _given(
+        self, hosts: NDArray[np.int64], corners: NDArray[np.float64], which: NDArray[np.int64]
+    ) -> _Cornered:
+        """The part with some corners, which split their triangles."""
+        old, count = self._mesh, len(self._mesh.triangles)
+        number = (len(old.vertices) + np.arange(len(which))).astype(np.int32)
+        a, b, c = old.triangles[hosts[which]].T
+        new = [np.stack([p, q, number], axis=1) for p, q in ((a, b), (b, c), (c, a))]
+        keep = np.setdiff1d(np.arange(count), hosts[which])
+        triangles = np.concatenate([old.triangles[keep], *new])
+        mesh = Mesh(np.concatenate([old.vertices, corners[which]]), triangles)
+        parents = np.concatenate([keep, np.full(len(triangles) - len(keep), -1)])
+        edges = edges_of(triangles)
+        missed = self._missed.of(mesh, edges)
+        inner = np.bincount(edges.sides.ravel(), minlength=len(edges.ends))[missed.edges] == 2
+        missed = _Points(missed.edges[inner], missed.points[inner], missed.sided)
+        return _Cornered(which, mesh, parents, edges, missed)
+
+    def _with(self, given: _Cornered, splits: NDArray[np.bool_]) -> _Sharpened:
+        """The part with corners, and with some of the points of sharp edges."""
+        mesh, edges, points = given.mesh, given.edges, given.missed.points[splits]
+        split = np.zeros(len(edges.ends), bool)
+        split[given.missed.edges[splits]] = True
+        whole = ~split[edges.sides].any(axis=1)
+        mesh, origin = cut(mesh, edges.sides, split, points)
+        parents = np.where(whole, given.parents, -1)[origin]
+        state = _Sharpened.plain(self._mesh, mesh, parents).measured_at(
+            np.flatnonzero(parents < 0), self._fit
+        )
+        ends = np.ones(len(given.corners), bool), np.zeros(len(points), bool)
+        fixed = np.concatenate([self._tips, *ends])
+        for _ in range(TURNS):
+            self._work.check()
+            following = self._fanned(state, fixed)
+            if following is None:
+                break
+            state = following
+        return state
+
+    def _wrong(self, state: _Sharpened) -> NDArray[np.int64]:
+        """New triangles that are turned over or too thin, or intersect others after quantisation."""
+        mesh = state.mesh
+        as_written = quantise(mesh, used(mesh), threads=self._work.threads).mesh
+        new = state.parents < 0
+        crossing = self_intersecting_triangles(as_written, threads=self._work.threads, among=new)
+        return np.union1d(state.bad(self._voxel, 0.0), np.flatnonzero(crossing))
+
+    def _fanned(self, state: _Sharpened, fixed: NDArray[np.bool_]) -> _Sharpened | None:
+        """Replace bad triangles by fans around new vertices or corners; None if none can be replaced."""
+        mesh, voxel = state.mesh, self._voxel
+        bad = state.bad(voxel)
+        if not len(bad):
+            return None
+        disks = _Disks(state, fixed, THIN * voxel)
+        apex = fixed.copy()
+        apex[len(state.old.vertices) :] = True
+        near = bad[np.argsort(~fixed[mesh.triangles[bad]].any(axis=1), kind="stable")].tolist()
+        ways = [(t, v) for t in near for v in sorted(mesh.triangles[t].tolist(), key=lambda v: not fixed[v])]
+        found = [disk for t, v in ways if apex[v] and (disk := disks.grown(t, v))]
+        found = list({(*old, fan[0][2]): (old, fan) for old, fan in found}.values())
+        if not found:
+            return None
+        fans = np.array([triangle for _, fan in found for triangle in fan], np.int32)
+        measured = self._fit.triangles(mesh.vertices[fans])
+        gone, stays, begin = set[int](), np.zeros(len(fans), bool), 0
+        for old, fan in found:
+            own = slice(begin, begin := begin + len(fan))
+            limit = max(SLACK * state.measured[old, OFF].max(), LOOSE * voxel)
+            good = measured[own, OFF].max() <= limit and measured[own, UPRIGHT].min() > UP
+            if good and gone.isdisjoint(old):
+                gone.update(old)
+                stays[own] = True
+        return state.fanned(sorted(gone), fans[stays], measured[stays]) if gone else None
+
+
+class _Disks:
+    """Disks of triangles, each seen in full from a vertex. Plain numbers: disks are small."""
+
+    def __init__(self, state: _Sharpened, fixed: NDArray[np.bool_], thin: float) -> None:
+        corners = state.mesh.triangles.astype(np.int64)
+        after = np.roll(corners, -1, axis=1)
+        keys, back = ((a << 32 | b).ravel() for a, b in ((corners, after), (after, corners)))
+        order = np.argsort(keys)
+        place = np.minimum(np.searchsorted(keys, back, sorter=order), len(keys) - 1)
+        beyond = np.where(keys[order[place]] == back, order[place] // 3, -1).reshape(-1, 3)
+        self._beyond, self._triangles, self._thin = beyond.tolist(), corners.tolist(), thin
+        self._order = np.argsort(corners, axis=None, kind="stable")
+        self._starts = np.searchsorted(corners.ravel()[self._order], np.arange(len(state.mesh.vertices) + 1))
+        self._points, self._fixed = state.mesh.vertices.tolist(), fixed
+        self._normals = state.measured[:, :3].tolist()
+        self._alike = [tuple(normal) for normal in np.round(state.measured[:, :3], 3).tolist()]
+
+    def grown(self, first: int, apex: int) -> Disk | None:
+        """A disk with a triangle and the star of a vertex, grown until the fan around that vertex faces as
+        the disk does: its triangles and the fan. None if there is no such disk or it would swallow a corner.
+        """
+        more = {first, *(self._order[self._starts[apex] : self._starts[apex + 1]] // 3).tolist()}
+        disk, normals = set[int](), dict[tuple[float, ...], list[float]]()
+        while more and len(disk) + len(more) <= MOST:
+            disk |= more
+            for t in sorted(more):
+                normals.setdefault(self._alike[t], self._normals[t])
+            rim, more = list[tuple[int, int]](), set[int]()
+            for t in sorted(disk):
+                a, b, c = self._triangles[t]
+                for beyond, edge in zip(self._beyond[t], ((a, b), (b, c), (c, a)), strict=True):
+                    if beyond in disk:
+                        continue
+                    if apex not in edge and self._seen(edge, apex, normals.values()):
+                        rim.append(edge)
+                    elif beyond < 0:
+                        return None
+                    else:
+                        more.add(beyond)
+        return None if more else self._fan(sorted(disk), rim, apex)
+
+    def _seen(self, edge: tuple[int, int], apex: int, normals: Iterable[list[float]]) -> bool:
+        """Whether the triangle of an edge and a vertex faces as one of the normals says, and is not thin."""
+        ax, ay, az = self._points[edge[0]]
+        bx, by, bz = self._points[edge[1]]
+        cx, cy, cz = self._points[apex]
+        ux, uy, uz, vx, vy, vz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az
+        x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        wx, wy, wz = vx - ux, vy - uy, vz - uz
+        sides = ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz, wx * wx + wy * wy + wz * wz
+        square = x * x + y * y + z * z
+        least = SHARP * math.sqrt(square)
+        thick = square >= self._thin**2 * max(sides)
+        return thick and any(x * n[0] + y * n[1] + z * n[2] >= least for n in normals)
+
+    def _fan(self, disk: list[int], rim: list[tuple[int, int]], apex: int) -> Disk | None:
+        """The disk, and the fan around the apex; None if it is no disk."""
+        following = dict(rim)
+        if not rim or len(following) < len(rim):
+            return None
+        first = here = min(following)
+        fan = []
+        while here in following:
+            there = following.pop(here)
+            fan.append((here, there, apex))
+            here = there
+        inside = {v for t in disk for v in self._triangles[t]} - {a for a, _ in rim} - {apex}
+        euler = len(inside) + len(rim) + 1 - (3 * len(disk) + len(rim)) // 2 + len(disk)
+        if here != first or following or euler != 1 or any(self._fixed[v] for v in inside):
+            return None
+        return disk, fan
+
+
+def _away(points: NDArray[np.float64], banned: NDArray[np.float64], reach: float) -> NDArray[np.bool_]:
+    """Whether points are farther than `reach` from all banned ones."""
+    away = np.ones(len(points), bool)
+    for one in banned:
+        away &= np.linalg.norm(points - one, axis=1) > reach
+    return away

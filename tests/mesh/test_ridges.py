@@ -1,0 +1,128 @@
+"""Sharp edges that samples cut off: a mesh reaches them, and stays sound."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from scipy.spatial import HalfspaceIntersection
+
+from fracslice.formulas import Node, difference, intersection, mandelbulb, menger, plane, sphere, transform
+from fracslice.mesh import Mesh
+from fracslice.mesh.check import check_mesh
+from fracslice.mesh.extract import contour_whole
+from fracslice.mesh.nearest import Nearest
+from fracslice.mesh.pieces import Pieces
+from fracslice.mesh.pointed_vertices import Pointed
+from fracslice.mesh.quantisation import quantised
+from fracslice.mesh.ridges import with_ridges
+from fracslice.mesh.tips import with_tips
+from fracslice.volume import plan, sample_scene
+from fracslice.work import Work
+
+THIRD = 3**-0.5
+TETRAHEDRON = -THIRD * np.array([(1, 1, 1, -0.5), (1, -1, -1, -0.5), (-1, 1, -1, -0.5), (-1, -1, 1, -0.5)])
+"""Half spaces: normals, and distances from the origin."""
+BOX = np.array(
+    [(*(sign * row), size) for row, size in zip(np.eye(3), (0.5, 0.35, 0.4), strict=True) for sign in (1, -1)]
+)
+PRISM = np.array(
+    [
+        (0.5, 0.75**0.5, 0, 0.25),
+        (0.5, -(0.75**0.5), 0, 0.25),
+        (-1, 0, 0, 0.4),
+        (0, 0, 1, 0.5),
+        (0, 0, -1, 0.5),
+    ]
+)
+TURN = (0.3, 0.5, 0.7, 52.2)
+
+
+def solid(sides: np.ndarray, turn: tuple[float, float, float, float]) -> tuple[Node, np.ndarray]:
+    """Of half spaces, turned; and points on its edges, [n, 3]."""
+    node: Node = sphere(radius=2)
+    for x, y, z, d in sides.tolist():
+        node = intersection(node, plane(normal=(x, y, z), offset=d))
+    corners = HalfspaceIntersection(sides * [1, 1, 1, -1], np.zeros(3)).intersections
+    on = np.abs(corners @ sides[:, :3].T - sides[:, 3]) < 1e-9
+    along = []
+    for one, other in combinations(range(len(sides)), 2):
+        ends = corners[on[:, one] & on[:, other]]
+        if len(ends) and np.ptp(ends, axis=0).max() > 1e-6:
+            far = ends[np.linalg.norm(ends - ends[0], axis=1).argmax()]
+            along.append(np.linspace(ends[0], far, 100))
+    return transform(node, rotate=turn), turned(np.concatenate(along), turn)
+
+
+def turned(points: np.ndarray, turn: tuple[float, float, float, float]) -> np.ndarray:
+    from scipy.spatial.transform import Rotation
+
+    axis, degrees = np.array(turn[:3]), turn[3]
+    return Rotation.from_rotvec(np.radians(degrees) * axis / np.linalg.norm(axis)).apply(points)
+
+
+def made(root: Node, resolution: float, threads: int = 2) -> tuple[Mesh, Mesh, float]:
+    """With tips only, with sharp edges too; the voxel."""
+    planned, work = plan(root, resolution), Work(threads=threads)
+    piece = contour_whole(planned.root, sample_scene(planned, work), work)
+    pieces, pointed = Pieces(), Pointed(planned.voxel)
+    for part in (pieces, pointed):
+        part.add(piece)
+    tipped, tips = with_tips(planned, pieces, pointed.points, work)
+    sharp, _ = with_ridges(planned, tipped, piece.blunt, tips, work)
+    return tipped.mesh(0), sharp.mesh(0), planned.voxel
+
+
+def off(mesh: Mesh, points: np.ndarray, voxel: float) -> np.ndarray:
+    """Distances of points from a mesh, voxels."""
+    return Nearest(mesh, closed=True).points(np.ascontiguousarray(points)) / voxel
+
+
+@pytest.mark.parametrize("turn", [(0, 0, 1, 0), TURN], ids=["straight", "turned"])
+@pytest.mark.parametrize("sides", [TETRAHEDRON, PRISM, BOX], ids=["tetrahedron", "prism", "box"])
+def test_edges_of_solids(sides: np.ndarray, turn: tuple[float, float, float, float]) -> None:
+    """They were cut off by up to 0.6 voxels, and tips fell off."""
+    root, edges = solid(sides, turn)
+    _, sharp, voxel = made(root, 64)
+    away = off(sharp, edges, voxel)
+    assert np.quantile(away, 0.99) < 0.05
+    assert away.max() < 0.1
+    report = check_mesh(quantised(sharp))
+    assert report.printable and report.components == 1
+
+
+def test_a_valley_of_60_degrees() -> None:
+    wedge, edges = solid(PRISM, (0, 0, 1, 0))
+    root = transform(difference(solid(BOX * [1, 1, 1, 2.5], (0, 0, 1, 0))[0], wedge), rotate=TURN)
+    inner = turned(edges[(edges[:, 0] > 0.49) & (np.abs(edges[:, 2]) < 0.4)], TURN)
+    before, sharp, voxel = made(root, 48)
+    assert off(before, inner, voxel).max() > 0.2
+    assert off(sharp, inner, voxel).max() < 0.05
+    assert check_mesh(quantised(sharp)).printable
+
+
+def test_the_rim_of_a_lens() -> None:
+    balls = (transform(sphere(radius=1), translate=(0, 0, z)) for z in (0.6, -0.6))
+    angle = np.linspace(0, 2 * np.pi, 500)
+    rim = 0.8 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    before, sharp, voxel = made(transform(intersection(*balls), rotate=TURN), 48)
+    assert off(before, turned(rim, TURN), voxel).max() > 0.3
+    assert off(sharp, turned(rim, TURN), voxel).max() < 0.03
+    assert check_mesh(quantised(sharp)).printable
+
+
+def test_sharp_edges_are_the_same_for_any_number_of_threads() -> None:
+    root, _ = solid(TETRAHEDRON, TURN)
+    (_, one, _), (_, many, _) = made(root, 32, 1), made(root, 32, 3)
+    assert (one.vertices == many.vertices).all()
+    assert (one.triangles == many.triangles).all()
+
+
+@pytest.mark.parametrize(
+    "root", [sphere(), menger(level=2), mandelbulb(iterations=5)], ids=["ball", "menger", "bulb"]
+)
+def test_nothing_where_no_sharp_edge_is_missing(root: Node) -> None:
+    before, sharp, _ = made(root, 48)
+    assert np.shares_memory(before.vertices, sharp.vertices)
+    assert np.array_equal(before.triangles, sharp.triangles)
