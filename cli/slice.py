@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from datetime import UTC, datetime
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,6 +34,20 @@ if TYPE_CHECKING:
 
 DATE = "SOURCE_DATE_EPOCH"
 OF_PICTURES = {"compensation", "gamma", "levels", "blur", "mirror", "sections"}
+
+
+def listed_resin(context: click.Context, _: click.Parameter, name: str | None) -> str | None:
+    """Return the name of a resin; "list" prints those of the printer, or all, and ends the command."""
+    if name != "list":
+        return name
+    from fracslice.export.resins import resin_names
+
+    machine = context.params.get("machine")
+    for known in resin_names(machine):
+        click.echo(known)
+    if machine and not resin_names(machine):
+        click.echo(f"no resin is known for {machine.title}: expected a .toml or .ini file, or --exposure")
+    context.exit()
 
 
 class SliceOptions(ClusterOptions, LayerOptions):
@@ -86,7 +101,9 @@ class SliceOptions(ClusterOptions, LayerOptions):
     )
     resin: str | None = option(
         Name("NAME|FILE"),
-        'A resin such as "Siraya Tech Fast Grey", or a file of its settings: .toml, or .ini of PrusaSlicer.',
+        'A resin such as "Siraya Tech Fast Grey", or a file of its settings: .toml, or .ini of PrusaSlicer; '
+        '"list" shows all.',
+        callback=listed_resin,
     )
     preview: str | None = option(
         Name("FILE", ".png", ".webp"), "Write a contact sheet (.png) or an animation (.webp) of the layers."
@@ -174,8 +191,8 @@ def recipe(given: SliceOptions, scene: Scene, kind: str, resin: Resin | None, wo
 
 
 def described(run: SliceRun, output: str, complete: Completeness) -> list[str]:
-    """Lines on the layers, with notes of the stack, on missing volume and on the printer's file."""
-    from fracslice.export.layer_files import printers_file
+    """Lines on the layers, with notes of the stack, on missing volume, exposure and the printer's file."""
+    from fracslice.export.layer_files import PRINTS, printers_file, slice_format
 
     stack, screen = run.stack, run.screen
     size = " x ".join(map(decimal, stack.size))
@@ -183,7 +200,21 @@ def described(run: SliceRun, output: str, complete: Completeness) -> list[str]:
     first = f"{output}: {counted(len(stack.z), 'layer')} of {columns} x {rows} pixels, {size} mm"
     other = printers_file(screen.printer, output) if screen.printer else ""
     lost = [f"would not print: {', '.join(complete.problems)}"] if complete.problems else []
-    return [first, *lost, *stack.notes, *complete.notes, *([other] if other else [])]
+    start = [calibration(run.resin)] if run.resin and slice_format(output) in PRINTS else []
+    return [first, *lost, *stack.notes, *complete.notes, *filter(None, start), *([other] if other else [])]
+
+
+def calibration(resin: Resin) -> str:
+    """Line on exposures that are no resin's."""
+    from fracslice.export.resins import START
+
+    keys = attrgetter("name", "exposure", "bottom_exposure", "bottom_layers", "transition_layers")
+    if keys(resin) != keys(START):
+        return ""
+    times = f"{resin.exposure:g} s a layer and {resin.bottom_exposure:g} s a bottom layer"
+    return (
+        f"exposed for {times}, as UVtools does by default: start here, then calibrate (--exposure, --resin)"
+    )
 
 
 def resin_of(given: SliceOptions) -> Resin | None:
@@ -209,14 +240,15 @@ def refuse_what_no_print_has(given: SliceOptions, kind: str, resin: Resin | None
 
     This is checked before print preparation, which may take minutes.
     """
-    from fracslice.export.layer_files import ENDINGS, printers_file
+    from fracslice.export.layer_files import ENDINGS, is_convertible, printers_file
     from fracslice.slicing.printers import PRINTERS
 
     machine, output = given.machine, given.output
     if machine is None:
         able = next((f", such as {p.name}" for p in PRINTERS.values() if not printers_file(p, output)), "")
         raise click.UsageError(f'{output}: a .{kind} file needs --printer{able}; "list" shows all')
-    if f".{machine.file}" in ENDINGS and (other := printers_file(machine, output)):
+    other = printers_file(machine, output)
+    if other and not (is_convertible(output) and f".{machine.file}" not in ENDINGS):
         raise click.UsageError(f"{output}: {other}")
     if resin is None:
         raise click.UsageError(

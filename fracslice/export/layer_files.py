@@ -51,7 +51,7 @@ ENDINGS = {
 }
 
 
-ALIASES = {".sl1": (".sl1s",), ".prz": (".goo",)}
+ALIASES = {".sl1": (".sl1s",), ".prz": (".goo",), ".photon": (".cbddlp",)}
 """Extensions of the same format that the same printers read."""
 
 
@@ -76,6 +76,10 @@ def slice_format(path: str | Path, name: str | None = None) -> str:
         For an unknown format or extension, or a path that cannot be written.
     """
     ending = Path(path).suffix.lower()
+    if Path(path).name.lower().endswith(".encrypted.ctb"):
+        raise ExportError(
+            f"{path}: encrypted .ctb files are not written: make a .goo and convert it with UVtools"
+        )
     if name is None:
         name = ENDINGS.get(ending)
         if name is None:
@@ -107,6 +111,11 @@ def printers_file(printer: Printer, output: str | Path) -> str:
     kind, name = ending.replace(".encrypted", "encrypted "), path.with_suffix(".goo").name
     make = f"convert {name}" if path.name == name else f"make {name} and convert it"
     return f"{printer.title} reads {kind} files, which are not written: {make} with UVtools"
+
+
+def is_convertible(output: str | Path) -> bool:
+    """True for a file of pictures that UVtools converts to formats that are not written here."""
+    return Path(output).suffix.lower() in (".goo", ".sl1")
 
 
 def write_slices(run: SliceRun, path: str | Path, name: str | None = None) -> Path:

@@ -17,7 +17,7 @@ from ..common.tables import read_table, read_text
 from ..errors import ExportError
 from ..formulas.parameters import REQUIRED, Count, Label, Number
 from ..formulas.records import attribute, from_table, validate
-from ..slicing.printers import Printer
+from ..slicing.printers import PRINTERS, Printer
 
 
 @dataclass(frozen=True)
@@ -79,8 +79,8 @@ class Resin:
         return self.bottom_exposure + share * (self.exposure - self.bottom_exposure)
 
     def seconds(self, layers: int) -> float:
-        """Duration of a print."""
-        motion = 60 * self.lift * (1 / self.lift_speed + 1 / self.retract_speed)
+        """Duration of a print, without the motion of a vat that tilts by itself."""
+        motion = 60 * self.lift * (1 / self.lift_speed + 1 / self.retract_speed) if self.lift > TILT else 0.0
         return float(self.exposures(layers).sum() + layers * (motion + self.wait))
 
 
@@ -133,11 +133,26 @@ def default_resin(printer: Printer, layer: float) -> Resin | None:
     Returns
     -------
     Resin or None
-        Settings for the nearest layer height; None if the maker publishes none.
+        Settings for the nearest layer height; where the maker publishes none, `START` for a printer of the
+        table, to calibrate it, and None for another one.
     """
     if printer.settings:
         return moving(of_table(printer.name, dict(printer.settings)), printer, printer.settings)
-    return resin(MAKERS, printer, layer) if MAKERS in _table().get(printer.name, {}) else None
+    if MAKERS in _table().get(printer.name, {}):
+        return resin(MAKERS, printer, layer)
+    return moving(START, printer) if printer.name in PRINTERS else None
+
+
+def resin_names(printer: Printer | None) -> list[str]:
+    """Names of the resins of the table for a printer, or for any.
+
+    Parameters
+    ----------
+    printer : Printer or None
+        The printer; None for all.
+    """
+    tables = _table().values() if printer is None else [_table().get(printer.name, {})]
+    return sorted({name for table in tables for name in table})
 
 
 def moving(resin: Resin, printer: Printer | None, but: Collection[tuple[str, Any]] = ()) -> Resin:
@@ -207,6 +222,12 @@ def _table() -> dict[str, dict[str, dict[float, tuple[float, float]]]]:
         heights[float(row["layer_mm"])] = float(row["exposure_s"]), float(row["bottom_s"])
     return table
 
+
+TILT = 0.1
+"""Lift below which the vat tilts, mm: its firmware alone knows how long that takes."""
+
+START = Resin(3.0, 30.0, bottom_layers=4, transition_layers=0)
+"""Where to start with a resin that no table has: the defaults of UVtools (FileFormat.cs)."""
 
 MAKERS = "Prusa Orange Tough"
 """Resin that is the default of its printers."""

@@ -45,6 +45,7 @@ READERS = {
     "sl1": (readers.sl1, lambda image: image),
     "goo": (readers.goo, lambda image: image),
     "ctb": (readers.ctb, lambda image: image >> 1),
+    "cbddlp": (readers.ctb, lambda image: (image.astype(int) + 32) // 64),
     "pwmx": (readers.photon, quantised(4)),
     "nanodlp": (readers.nanodlp, lambda image: image),
 }

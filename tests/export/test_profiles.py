@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from fracslice.errors import ExportError, SliceError
-from fracslice.export.layer_files import ENDINGS, printers_file
+from fracslice.export.layer_files import ENDINGS, printers_file, slice_format
 from fracslice.export.resins import Resin, default_resin, resin
 from fracslice.slicing import printers
 from fracslice.slicing.printers import PRINTERS, printer
@@ -78,13 +78,46 @@ def test_which_file_a_printer_reads(name: str, output: str, expected: str) -> No
     assert printers_file(printer(name), output) == expected
 
 
+def test_encrypted_files_are_not_written_as_plain_ones(tmp_path: Path) -> None:
+    with pytest.raises(ExportError, match=r"encrypted [.]ctb files are not written"):
+        slice_format(tmp_path / "a.encrypted.ctb")
+
+
+@pytest.mark.parametrize(
+    ("name", "file", "version", "lift", "wait"),
+    [
+        ("photon", "photon", 2, 5, 0),
+        ("photon-mono", "pwmo", 1, 6, 2.5),
+        ("photon-mono-se", "pwms", 1, 6, 2.5),
+        ("photon-mono-sq", "pmsq", 1, 8, 2.5),
+        ("photon-mono-x", "pwmx", 1, 8, 2.5),
+        ("photon-ultra", "dlp", 1, 5, 2.5),
+        ("photon-x", "pwx", 1, 8, 2.5),
+        ("photon-zero", "pw0", 1, 6, 2.5),
+        ("sonic-mighty-4k", "ctb", 3, 6, 0),
+        ("mars-5-ultra", "encrypted.ctb", 1, 0.05, 0),
+        ("saturn-4-ultra", "encrypted.ctb", 1, 0.05, 0),
+        ("saturn-4-ultra-16k", "encrypted.ctb", 1, 0.05, 0),
+    ],
+)
+def test_motion_is_that_of_the_source(name: str, file: str, version: int, lift: float, wait: float) -> None:
+    """Figures of UVtools' profiles, folder PrusaSlicer/printer."""
+    machine = printer(name)
+    assert (machine.file, machine.motion[0], machine.motion[3]) == (file, lift, wait)
+    assert file.startswith("encrypted") or machine.version == version
+    start = default_resin(machine, 0.05)
+    assert start and start.seconds(1000) < 1000 * 25
+
+
 def test_exposures_are_the_resins_and_the_layers() -> None:
     result = [default_resin(printer(name), layer) for name in ("sl1", "sl1s") for layer in (0.025, 0.05, 0.1)]
     assert [(r.exposure, r.bottom_exposure) for r in result if r] == [
         *((6, 35), (7.5, 35), (13, 45)),
         *((1.8, 25), (2, 25), (2.6, 25)),
     ]
-    assert default_resin(printer("mars-5"), 0.05) is None
+    assert all(default_resin(machine, 0.05) for machine in PRINTERS.values())
+    start = default_resin(printer("mars-5"), 0.05)
+    assert start and (start.exposure, start.bottom_exposure, start.bottom_layers) == (3, 30, 4)
     assert resin("Siraya Tech Fast Grey", printer("sl1"), 0.06).exposure == 10
     with pytest.raises(ExportError, match=r"did you mean .Siraya Tech Fast Grey."):
         resin("Siraya Fast Gray", printer("sl1"), 0.05)
