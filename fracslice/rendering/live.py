@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Iterator, Sequence
@@ -27,6 +28,8 @@ COARSEST = 8
 """Largest spacing of a draft's pixels."""
 READABLE = 4
 """Samples per pixel from which the final picture replaces the draft: fewer are noisier."""
+FARTHEST = 100.0
+"""Distance from the first target that a flight keeps within, in distances of the first eye."""
 LONGEST = 0.1
 """Longest step of a flight, seconds: the camera rests while a kernel is compiled."""
 
@@ -111,6 +114,7 @@ class Live:
         self._file = WatchedFile(self._path)
         self._load(self._read(), None)
         self.first = self.camera
+        self._farthest = FARTHEST * math.dist(self.first.eye, self.first.target)
         self._open = True
         self._failure: BaseException | None = None
         self._thread = threading.Thread(target=self._run, name="fracslice live", daemon=True)
@@ -212,7 +216,10 @@ class Live:
         with self._lock:
             now = time.monotonic()
             seconds, self._stepped = min(now - self._stepped, LONGEST), now
-            self._aim = self._camera_input.flown(self._aim, self.shown.distance, seconds)
+            distance = min(self.shown.distance, self._farthest)
+            aim = self._camera_input.flown(self._aim, distance, seconds)
+            if math.dist(aim.eye, self.first.target) < self._farthest:
+                self._aim = aim
             return self._aim
 
     def _draft(self, drafts: Follower, camera: Camera | None, size: tuple[int, int]) -> None:

@@ -24,6 +24,8 @@ MOVES = {
 """Axis and direction of each key that moves or turns the camera while it is held."""
 PACES = {str(digit): 2.0 ** (digit - 5) for digit in range(1, 10)}
 """Pace of each speed key: 5 is 1, and the next one is twice as fast."""
+SLOWEST = 2.0**-10
+"""Slowest pace; the fastest one is its inverse."""
 RELEASE = 0.05
 """Delay, in seconds, after which a key release counts: key repeat sends releases and presses continuously."""
 
@@ -61,6 +63,14 @@ class Controls:
         self.pace = PACES.get(key, self.pace)
         if key in MOVES:
             self._held[key] = None
+
+    def hurry(self, factor: float) -> None:
+        """Multiply the pace, within `SLOWEST` and its inverse."""
+        self.pace = min(max(self.pace * factor, SLOWEST), 1 / SLOWEST)
+
+    def let_go(self) -> None:
+        """Release all keys at once."""
+        self._held.clear()
 
     def release(self, key: str) -> None:
         """Release a key once `RELEASE` seconds pass without a press.

@@ -170,7 +170,7 @@ class Viewer:
 
     def hurry(self, factor: float) -> None:
         """Multiply the pace."""
-        self.controls.pace *= factor
+        self.controls.hurry(factor)
 
     def grasp(self, at: tuple[int, int] | None) -> None:
         """Begin or end a drag; mouse look ends by its key only.
@@ -210,6 +210,8 @@ class Viewer:
     def reset(self) -> None:
         """Return to the first view, unless the camera is locked."""
         if not self.controls.locked:
+            self.controls.let_go()  # a key that was just released would move on from there
+            self.live.steer(self.controls.input)
             self.live.look(self.live.first)
 
     def save(self) -> None:

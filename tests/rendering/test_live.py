@@ -15,6 +15,7 @@ from fracslice.errors import SceneError
 from fracslice.rendering.live import Live
 from fracslice.rendering.steering import CameraInput
 from fracslice.scene.view import Camera
+from fracslice.viewer.controls import Controls
 from fracslice.work import Work
 
 SCENE = '<scene version="1"><solid size="80mm">{}</solid><camera eye="3 -2 1"/><film samples="4"/></scene>'
@@ -61,6 +62,29 @@ def test_a_flight_never_gets_there() -> None:
     aside = CameraInput(1, 1, 1, pace=1e3).flown(Camera(eye=(3, 0, 0), target=(0, 0, 0)), 2.0, 1.0)
     assert np.hypot.reduce(np.subtract(aside.eye, (3, 0, 0))) == pytest.approx(1.0)
     assert CameraInput(pace=3).flown(camera, 1.0, 1.0) == camera
+
+
+def test_a_flight_away_ends_within_sight_of_the_first_view(live: Live) -> None:
+    live.steer(CameraInput(forward=-1, pace=1e3))
+    start = np.linalg.norm(live.first.eye)
+    within(lambda: np.linalg.norm(live.camera.eye) > 30 * start)
+    live.steer(CameraInput(forward=-1, right=1, pace=2e3))
+    time.sleep(0.5)
+    assert np.linalg.norm(live.camera.eye) < 101 * start
+    live.steer(CameraInput())
+    live.look(live.first)
+    within(lambda: live.camera == live.first)
+
+
+def test_keys_are_let_go_at_once_and_the_pace_has_limits() -> None:
+    controls = Controls()
+    controls.press("d")
+    controls.release("d")
+    controls.let_go()
+    assert controls.input == CameraInput()
+    for _ in range(1000):
+        controls.hurry(1.5)
+    assert 0 < controls.pace < 1e4
 
 
 def test_it_sharpens_and_follows_the_pilot(live: Live) -> None:
