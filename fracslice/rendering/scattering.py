@@ -63,7 +63,14 @@ def onward(linker: Linker, drawn: Drawn, look: Look, weighted: bool) -> list[str
         Kernel source lines for the throughput t, the origin o, the direction e, the side es and the density
         eq.
     """
-    for function in (shade.mirrored, shade.fresnel, shade.bent, shade.goes_on, shade.reflects):
+    for function in (
+        shade.mirrored,
+        shade.fresnel,
+        shade.dielectric,
+        shade.bent,
+        shade.goes_on,
+        shade.reflects,
+    ):
         linker.share(function)
     (u,) = drawn.names(1) if look.inside else ("t",)
     lines, out = ["eq = 0.0 * t"], ""
@@ -110,7 +117,8 @@ def lacquered(linker: Linker, colour: list[str]) -> list[str]:
     list of str
         Kernel source lines that add to the reflection of the lacquer.
     """
-    linker.share(shade.lacquer)
+    for function in (shade.dielectric, shade.lacquer):
+        linker.share(function)
     lines = [f"spark, slope = highlight(nx, ny, nz, dx, dy, dz, lx, ly, lz, {glossy.LACQUER})"]
     return lines + [
         f"glaze{c} = glaze{c} + power * {s} * spark * lacquer(slope, coat)"
@@ -120,7 +128,8 @@ def lacquered(linker: Linker, colour: list[str]) -> list[str]:
 
 def _lacquered(linker: Linker, drawn: Drawn) -> list[str]:
     """Lines that choose between the reflection of a lacquer and the ray of the material under it."""
-    linker.share(shade.lacquer)
+    for function in (shade.dielectric, shade.lacquer):
+        linker.share(function)
     (u,) = drawn.names(1)
     lines = [
         "lacquer_ = lacquer(facing, coat)",

@@ -15,7 +15,7 @@ from fracslice.rendering import Pass, Renderer, develop, progressive
 from fracslice.rendering.units.fog import height_fog
 from fracslice.rendering.units.lights import sky
 from fracslice.rendering.units.pixel import linear
-from fracslice.rendering.units.shade import fresnel
+from fracslice.rendering.units.shade import dielectric, goes_on, lacquer
 from fracslice.scene.view import Camera, Film, Fog, Light, Shading, View
 from fracslice.work import Work
 from tests.rendering.rays import directions
@@ -71,7 +71,7 @@ def test_a_glass_ball_shows_the_sky_by_the_laws_of_refraction() -> None:
     cosine = np.maximum(-(d * normal).sum(2, keepdims=True), 0)
     bent = np.sqrt(1 - (1 - cosine**2) / index**2)
     inside = d / index + (cosine / index - bent) * normal
-    outer, inner = (fresnel(c, ((index - 1) / (index + 1)) ** 2) for c in (cosine, bent))
+    outer, inner = dielectric(cosine, bent**2, 1 / index), dielectric(bent, cosine**2, index)
     light = outer * seen(d + 2 * cosine * normal)
     weight = 1 - outer
     for _ in range(3):
@@ -84,6 +84,43 @@ def test_a_glass_ball_shows_the_sky_by_the_laws_of_refraction() -> None:
     ratio = blocks[0][blocks[1] > 30] / blocks[1][blocks[1] > 30]
     assert ratio.size > 50
     assert abs(ratio - 1).mean() < 0.01 and abs(ratio.mean() - 1) < 0.005
+
+
+@pytest.mark.parametrize(("degrees", "expected"), [(0, 0.04), (45, 0.0502), (60, 0.0892), (75, 0.2531)])
+def test_glass_reflects_as_fresnel_says_from_both_sides(degrees: float, expected: float) -> None:
+    cosine, index = np.cos(np.radians(degrees)), 1.5
+    left = 1 - (1 - cosine**2) / index**2
+    assert dielectric(cosine, left, 1 / index) == pytest.approx(expected, abs=1e-4)
+    assert dielectric(np.sqrt(left), cosine**2, index) == pytest.approx(expected, abs=1e-4)
+    assert lacquer(cosine, 0.5) == pytest.approx(expected / 2, abs=1e-4)
+
+
+def test_of_two_panes_a_slab_passes_what_both_leave() -> None:
+    """Reflections inside included: (1 - R) / (1 + R)."""
+    cosine = np.cos(np.radians(75))
+    part = dielectric(cosine, 1 - (1 - cosine**2) / 2.25, 1 / 1.5)
+    assert (1 - part) / (1 + part) == pytest.approx(0.60, abs=0.005)
+
+
+def test_total_reflection_and_a_solid_of_hardly_any_index() -> None:
+    ray = np.sin(np.radians(50)), 0.0, -np.cos(np.radians(50))
+    for side, index, out in ((-1.0, 1.5, 1.0), (1.0, 1.5, -1.0), (1.0, 1.0001, -1.0), (-1.0, 1.0001, -1.0)):
+        *_, passed = goes_on(*ray, 0.0, 0.0, 1.0, np.float64(side), 0.0, 1.0, index, 0.2)
+        assert passed == out
+    assert dielectric(1e-3, 1 - (1 - 1e-6) / 1.0001**2, 1 / 1.0001) < 0.8
+
+
+def test_a_thin_gap_under_glass_is_not_passed() -> None:
+    """A box of glass, a twentieth of its width above a table, had black bands."""
+    table = material(
+        transform(box(size=(20, 20, 0.2)), translate=(0, 0, -0.7)), colour=(0.9, 0.4, 0.1), specular=0
+    )
+    glass = material(box(size=(2, 2, 1)), colour=(0, 0, 0), specular=0, clear=1, index=1.5)
+    camera, white = Camera(eye=(3, -4, 3), target=(0, 0, 0.5), fov=20), (1.0, 1.0, 1.0)
+    sky = Light(kind="sky", colour=white, horizon=white, ground=white, strength=0.7)
+    view = View(camera=camera, lights=(sky,), shading=Shading(bounces=16, paths="yes"))
+    image = rendered(union(table, glass), view, 32, (96, 72)).image[20:36, 30:66, 0]  # its top
+    assert image.reshape(4, 4, 9, 4).mean((1, 3)).min() > 0.3
 
 
 def seen(d: np.ndarray) -> np.ndarray:

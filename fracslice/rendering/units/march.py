@@ -53,8 +53,9 @@ def advance(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness,
     sign over less than two pixels, or within an empty ball, where only rounding causes it. The root is that
     of the secant.
 
-    Inside the solid (side -1), the field of a fractal is no useful bound: steps are at least two pixels, and
-    a step that leaves the solid by more is repeated up to the secant's root.
+    Inside the solid (side -1), the field of a fractal is no useful bound: steps are at least two pixels. Longer
+    ones obey the same rule, so that no gap is passed; a step that leaves the solid by more is repeated up to
+    the secant's root.
 
     Parameters
     ----------
@@ -84,10 +85,12 @@ def advance(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness,
         inside = side < 0.0
         beyond = inside & (radius < 0.0)
         near_exit = beyond & (stride <= 4.0 * near)
-        kept = (kept | inside) & ((radius >= 0.0) | (side > 0.0) | near_exit)
-        hit = near_exit | (hit & (side > 0.0))
+        sure = (before + absolute(radius) >= stride) | (stride <= 4.0 * near)
+        outside = side > 0.0
+        kept = (outside & kept) | (inside & sure & ((radius >= 0.0) | near_exit))
+        hit = near_exit | (hit & outside)
         step = where(inside, maximum(step, 4.0 * near), step)
-        back = where(beyond, maximum(stride + ahead - 2.0 * near, 0.5 * (stride + ahead)), before)
+        back = where(beyond & sure, maximum(stride + ahead - 2.0 * near, 0.5 * (stride + ahead)), before)
         after = where(kept, t + step, t - stride + back)
         after = where(hit, t + where(radius < 0.0, ahead, 0.0), after)
         return after, where(kept, radius, before), where(kept, step, back), where(hit, -1.0, 1.0)

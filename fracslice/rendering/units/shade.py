@@ -102,7 +102,8 @@ def lacquer(facing, coat):
     coat : float
         Strength of the lacquer.
     """
-    return coat * fresnel(facing, 0.04)
+    cosine = minimum(maximum(facing, 0.0), 1.0)
+    return coat * dielectric(cosine, 1.0 - (1.0 - cosine * cosine) / 2.25, 1.0 / 1.5)
 
 
 def mirrored(dx, dy, dz, nx, ny, nz):
@@ -122,6 +123,24 @@ def fresnel(cosine, least):
     a = 1.0 - minimum(maximum(cosine, 0.0), 1.0)
     a2 = a * a
     return least + (1.0 - least) * a2 * a2 * a
+
+
+def dielectric(cosine, left, ratio):
+    """Reflectance of a transparent surface for unpolarised light (Fresnel 1823).
+
+    Parameters
+    ----------
+    cosine : float
+        Cosine of the angle of incidence.
+    left : float
+        Square of the cosine of the angle of refraction; negative for total internal reflection.
+    ratio : float
+        Ratio of the refractive indices, near side to far side.
+    """
+    on = sqrt(maximum(left, 0.0))
+    across = (ratio * cosine - on) / maximum(ratio * cosine + on, 1e-9)
+    along = (cosine - ratio * on) / maximum(cosine + ratio * on, 1e-9)
+    return where(left > 0.0, 0.5 * (across * across + along * along), 1.0)
 
 
 def bent(dx, dy, dz, nx, ny, nz, cosine, ratio):
@@ -185,11 +204,10 @@ def goes_on(dx, dy, dz, nx, ny, nz, side, reflect, clear, index, chance):
         -1 if the ray passes through the surface, 1 if it is reflected.
     """
     cosine = -(dx * nx + dy * ny + dz * nz)
-    glass = (index - 1.0) / (index + 1.0)
     mirror = where(reflect > 0.0, fresnel(cosine, reflect), 0.0)
     ratio = where(side < 0.0, index + 0.0 * cosine, 1.0 / (index + 0.0 * cosine))
     bx, by, bz, left = bent(dx, dy, dz, nx, ny, nz, cosine, ratio)
-    back = maximum(fresnel(cosine, maximum(glass * glass, reflect)), where(left < 0.0, 1.0, 0.0 * left))
+    back = maximum(dielectric(maximum(cosine, 0.0), left, ratio), mirror)
     through = (clear > 0.0) & (chance > back)
     rx, ry, rz = mirrored(dx, dy, dz, nx, ny, nz)
     share = where(clear > 0.0, clear + 0.0 * cosine, mirror)
