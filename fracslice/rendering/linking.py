@@ -147,7 +147,8 @@ class _Frame:
         hi = tuple(min(a, e + seen.far) for a, e in zip(box.hi, self.camera.eye, strict=True))
         self.linker.bind("span_box", march.span, {"lo": lo, "hi": hi})
         width = {"cone": seen.cone, "least": seen.least}
-        stepping = {"steepness": steepness, **width, "glass": Fixed(self.inside)}
+        rounded = {"rounding": seen.rounding, "glass": Fixed(self.inside)}
+        stepping = {"steepness": steepness, **width, **rounded}
         self.linker.bind("step_ray", march.advance, stepping)
         self.linker.bind("step_cone", march.widen, {"steepness": steepness})
         self.linker.bind("width_at", _width, width)

@@ -20,8 +20,10 @@ class Optics:
     cone : float
         Half width of a pixel at distance 1.
     least : float
-        Smallest hit tolerance, scene units: the rounding error of positions, or half the width of a pixel of
-        parallel rays.
+        Half width of a pixel at distance 0, scene units: half a pixel of parallel rays, or the rounding of
+        positions.
+    rounding : float
+        Rounding error of positions, scene units.
     far : float
         Distance beyond which the scene is empty, scene units.
     origin : tuple of int
@@ -31,6 +33,7 @@ class Optics:
     size: tuple[int, int]
     cone: float
     least: float
+    rounding: float
     far: float
     origin: tuple[int, int] = (0, 0)
 
@@ -108,4 +111,4 @@ def optics(camera: Camera, size: tuple[int, int], root: Node, least: float) -> O
     growth, base = footprint(camera, size)
     if base:  # parallel rays start at the whole film
         far += base * math.hypot(*size) / 2
-    return Optics(size, growth / 2, max(least, base / 2), far + camera.stereo)
+    return Optics(size, growth / 2, max(least, base / 2), least, far + camera.stereo)

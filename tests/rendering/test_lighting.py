@@ -123,6 +123,33 @@ def test_a_thin_gap_under_glass_is_not_passed() -> None:
     assert image.reshape(4, 4, 9, 4).mean((1, 3)).min() > 0.3
 
 
+@pytest.mark.parametrize(("height", "error"), [(6, 0.2), (18, 0.05)])
+def test_a_glowing_ball_is_as_bright_in_parallel_rays(height: int, error: float) -> None:
+    """L (r / d)^2 cos, the mean over four pixels, but for the height at which rays go on, 1.5 pixels.
+
+    Rays within half a pixel of the ball met it: it was three times as bright at 6 rows.
+    """
+    radius, light = 0.1, 5.0
+    floor = material(transform(box(size=(40, 40, 1)), translate=(0, 0, -0.5)), colour=(1, 1, 1), specular=0)
+    ball = material(
+        transform(sphere(radius=radius), translate=(0, 0, 1)), colour=(1, 1, 1), glow=light, specular=0
+    )
+    camera = Camera(kind="orthographic", eye=(0, -4, 2), target=(0, -1, 0), fov=20)
+    dark = Light(kind="sky", colour=(0, 0, 0), horizon=(0, 0, 0), ground=(0, 0, 0))
+    view = View(camera=camera, lights=(dark,), shading=Shading(bounces=1, paths="yes"))
+    width = height * 4 // 3
+    image = rendered(union(floor, ball), view, 300_000 // (width * height), (width, height)).image
+    middle = slice(height // 2 - 1, height // 2 + 1), slice(width // 2 - 1, width // 2 + 1)
+    pixel = 2 * np.tan(np.radians(10)) / height * np.sqrt(13)
+    u, v = np.meshgrid(*[(np.arange(64) + 0.5) / 32 - 1] * 2) * np.array(pixel)
+    away = np.array([0.0, 3, -2]) / np.sqrt(13)
+    points = np.array([0.0, -1, 0]) + u[..., None] * [1, 0, 0] + v[..., None] * np.cross([1, 0, 0], away)
+    points = points - points[..., 2:] / away[2] * away
+    distance = np.linalg.norm(points - [0, 0, 1], axis=-1)
+    expected = (light * (radius / distance) ** 2 / distance).mean()
+    assert image[middle][..., 0].mean() == pytest.approx(expected, rel=error)
+
+
 def seen(d: np.ndarray) -> np.ndarray:
     """Light of the sky."""
     colours = (linear(c) for c in (SKY.colour, SKY.horizon, SKY.ground))

@@ -40,7 +40,9 @@ def span(ox, oy, oz, dx, dy, dz, lo, hi):
     return maximum(enter, 0.0), leave
 
 
-def advance(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness, cone, least, glass):
+def advance(
+    ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness, cone, least, rounding, glass
+):  # fmt: skip
     """Take one step of safe, over-relaxed sphere tracing.
 
     Sphere tracing: Hart 1996, "Sphere Tracing". Over-relaxation: Keinert et al. 2014, "Enhanced Sphere
@@ -53,14 +55,14 @@ def advance(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness,
     sign over less than two pixels, or within an empty ball, where only rounding causes it. The root is that
     of the secant.
 
-    Inside the solid (side -1), the field of a fractal is no useful bound: steps are at least two pixels. Longer
-    ones obey the same rule, so that no gap is passed; a step that leaves the solid by more is repeated up to
-    the secant's root.
+    Inside the solid (side -1), the field of a fractal is no useful bound: steps are at least two pixels.
+    Longer ones obey the same rule, so that no gap is passed; a step that leaves the solid by more is repeated
+    up to the secant's root.
 
     Parameters
     ----------
-    cone, least : float
-        Half width of a pixel at distance 1; resolution of positions.
+    cone, least, rounding : float
+        Half width of a pixel at distance 1 and at distance 0; resolution of positions.
     glass : bool
         True if rays may be inside the solid.
 
@@ -76,7 +78,7 @@ def advance(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness,
     near = cone * (path + t) + least
     fall = maximum(before - radius, 1e-30)
     ahead = radius * stride / fall
-    hit = (radius < least) & (stride <= maximum(before, 4.0 * near))
+    hit = (radius < rounding) & (stride <= maximum(before, 4.0 * near))
     kept = maximum(radius, 0.0) + before >= stride
     relax = maximum(MOST * stride / (stride + fall), 1.0)
     step = relax * radius
