@@ -182,7 +182,9 @@ def layers_amount(slicer: Slicer, work: Work) -> Completeness:
     stack = slicer.stack
     starts = np.arange(0, len(stack.z), SLAB)
     chosen = [s.tolist() for s in np.split(np.arange(len(stack.z)), starts[1:])]
-    chosen = [chosen[k] for k in np.unique(np.linspace(0, len(starts) - 1, SLABS).round().astype(int))]
+    chosen = [
+        chosen[k] for k in sorted(set(np.linspace(0, len(starts) - 1, SLABS).round().astype(int).tolist()))
+    ]
     layers = [layer for slab in chosen for layer in slab]
     for _ in slicer.map(lambda layer: layer.area, [k for k in layers if k not in slicer.areas]):
         pass  # the slicer keeps the areas
