@@ -31,6 +31,8 @@ from .subdivision import Edges, cut, edges_of
 from .tip_triangles import tips_to_end
 from .topology import component_sizes
 
+NEAR = 1e-3
+"""Distance between vertices, voxels, below which rounding may join them."""
 LARGE = 1 << 24
 """Triangles above which a surface stays as it is: pieces that sharp edges span are joined, in memory."""
 
@@ -132,7 +134,24 @@ def with_ridges(
         own = [Cap(c.old - start, c.fan) for c in caps if 0 <= c.old[0] - start < len(part.triangles)]
         part, _, fresh = tips_to_end(capped(part, own) if own else part, points)
         result.add(Piece(part, pieces.ends[last - 1]), fresh)
-    return result, points
+    sound = _are_apart(result.mesh(0), made.new_vertices(), NEAR * planned.voxel) and _is_sound(result, work)
+    return (result, points) if sound else (pieces, tips)
+
+
+def _are_apart(mesh: Mesh, points: NDArray[np.float64], least: float) -> bool:
+    """True if no other vertex is as near to one of the points: where bodies touch, both have an edge there."""
+    from scipy.spatial import cKDTree
+
+    near = cKDTree(mesh.vertices).query_ball_point(points, least, return_length=True)
+    return bool((near <= 1).all())
+
+
+def _is_sound(pieces: Pieces, work: Work) -> bool:
+    """True if a surface is a closed manifold without self-intersections once it is rounded."""
+    from .check import check_mesh
+    from .quantisation import quantised
+
+    return check_mesh(quantised(pieces.mesh(0)), threads=work.threads).printable
 
 
 def _creased(
