@@ -134,12 +134,13 @@ def with_ridges(
         own = [Cap(c.old - start, c.fan) for c in caps if 0 <= c.old[0] - start < len(part.triangles)]
         part, _, fresh = tips_to_end(capped(part, own) if own else part, points)
         result.add(Piece(part, pieces.ends[last - 1]), fresh)
-    sound = _are_apart(result.mesh(0), made.new_vertices(), NEAR * planned.voxel) and _is_sound(result, work)
+    least = NEAR * planned.voxel
+    sound = _are_apart(result.mesh(0), made.new_vertices(), least) and _is_sound(result, work)
     return (result, points) if sound else (pieces, tips)
 
 
 def _are_apart(mesh: Mesh, points: NDArray[np.float64], least: float) -> bool:
-    """True if no other vertex is as near to one of the points: where bodies touch, both have an edge there."""
+    """True if no other vertex is as near to a point: where bodies touch, both have an edge there."""
     from scipy.spatial import cKDTree
 
     near = cKDTree(mesh.vertices).query_ball_point(points, least, return_length=True)
