@@ -28,11 +28,11 @@ def test_a_flake_whose_corners_touch_is_joined_by_the_thickness_that_its_report_
 
 
 def test_one_line_says_what_is_lost_and_which_options_help() -> None:
-    """A tetrahedron of four voxels breaks into its middle and four tips, which are dust."""
+    """A tetrahedron of four voxels is sampled as its middle and four tips; its sharp edges hold most tips."""
     root = flake(solid="tetrahedron", level=3)
     made = make_mesh(root, size="60mm", resolution=32)
     assert made.report.mesh.components == 64
-    assert made.report.removed.bodies == 4 * 64
+    assert made.report.removed.bodies <= 4
     (note,) = made.report.notes
     assert re.match(
         r"60 bodies come within two voxels .* --set flake\.level=1 makes them about 8 voxels wide or more, "
