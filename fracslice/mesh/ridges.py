@@ -31,7 +31,7 @@ from .subdivision import Edges, cut, edges_of
 from .tip_triangles import tips_to_end
 from .topology import component_sizes
 
-NEAR = 1e-3
+APART = 5e-5
 """Distance between vertices, voxels, below which rounding may join them."""
 LARGE = 1 << 24
 """Triangles above which a surface stays as it is: pieces that sharp edges span are joined, in memory."""
@@ -134,7 +134,7 @@ def with_ridges(
         own = [Cap(c.old - start, c.fan) for c in caps if 0 <= c.old[0] - start < len(part.triangles)]
         part, _, fresh = tips_to_end(capped(part, own) if own else part, points)
         result.add(Piece(part, pieces.ends[last - 1]), fresh)
-    least = NEAR * planned.voxel
+    least = APART * planned.voxel
     sound = _are_apart(result.mesh(0), made.new_vertices(), least) and _is_sound(result, work)
     return (result, points) if sound else (pieces, tips)
 

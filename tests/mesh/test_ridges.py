@@ -87,7 +87,7 @@ def test_edges_of_solids(sides: np.ndarray, turn: tuple[float, float, float, flo
     _, sharp, voxel = made(root, 64)
     away = off(sharp, edges, voxel)
     assert np.quantile(away, 0.99) < 0.05
-    assert np.quantile(away, 0.999) < 0.1
+    assert away.max() < 0.15
     report = check_mesh(quantised(sharp))
     assert report.printable and report.components == 1
 

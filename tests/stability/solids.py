@@ -29,7 +29,7 @@ def outcome(root: Node, resolution: float, threads: int = 1) -> Outcome:
         result = make_mesh(scene(root, size="50mm"), MeshJob(resolution=resolution), Work(threads=threads))
     except FracsliceError as error:
         return Outcome(refused=str(error))
-    report, actual = result.report.mesh, list(result.report.problems)
+    report, actual = result.report.mesh, list(result.report.mesh.problems)
     for name in ("watertight", "manifold", "oriented"):
         if not getattr(report, name):
             actual.append(f"not {name}")
