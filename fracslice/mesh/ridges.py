@@ -32,7 +32,7 @@ from .tip_triangles import tips_to_end
 from .topology import component_sizes
 
 APART = 5e-5
-"""Distance between vertices, voxels, below which rounding may join them."""
+"""Distance between vertices, voxels, below which rounding may join them; contouring keeps twice that."""
 LARGE = 1 << 24
 """Triangles above which a surface stays as it is: pieces that sharp edges span are joined, in memory."""
 
@@ -122,7 +122,7 @@ def with_ridges(
     crumb = _crumbs(mesh, planned.voxel)
     whole = Mesh(mesh.vertices, mesh.triangles[crumb < 0]).in_order()
     made = _Sharpening(planned, whole, tips, work).made()
-    if made is None:
+    if made is None or not made.is_apart(APART * planned.voxel):
         return pieces, tips
     caps = [Cap(numbers[crumb < 0][cap.old], cap.fan) for cap in made.caps()]
     for one in np.unique(crumb[crumb >= 0]):
@@ -134,25 +134,7 @@ def with_ridges(
         own = [Cap(c.old - start, c.fan) for c in caps if 0 <= c.old[0] - start < len(part.triangles)]
         part, _, fresh = tips_to_end(capped(part, own) if own else part, points)
         result.add(Piece(part, pieces.ends[last - 1]), fresh)
-    least = APART * planned.voxel
-    sound = _are_apart(result.mesh(0), made.new_vertices(), least) and _is_sound(result, work)
-    return (result, points) if sound else (pieces, tips)
-
-
-def _are_apart(mesh: Mesh, points: NDArray[np.float64], least: float) -> bool:
-    """True if no other vertex is as near to a point: where bodies touch, both have an edge there."""
-    from scipy.spatial import cKDTree
-
-    near = cKDTree(mesh.vertices).query_ball_point(points, least, return_length=True)
-    return bool((near <= 1).all())
-
-
-def _is_sound(pieces: Pieces, work: Work) -> bool:
-    """True if a surface is a closed manifold without self-intersections once it is rounded."""
-    from .check import check_mesh
-    from .quantisation import quantised
-
-    return check_mesh(quantised(pieces.mesh(0)), threads=work.threads).printable
+    return result, points
 
 
 def _creased(
@@ -330,6 +312,14 @@ class _Sharpened:
         """Vertices that were added and are used, [k, 3]."""
         taken = np.unique(self.mesh.triangles)
         return self.mesh.vertices[taken[taken >= len(self.old.vertices)]]
+
+    def is_apart(self, least: float) -> bool:
+        """True if no other vertex is as near to a new one: where bodies touch, both have an edge there."""
+        from scipy.spatial import cKDTree
+
+        used = self.mesh.vertices[np.unique(self.mesh.triangles)]
+        near = cKDTree(used).query_ball_point(self.new_vertices(), least, return_length=True)
+        return bool((near <= 1).all())
 
     def caps(self) -> list[Cap]:
         """What is replaced by what; connected parts apart."""
