@@ -26,6 +26,7 @@ demo: setup
 test: lint native-tests suite
 
 suite: setup
+	$(BIN)/python -m tests.structure
 	$(BIN)/python -m pytest -n 2 $(SELECT)
 
 native-tests: packages

@@ -7,13 +7,24 @@ from pathlib import Path
 
 import click
 
-from fracslice.common.digits import counted
+from fracslice.common.messages import format_count
 
-from .cluster import ClusterOptions
 from .inputs import check_folder, check_targets, load_scene, refuse_moved, refuse_options
-from .options import DEVICE, SAMPLES, SceneOptions, argument, command, flag, option, output
-from .sizes import PIXELS
-from .value_types import INTERVAL, POSITIVE, Parsed
+from .options import (
+    DEVICE,
+    INTERVAL,
+    PIXELS,
+    POSITIVE,
+    SAMPLES,
+    ClusterOptions,
+    Parsed,
+    SceneOptions,
+    argument,
+    command,
+    flag,
+    option,
+    output,
+)
 
 SMALLER, FEWER = 4, 4
 """Of --preview: divisor of the size, and samples."""
@@ -70,7 +81,15 @@ def animate(given: FilmOptions) -> None:
     fracslice animate my.xml -o film.mp4 --preview
     fracslice animate mandelbulb -o flight.mp4 --fly 10s --size 640x360
     """
-    from fracslice.animation import FilmJob, Timeline, check_film, encode, flown, sheet_frames, write_frames
+    from fracslice.animation import (
+        FilmJob,
+        Timeline,
+        check_film,
+        encode,
+        sheet_frames,
+        with_flight,
+        write_frames,
+    )
     from fracslice.export import replacing
     from fracslice.scene.writer import to_xml
 
@@ -90,7 +109,7 @@ def animate(given: FilmOptions) -> None:
     width, height = given.size or (film.width, film.height)
     samples = given.samples or (FEWER if given.preview else film.samples)
     if given.fly:
-        scene = flown(scene, given.fly, (width, height))
+        scene = with_flight(scene, given.fly, (width, height))
     timeline = Timeline(scene)
     if given.preview:
         width, height = max(width // SMALLER, 1), max(height // SMALLER, 1)
@@ -117,5 +136,5 @@ def animate(given: FilmOptions) -> None:
         if ending:
             encode(paths, target, rate, work)
     if not given.quiet:
-        frames = counted(len(paths), "frame")
+        frames = format_count(len(paths), "frame")
         click.echo(f"{given.output}: {frames} of {width} x {height} pixels, {len(chosen) / rate:.2f} s")

@@ -6,10 +6,8 @@ from pathlib import Path
 
 import click
 
-from .cluster import ClusterOptions
 from .inputs import check_folder
-from .options import command, option
-from .value_types import POSITIVE, Name, Whole
+from .options import POSITIVE, ClusterOptions, Name, Whole, command, option
 
 
 class BenchOptions(ClusterOptions):
@@ -60,8 +58,7 @@ def bench(given: BenchOptions) -> int:
     fracslice bench -o bench --workload sphere --resolution 64
     """
     from fracslice.bench.bench_report import require_plots, write_report
-    from fracslice.bench.measurements import BenchmarkTask, measure
-    from fracslice.bench.peers import Peer
+    from fracslice.bench.measurements import BenchmarkTask, Peer, measure
 
     require_plots()
     chosen = {"workloads": given.workloads, "resolutions": given.resolutions}

@@ -9,21 +9,32 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fracslice.common.digits import counted, decimal, significant
+from fracslice.common.messages import decimal, format_count, significant
 
-from .closing import DENSITIES, of_material
-from .cluster import ClusterOptions
 from .inputs import BadInput, check_targets, is_model, load_model, load_scene, refuse_options
-from .layers import LAYER, PIXEL_MM, LayerOptions, layer_option, printer_option, write_page
-from .options import MeshOptions, argument, command, flag, option
-from .summary import figures, sizes, summary
-from .value_types import LENGTH, Name
+from .options import (
+    LAYER,
+    LENGTH,
+    PIXEL_MM,
+    ClusterOptions,
+    LayerOptions,
+    MeshOptions,
+    Name,
+    argument,
+    command,
+    flag,
+    layer_option,
+    option,
+    printer_option,
+    write_page,
+)
+from .summary import DENSITIES, figures, of_material, sizes, summary
 
 if TYPE_CHECKING:
     from fracslice.formulas.box import Triple
     from fracslice.kernel import Field
     from fracslice.mesh import Mesh
-    from fracslice.printing.limits import Limits
+    from fracslice.printing.problems import Limits
     from fracslice.scene import Print, Scene
     from fracslice.slicing import SliceJob, Stack
     from fracslice.slicing.layer_checks import PrintReport
@@ -76,7 +87,7 @@ class CheckOptions(LayerOptions, MeshOptions, ClusterOptions):
     @property
     def limits(self) -> Limits:
         """Minimum thicknesses of walls and floors."""
-        from fracslice.printing.limits import Limits
+        from fracslice.printing.problems import Limits
 
         return Limits(wall=self.wall, floor=self.floor)
 
@@ -128,7 +139,7 @@ def of_mesh(given: CheckOptions, work: Work) -> Checked:
     problems = (*result.report.problems, *solid.thin)
     hint = "" if problems else "; --layer looks at islands, cups, traps, overhangs and necks, too"
     numbers = result.report.as_dict() | {"solid": solid.as_dict()}
-    return numbers, [summary(given.source, result.report), solid.unseen, judged(problems) + hint], problems
+    return numbers, [summary(given.source, result.report), solid.unseen, verdict(problems) + hint], problems
 
 
 def of_scene(given: CheckOptions, work: Work) -> Checked:
@@ -143,19 +154,19 @@ def of_scene(given: CheckOptions, work: Work) -> Checked:
 def of_model(given: CheckOptions, work: Work) -> Checked:
     """Check the mesh of a model and, if it encloses a volume, its layers."""
     from fracslice.errors import EmptyError, MeshError
-    from fracslice.mesh.check import check_mesh
+    from fracslice.mesh.checks import check_mesh
     from fracslice.mesh.field import MeshField
     from fracslice.scene import Print
     from fracslice.scene.lengths import LARGEST
     from fracslice.volume.sizing import SAME, UP, Sizing
 
-    turned = placed(load_model(given.source), given.up, SAME)
+    turned = place(load_model(given.source), given.up, SAME)
     length = longest(turned) or 1.0
     side = given.size or length
     if side > LARGEST:
         raise BadInput(f"{given.source}: {side:.3g} mm long, more than a kilometre: expected a model in mm")
     x, y, z = (factor * side / length for factor in given.scale)
-    mesh = placed(turned, UP, (x, y, z))
+    mesh = place(turned, UP, (x, y, z))
     try:
         report = check_mesh(mesh, threads=work.threads)
     except MeshError as error:
@@ -182,11 +193,11 @@ def of_model(given: CheckOptions, work: Work) -> Checked:
     except EmptyError:
         finest = f"layer of {layered.layer[0]:.3g} mm has a pixel of {max(layered.pixels):.3g} mm"
         nothing = f"no {finest} inside: all of it is thinner"
-        return numbers, [line, judged([nothing])], (*report.problems, nothing)
+        return numbers, [line, verdict([nothing])], (*report.problems, nothing)
     return numbers | {"layers": layers}, [line, *lines], (*report.problems, *problems)
 
 
-def placed(mesh: Mesh, up: Triple, scale: Triple) -> Mesh:
+def place(mesh: Mesh, up: Triple, scale: Triple) -> Mesh:
     """Mesh turned and scaled."""
     from fracslice.formulas.algebra import product
     from fracslice.volume.sizing import SAME, UP, orientation
@@ -225,7 +236,7 @@ class Attempt:
 def of_layers(of: Scene | Field, size: Sizing, how: Print, given: CheckOptions, work: Work) -> Checked:
     """Check the layers of an object; with --fix, try what mends its problems and keep what helps."""
     check_targets(given.source, given.picture, given.html)
-    first = examined(of, size, how, given.up, (), given, work)
+    first = examine_layers(of, size, how, given.up, (), given, work)
     best, refused = mended_object(of, first, given, work) if given.fix else (first, [])
     if best.shown and given.picture:
         draw(*best.shown, given.picture, work)
@@ -247,7 +258,7 @@ def mended_object(
 
     All settings that the problems name are tried at once, then one by one; then other directions up.
     """
-    from fracslice.printing.problems import mended
+    from fracslice.printing.problems import mend_settings
 
     def tried(of_best: Attempt, settings: dict[str, str], up: Triple) -> Attempt:
         size, values = of_best.size, dict(settings)
@@ -257,9 +268,9 @@ def mended_object(
         how = replace(of_best.how, **{name: kinds[name].read(text) for name, text in values.items()})
         turned = () if up == of_best.up else ("--up " + " ".join(f"{c:g}" for c in up),)
         flags = (*of_best.flags, *(f"--{name} {text}" for name, text in settings.items()), *turned)
-        return examined(of, size, how, up, flags, given, work)
+        return examine_layers(of, size, how, up, flags, given, work)
 
-    settings, best, refused = mended(first.problems), first, list[str]()
+    settings, best, refused = mend_settings(first.problems), first, list[str]()
     choices = [settings] if settings else []
     if len(settings) > 1:
         choices += [{name: text} for name, text in settings.items()]
@@ -277,7 +288,7 @@ def mended_object(
     return best, refused
 
 
-def examined(
+def examine_layers(
     of: Scene | Field,
     size: Sizing,
     how: Print,
@@ -291,8 +302,7 @@ def examined(
     from fracslice.printing.problems import Problem
     from fracslice.scene import Scene
     from fracslice.slicing import SliceJob, Slicer, adapted, plan_stack
-    from fracslice.slicing.layer_checks import check_layers
-    from fracslice.slicing.layer_problems import misfit
+    from fracslice.slicing.layer_checks import check_layers, misfit
 
     machine, (layer, most) = given.machine, given.layer
     sides = size.side, layer, given.pixels, up, how, size.factors, size.unit
@@ -309,13 +319,13 @@ def examined(
     if lost := layers_amount(Slicer(stack, work), work).problems:
         report = replace(report, problems=[*(Problem("lost", text) for text in lost), *report.problems])
     report = of_material(report, given.material)
-    return Attempt(*settings, report.as_dict(), described(report), report.problems, (stack, report))
+    return Attempt(*settings, report.as_dict(), describe_report(report), report.problems, (stack, report))
 
 
 def shared_check(scene: Scene, job: SliceJob, given: CheckOptions, work: Work) -> tuple[Stack, PrintReport]:
     """Check the layers of a scene by the pool of the work."""
     from fracslice.jobs.slice_checks import check_run
-    from fracslice.jobs.slice_recipe import SliceRecipe
+    from fracslice.jobs.slices import SliceRecipe
     from fracslice.scene.writer import to_xml
 
     recipe = SliceRecipe(to_xml(scene), scene.name, job, given.layer[1], printer=given.machine)
@@ -332,9 +342,9 @@ def draw(stack: Stack, report: PrintReport, path: str, work: Work) -> None:
         worst_layers(stack, report.worst, file, work)
 
 
-def described(report: PrintReport) -> str:
+def describe_report(report: PrintReport) -> str:
     """Summary of a print report: figures, a line for each problem, and thin features that layers may miss."""
-    lines = f"{figures_of(report)}, {judged(report.problems)}", report.solid.unseen
+    lines = f"{figures_of(report)}, {verdict(report.problems)}", report.solid.unseen
     return os.linesep.join(filter(None, lines))
 
 
@@ -343,10 +353,10 @@ def figures_of(report: PrintReport) -> str:
     size = " x ".join(map(decimal, report.size))
     ml, g = significant(report.volume / 1000), significant(report.weight_g)
     parts = f"{len(report.bodies)} bodies, " if len(report.bodies) > 1 else ""
-    return f"{counted(report.layers, 'layer')}, {size} mm, {parts}{ml} ml, {g} g"
+    return f"{format_count(report.layers, 'layer')}, {size} mm, {parts}{ml} ml, {g} g"
 
 
-def judged(problems: Sequence[object]) -> str:
+def verdict(problems: Sequence[object]) -> str:
     """Verdict on printability, with a line for each problem."""
     from fracslice.printing.problems import verdict
 

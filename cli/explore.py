@@ -12,9 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from .inputs import check_folder, check_targets, load_scene
-from .options import SceneOptions, argument, command, option, output
-from .sizes import PIXELS
-from .value_types import Parsed, Whole
+from .options import PIXELS, Parsed, SceneOptions, Whole, argument, command, option, output
 
 if TYPE_CHECKING:
     import numpy as np
@@ -62,7 +60,7 @@ def explore(given: ExploreOptions) -> None:
     fracslice explore quaternion-julia -o sheet.png --spread 0.5
     fracslice explore sheet/07.xml -o next.png --seed 1
     """
-    from fracslice.scene.variation import varied
+    from fracslice.scene.overrides import varied
 
     target, count = Path(given.output), given.count
     check_targets(given.source, given.output)
@@ -72,13 +70,15 @@ def explore(given: ExploreOptions) -> None:
     scene = load_scene(given.source, given.settings)
     scenes = [scene, *(varied(scene, (given.seed, k), given.spread) for k in range(1, count))]
     with given.working() as work:
-        pictures = [rendered(one, given.size, given.samples, k / count, work) for k, one in enumerate(scenes)]
+        pictures = [
+            render_tile(one, given.size, given.samples, k / count, work) for k, one in enumerate(scenes)
+        ]
         write(target, scenes, pictures)
     if not given.quiet:
         click.echo(f"{given.output}: {count} variations; their scenes are in {target.with_suffix('')}")
 
 
-def rendered(scene: Scene, size: tuple[int, int], samples: int, before: float, work: Work) -> np.ndarray:
+def render_tile(scene: Scene, size: tuple[int, int], samples: int, before: float, work: Work) -> np.ndarray:
     """Render one picture; `before` is the share of the sheet that is done."""
     from fracslice.rendering import Renderer
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import click
 
 from .inputs import scene_path
-from .options import DEVICE, SceneOptions, argument, command, option
-from .sizes import PIXELS
+from .options import DEVICE, PIXELS, SceneOptions, argument, command, option
 
 
 class FlyOptions(SceneOptions):

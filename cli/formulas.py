@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from .inputs import BadInput, check_targets
-from .options import CommandOptions, argument, command, option
-from .value_types import Name
+from .options import CommandOptions, Name, argument, command, option
 
 if TYPE_CHECKING:
     from fracslice.formulas import Node
@@ -50,7 +49,7 @@ def formulas(given: FormulaOptions) -> None:
         click.echo(manual.overview() if given.name is None else manual.page(given.name))
         return
     from fracslice.formulas.plugins import run_file
-    from fracslice.kernel.trial import trial
+    from fracslice.kernel.validation import trial
 
     check_targets(given.file, given.picture)
     trials = [(formula.name, trial(formula)) for formula in run_file(given.file)]

@@ -32,7 +32,7 @@ from fracslice.errors import (
 )
 from fracslice.version import __version__
 
-from .working import NOTHING, StoppedError
+from .execution import NOTHING, StoppedError
 
 NAMES = (
     "animate",
@@ -121,18 +121,7 @@ def prepare() -> None:
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
-    """Run one command.
-
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        Arguments of the command line; those of the process by default.
-
-    Returns
-    -------
-    int
-        Exit status.
-    """
+    """Run one command."""
     try:
         with warnings.catch_warnings():
             warnings.showwarning = show_warning

@@ -2,26 +2,36 @@
 
 from __future__ import annotations
 
+import io
 import os
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from fracslice.common.digits import decimal
+from fracslice.common.messages import decimal
 
-from .closing import DENSITIES, of_mesh
-from .cluster import ClusterOptions
-from .families import MOST, TABLE, families, going_on, is_table, suffixed
-from .inputs import check_folder, check_targets, load_scene, refuse_moved, refuse_options
-from .options import MeshOptions, argument, command, flag, option, output
-from .summary import summary
-from .value_types import AMOUNT, INTERVAL, SECONDS, Name
+from .inputs import BadInput, check_folder, check_targets, load_scene, refuse_moved, refuse_options
+from .options import (
+    AMOUNT,
+    INTERVAL,
+    SECONDS,
+    ClusterOptions,
+    MeshOptions,
+    Name,
+    argument,
+    command,
+    flag,
+    option,
+    output,
+)
+from .summary import DENSITIES, of_mesh, summary
+from .sweeps import MOST, TABLE, families, going_on, is_table, with_suffix
 
 if TYPE_CHECKING:
-    from fracslice.jobs.mesh_result import MeshResult
-    from fracslice.jobs.report import Report
+    from fracslice.jobs.report import MeshResult, Report
     from fracslice.meshjob import MeshJob
     from fracslice.scene import Scene
     from fracslice.store import Store
@@ -93,7 +103,7 @@ def mesh(given: MeshFileOptions) -> int:
     fracslice mesh geode -o geode.3mf --thickness 0.8mm --bridge 1.5mm
     fracslice mesh menger-sponge -o sponge.stl --set menger.level=1..3
     """
-    from fracslice.kernel.devices import chosen
+    from fracslice.kernel.devices import choose_device
 
     check_outputs(given)
     if Path(given.output).suffix.lower() == GRID:
@@ -106,10 +116,10 @@ def mesh(given: MeshFileOptions) -> int:
         refuse_moved(scene, given.settings)
     scenes = moments(scene, given.seconds, given.every)
     problems = False
-    with given.working(store=store_in(given.cache), device=chosen(given.device)) as work:
+    with given.working(store=store_in(given.cache), device=choose_device(given.device)) as work:
         for suffix, scene in scenes:
             files = {name: vars(given)[name] for name in ("output", "report", "picture")}
-            own = given.but(**{name: file and suffixed(file, suffix) for name, file in files.items()})
+            own = given.but(**{name: file and with_suffix(file, suffix) for name, file in files.items()})
             with going_on(own.output):
                 problems |= (write_formula if given.implicit else write_mesh)(scene, own, work)
     return 1 if problems else 0
@@ -117,11 +127,9 @@ def mesh(given: MeshFileOptions) -> int:
 
 def write_mesh(scene: Scene, given: MeshFileOptions, work: Work) -> bool:
     """Make the mesh, the report and the picture; True if the mesh would not print."""
-    result = made(scene, given, work)
+    result = make_and_write(scene, given, work)
     if given.report is not None:
         if is_table(given.report):
-            from .tables import write_row
-
             write_row(given.report, given.output, given.settings, result.report)
         else:
             write_report(result.report, given.report)
@@ -185,7 +193,7 @@ def store_in(folder: str | None) -> Store | None:
     return Store(Path(folder))
 
 
-def made(scene: Scene, given: MeshFileOptions, work: Work) -> MeshResult:
+def make_and_write(scene: Scene, given: MeshFileOptions, work: Work) -> MeshResult:
     """Make the mesh and write it, or its samples, and the picture."""
     from fracslice.export import write
     from fracslice.jobs.mesh import make_mesh
@@ -216,8 +224,6 @@ def check_outputs(given: MeshFileOptions) -> None:
         raise click.UsageError(f"{given.output}: unknown kind of file; known are {known}")
     check_targets(given.source, given.output, given.report, given.picture)
     if given.report is not None and is_table(given.report):
-        from .tables import table_rows
-
         table_rows(given.report)
     if given.picture is not None:
         from fracslice.viewer import need_pyvista
@@ -248,3 +254,43 @@ def write_report(report: Report, path: str) -> None:
 
     with replacing(path) as file:
         file.write((json.dumps(report.as_dict(), indent=2) + "\n").encode())
+
+
+KEY = "file"
+"""First column: the output of the row."""
+
+
+def table_rows(path: str) -> dict[str, dict[str, Any]]:
+    """Rows of a table by their output; none if there is no file.
+
+    Raises `BadInput` for a file that is no table of meshes.
+    """
+    import csv
+
+    try:
+        table = csv.DictReader(Path(path).read_text("utf-8").splitlines())
+    except FileNotFoundError:
+        return {}
+    except (OSError, UnicodeDecodeError):
+        raise BadInput(f"{path}: cannot be read as a table") from None
+    if KEY not in (table.fieldnames or ()):
+        raise BadInput(f"{path}: expected a table of meshes, with a column {KEY!r}, or a new file")
+    return {row[KEY]: {name: value for name, value in row.items() if name} for row in table}
+
+
+def write_row(path: str, output: str, settings: Sequence[str], report: Report) -> None:
+    """Write the settings and numbers of a mesh to its row of a table; the rows of other outputs stay."""
+    import csv
+
+    from fracslice.export import replacing
+
+    numbers = {name: value for name, value in report.as_dict().items() if isinstance(value, int | float)}
+    values = dict(setting.split("=", 1) for setting in settings)
+    own = {KEY: output, **values, **numbers, "problems": "; ".join(report.problems)}
+    rows = {**table_rows(path), output: own}
+    text = io.StringIO()
+    table = csv.DictWriter(text, list(dict.fromkeys(name for row in rows.values() for name in row)))
+    table.writeheader()
+    table.writerows(rows.values())
+    with replacing(path) as file:
+        file.write(text.getvalue().encode())

@@ -1,26 +1,165 @@
-"""Options of commands: records that click fills."""
+"""Options of commands: records that click fills, the types of their values, and the options that commands
+share.
+"""
 
 from __future__ import annotations
 
 import inspect
+import io
+import math
 import os
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+import re
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from fracslice.errors import VolumeError
+from fracslice.errors import ClusterError, SceneError, VolumeError
 
-from .value_types import AMOUNT, FACTORS, LENGTH, NUMBER, Name, PrintSetting, Whole, direction
-from .working import NOTHING, working
+from .execution import NOTHING, working
+from .inputs import BadInput
 
 if TYPE_CHECKING:
+    from fracslice.cluster import Pool
     from fracslice.meshjob import MeshJob
     from fracslice.scene import Print, Scene
+    from fracslice.slicing import Stack
+    from fracslice.slicing.layer_checks import PrintReport
+    from fracslice.slicing.printers import Printer
     from fracslice.work import Work
+
+
+class Name(click.types.StringParamType):
+    """Name of a file or folder, with one of some endings."""
+
+    name = "name"
+
+    def __init__(self, metavar: str = "", *endings: str) -> None:
+        self.metavar, self.endings = metavar, endings
+
+    def convert(self, value: Any, option: click.Parameter | None, context: click.Context | None) -> Any:
+        if not value:
+            self.fail("expected the name of a file, found nothing", option, context)
+        if value == "-":
+            self.fail(
+                "-: expected the name of a file; standard input and output are not used", option, context
+            )
+        if self.endings and not value.lower().endswith(self.endings):
+            endings = " or ".join(self.endings)
+            self.fail(f"{value}: expected a file name that ends in {endings}", option, context)
+        return value
+
+
+class Whole(click.IntRange):
+    """A whole number within a range."""
+
+    name, metavar = "whole number", "N"
+
+    def _describe_range(self) -> str:
+        return "" if self.min is self.max is None else super()._describe_range()
+
+
+class Finite(click.types.FloatParamType):
+    """A number that is neither infinite nor undefined."""
+
+    name, metavar = "number", "N"
+
+    def convert(self, value: Any, option: click.Parameter | None, context: click.Context | None) -> float:
+        number: float = super().convert(value, option, context)
+        if not math.isfinite(number):
+            self.fail(f"{value}: expected a finite number", option, context)
+        return number
+
+
+class Signed(Finite):
+    """A finite number above zero, or at least zero."""
+
+    def __init__(self, relation: str) -> None:
+        self.relation = relation
+
+    def convert(self, value: Any, option: click.Parameter | None, context: click.Context | None) -> float:
+        number = super().convert(value, option, context)
+        if number < 0 or (number == 0 and self.relation == ">"):
+            self.fail(f"{number:g}: expected a number {self.relation} 0", option, context)
+        return number
+
+
+class Parsed(click.types.StringParamType):
+    """A value that a function parses; the message of its `ValueError` names what it expects."""
+
+    name = "text"
+
+    def __init__(self, parse: Callable[[str], Any], metavar: str) -> None:
+        self.parse, self.metavar = parse, metavar
+
+    def convert(self, value: Any, option: click.Parameter | None, context: click.Context | None) -> Any:
+        try:
+            return self.parse(value)
+        except SceneError as error:
+            self.fail(str(error), option, context)
+        except ValueError as error:
+            self.fail(f"{value!r}: expected {error}", option, context)
+
+
+class PrintSetting(click.types.StringParamType):
+    """The attribute of `<print>` that the option is named after."""
+
+    name, metavar = "text", "LENGTH"
+
+    def convert(self, value: Any, option: click.Parameter | None, context: click.Context | None) -> Any:
+        from fracslice.scene import Print
+
+        assert option is not None
+        return Parsed(Print.kinds()[str(option.name)].read, "").convert(value, option, context)
+
+
+def read_length(text: str) -> float:
+    """Parse a length into mm."""
+    from fracslice.scene import parse_length
+
+    return parse_length(text)
+
+
+def read_seconds(text: str) -> float:
+    """Parse a time of an animation."""
+    from fracslice.scene.animation import Seconds
+
+    return float(Seconds(0.0, "").read(text))
+
+
+def read_interval(text: str) -> float:
+    """Parse a time above zero of an animation."""
+    seconds = read_seconds(text)
+    if not seconds:
+        raise ValueError("a time in seconds above zero, such as 2.5s")
+    return seconds
+
+
+def read_factors(text: str) -> tuple[float, float, float]:
+    """Parse the compensation of shrinkage into factors along x, y and z."""
+    from fracslice.scene.lengths import Percent
+
+    x, y, z = Percent(None, "").read(text)
+    return x, y, z
+
+
+def direction(
+    _: click.Context, __: click.Parameter, value: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    """Check that a direction is not zero."""
+    if not any(value):
+        raise click.BadParameter("0 0 0: expected a direction")
+    return value
+
+
+NUMBER, AMOUNT, POSITIVE = Finite(), Signed(">="), Signed(">")
+LENGTH, SECONDS = Parsed(read_length, "LENGTH"), Parsed(read_seconds, "TIME")
+INTERVAL = Parsed(read_interval, "TIME")
+FACTORS = Parsed(read_factors, "N%[,N%,N%]")
+
 
 R = TypeVar("R", bound="CommandOptions")
 
@@ -36,19 +175,7 @@ def output(metavar: str, text: str, *endings: str) -> Any:
 
 
 def option(kind: Any, text: str, *names: str, **settings: Any) -> Any:
-    """Declare an option as an attribute of a record.
-
-    Parameters
-    ----------
-    kind : click.ParamType
-        Type of the value; its attribute `metavar`, if it has one, names the value in the help.
-    text : str
-        Help.
-    *names : str
-        The option; by default two dashes and the attribute's name.
-    **settings
-        Further arguments of `click.Option`.
-    """
+    """Declare an option as an attribute of a record."""
     shown = {"metavar": getattr(kind, "metavar", None)}
     return partial(_parameter, click.Option, names, type=kind, help=text, **{**shown, **settings})
 
@@ -110,7 +237,7 @@ class CommandOptions:
         return [make(name=name) for name, make in declared.items()]
 
 
-def named(function: Callable[[R], int | None], given: R) -> int | None:
+def run_named(function: Callable[[R], int | None], given: R) -> int | None:
     """Run a command; errors of a volume, which has no file, name the file or scene of the command."""
     try:
         return function(given)
@@ -131,7 +258,7 @@ def command(
         text, _, examples = (inspect.getdoc(function) or "").partition("\n\nExamples\n--------\n")
         return click.Command(
             name or function.__name__,
-            callback=lambda **values: named(function, record(**values)),
+            callback=lambda **values: run_named(function, record(**values)),
             params=record.parameters(),
             help=text,
             epilog=f"\b\nExamples:\n  {examples.replace(chr(10), f'{chr(10)}  ')}",
@@ -255,3 +382,170 @@ class MeshOptions(PreparationOptions):
             scale=self.scale,
             proved=self.proved,
         )
+
+
+UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0}
+
+
+def read_pixels(text: str) -> tuple[int, int]:
+    """Parse a size such as 1280x720 into pixels across and down."""
+    match = re.fullmatch(r"\s*(\d{1,5})\s*x\s*(\d{1,5})\s*", text)
+    if not match or not all(1 <= int(n) <= 32768 for n in match.groups()):
+        raise ValueError("pixels across and down, such as 1280x720, from 1 to 32768")
+    return int(match[1]), int(match[2])
+
+
+def read_part(text: str) -> tuple[int, ...]:
+    """Parse a part of a picture such as 100,50,640,480: left, top, width and height."""
+    match = re.fullmatch(r"\s*(\d{1,5})" + 3 * r"\s*,\s*(\d{1,5})" + r"\s*", text)
+    if not match:
+        raise ValueError("left, top, width and height, such as 100,50,640,480")
+    return tuple(map(int, match.groups()))
+
+
+def read_duration(text: str) -> float:
+    """Parse a time such as 10s into seconds."""
+    match = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*(s|min|h)?\s*", text)
+    if not match or not 0 < float(match[1]) < 1e6:
+        raise ValueError("a time above zero, such as 10s, 2min or 1h")
+    return float(match[1]) * UNITS[match[2] or "s"]
+
+
+PIXELS, PART = Parsed(read_pixels, "WxH"), Parsed(read_part, "X,Y,W,H")
+DURATION = Parsed(read_duration, "TIME")
+
+
+LAYER, PIXEL_MM = "0.05mm", 0.05
+
+
+def read_shift(text: str) -> float:
+    """Parse a length, zero or negative ones included, into mm."""
+    from fracslice.scene.lengths import Shift
+
+    return float(Shift(0.0, "").read(text))
+
+
+def read_heights(text: str) -> tuple[float, float | None]:
+    """Parse a layer height into mm, or the minimum and maximum of adaptive layers."""
+    low, dots, high = text.partition("..")
+    return read_length(low), read_length(high) if dots else None
+
+
+def printer(context: click.Context, _: click.Parameter, name: str | None) -> Printer | None:
+    """Look up a printer by name; "list" prints all printers and ends the command."""
+    from fracslice.slicing import printers
+
+    if name != "list":
+        return None if name is None else printers.printer(name)
+    for p in printers.PRINTERS.values():
+        volume = " x ".join(f"{r:g}" for r in p.build_volume)
+        click.echo(f"{p.name:20} {p.title:30} {p.pixels[0]} x {p.pixels[1]}, {volume} mm, .{p.file}")
+    context.exit()
+
+
+def layer_option(text: str, **settings: Any) -> Any:
+    """Declare --layer, a height or a range of heights."""
+    return option(Parsed(read_heights, "LENGTH[..LENGTH]"), text, **settings)
+
+
+def printer_option(text: str) -> Any:
+    """Declare --printer, looked up before missing options are reported."""
+    return option(str, text, "--printer", metavar="NAME|FILE", callback=printer, is_eager=True)
+
+
+class LayerOptions(PreparationOptions):
+    """Options of layers."""
+
+    layer: tuple[float, float | None]
+    machine: Printer | None
+    pixel: float | None = option(LENGTH, "Pixel size; the printer's by default, or 0.05mm.")
+    html: str | None = option(
+        Name("FILE.html", ".html"),
+        "Write a page: figures, problems, pictures of the worst layers, cross-section over height.",
+    )
+
+    @property
+    def pixels(self) -> tuple[float, float]:
+        """Pixel size, mm: that of --pixel or of --printer, which exclude each other."""
+        pixel, machine = self.pixel, self.machine
+        if pixel is not None and machine is not None:
+            raise click.UsageError("--pixel and --printer: expected one of them")
+        return (pixel, pixel) if pixel else machine.pixel if machine else (PIXEL_MM, PIXEL_MM)
+
+
+def write_page(
+    stack: Stack, report: PrintReport, lines: Sequence[str], title: str, path: str, work: Work
+) -> None:
+    """Write the summary page of layers that were checked."""
+    import numpy as np
+
+    from fracslice.export import replacing
+    from fracslice.export.page import page
+    from fracslice.printing.problems import verdict
+    from fracslice.slicing.preview import worst_layers
+
+    with io.BytesIO() as picture, replacing(path) as file:
+        worst_layers(stack, report.worst, picture, work)
+        problems = [str(problem) for problem in report.problems]
+        areas, worst = np.array(report.areas), picture.getvalue()
+        file.write(page(title, lines, verdict(report.problems), problems, stack.tops, areas, worst))
+
+
+class ClusterOptions(RunOptions):
+    """Other processes and machines."""
+
+    output: str
+    cluster: str | None = option(
+        str,
+        "Share the job between workers: tcp://HOST:8786, a scheduler of Dask; or local:N processes.",
+        metavar="WHERE",
+    )
+    shard: str | None = option(
+        str, "Make the I-th of N shares of the job, such as 3/64; shard 1 writes the file.", metavar="I/N"
+    )
+    store: str | None = option(
+        str,
+        "Folder or fsspec URL for pieces, which all machines reach; beside the file by default.",
+        metavar="FOLDER",
+    )
+
+    @property
+    def beside(self) -> str:
+        """File beside which pieces are kept by default."""
+        return self.output
+
+    @contextmanager
+    def working(self, kept: str = NOTHING, **settings: Any) -> Iterator[Work]:
+        """Work with the pool of --cluster and --shard."""
+        with ExitStack() as stack:
+            pool = stack.enter_context(self._pooled())
+            with super().working(kept, cluster=pool, **settings) as work:
+                yield work
+                stack.pop_all().close()  # Ctrl-C while workers end would say that nothing was written
+
+    @contextmanager
+    def _pooled(self) -> Iterator[Pool | None]:
+        """Pool of the given options; None without --cluster and --shard."""
+        if self.cluster and self.shard:
+            raise click.UsageError("--cluster and --shard: expected one of them")
+        if not self.cluster and not self.shard:
+            if self.store:
+                raise click.UsageError("--store: needs --cluster or --shard")
+            yield None
+            return
+        from fracslice.cluster import HIDDEN, ResultFolder, Shard, connect
+
+        place = self.store or os.path.join(os.path.dirname(os.path.abspath(self.beside)), HIDDEN)
+        place = place if "://" in place else os.path.abspath(place)
+        with ExitStack() as stack:
+            try:
+                pool: Pool = (
+                    Shard.read(self.shard, ResultFolder(place))
+                    if self.shard
+                    else stack.enter_context(connect(str(self.cluster), place, self.threads))
+                )
+            except ClusterError as error:
+                raise BadInput(str(error)) from None
+            yield pool
+        if not self.shard:
+            pool.pieces.tidy()

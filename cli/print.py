@@ -9,10 +9,9 @@ import click
 
 from fracslice.errors import keeping
 
-from .closing import duration
 from .inputs import check_targets, load_scene
-from .options import MeshOptions, argument, command, option, output
-from .value_types import Name
+from .options import MeshOptions, Name, argument, command, option, output
+from .summary import duration
 
 TOLERANCE = 0.02
 """Default tolerance of the simplified mesh, mm."""

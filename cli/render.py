@@ -5,28 +5,101 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from fracslice.errors import Cancelled, KeptError, SharedError
 
-from .bands import announced, check_options, light_of, render_to
-from .cluster import ClusterOptions
-from .families import families
-from .inputs import check_folder, check_targets, load_scene
-from .options import DEVICE, SAMPLES, SceneOptions, argument, command, flag, option, output
-from .sizes import DURATION, PART, PIXELS
-from .value_types import Name, Whole
+from .inputs import check_folder, check_targets, load_scene, refuse_options
+from .options import (
+    DEVICE,
+    DURATION,
+    PART,
+    PIXELS,
+    SAMPLES,
+    ClusterOptions,
+    Name,
+    SceneOptions,
+    Whole,
+    argument,
+    command,
+    flag,
+    option,
+    output,
+)
+from .sweeps import families
 
 if TYPE_CHECKING:
     import numpy as np
 
     from fracslice.rendering import Pass, Renderer
+    from fracslice.rendering.sequence import SampleRange
     from fracslice.scene import Scene
     from fracslice.work import Work
+
+
+def announcement(film: tuple[int, int], rows: int) -> str:
+    """Line on the memory that a picture needs, whole and in bands."""
+    from fracslice.rendering.crops import BYTES, MARGIN
+
+    width, height = film
+    whole, part = (BYTES * width * n / 1e9 for n in (height, min(rows + 2 * MARGIN, height)))
+    return (
+        f"{width} x {height} pixels need {whole:,.1f} GB of memory, more than is free: "
+        f"rendered in {-(-height // rows)} bands of {rows} rows, {part:,.1f} GB each"
+    )
+
+
+def check_options(path: str, names: Sequence[str]) -> None:
+    """Raise an error for a kind of file and for given options that need the whole picture."""
+    from fracslice.export.images import BANDED, check_image
+
+    reason = "expected a picture that fits into the memory; a larger one is rendered in bands"
+    if check_image(path) not in BANDED:
+        raise click.BadParameter(f"{path}: {reason}, as {', '.join(BANDED)}", param_hint="--output")
+    refuse_options(names, reason)
+
+
+def render_to(
+    path: str,
+    scene: Scene,
+    film: tuple[int, int],
+    rows: int,
+    work: Work,
+    device: str,
+    sequence: SampleRange,
+    samples: int | None,
+    bits: int,
+    text: Mapping[str, str],
+) -> str:
+    """Render a picture in bands and write it; return the line on it."""
+    from fracslice.export.images import check_image, write_bands
+    from fracslice.rendering.bands import check_bands, render_bands
+
+    view, taken, squares = scene.view, [], []
+    check_bands(view, display=check_image(path) == ".png")
+
+    def bands() -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        made = render_bands(scene.root, view, film, rows, work, device, sequence, samples)
+        for k, band in enumerate(made, 1):
+            taken.append(band.samples)
+            squares.append(band.error**2)
+            work.progress("bands", k * rows / film[1])
+            yield band.developed, light_of(band)
+
+    write_bands(path, film, bands(), 4 if view.film.transparent else 3, bits, text, work)
+    return (
+        f"{path}: {film[0]} x {film[1]} pixels, {sum(taken) / len(taken):.1f} samples a pixel, "
+        f"error {(sum(squares) / len(squares)) ** 0.5:.2g}"
+    )
+
+
+def light_of(done: Pass) -> Any:
+    """Linear light of a pass, with alpha if the film is transparent."""
+    return done.mean if done.view.film.transparent else done.image
 
 
 class RenderOptions(ClusterOptions, SceneOptions):
@@ -69,7 +142,7 @@ def render(given: RenderOptions) -> None:
     from fracslice.kernel.devices import for_picture
     from fracslice.rendering import Renderer
     from fracslice.rendering.bands import rows_of_bands
-    from fracslice.rendering.picture_layers import layers
+    from fracslice.rendering.progressive import layers
     from fracslice.rendering.sequence import SampleRange
 
     scene, start = checked_scene(given), time.monotonic()
@@ -98,7 +171,7 @@ def render(given: RenderOptions) -> None:
     if not given.quiet:
         took = time.monotonic() - start
         about = f"{renderer.setup.precision}, {renderer.device}, {took:.1f} s"
-        click.echo(f"{described(given.output, renderer, done)}, {about}")
+        click.echo(f"{describe_picture(given.output, renderer, done)}, {about}")
 
 
 def checked_scene(given: RenderOptions) -> Scene:
@@ -124,7 +197,7 @@ def in_bands(given: RenderOptions, scene: Scene, film: tuple[int, int], rows: in
 
     whole = ("layers", "denoise", "limit", "pass_images", "watch", "state", "cluster", "shard")
     check_options(given.output, whole)
-    click.echo(announced(film, rows), err=True)
+    click.echo(announcement(film, rows), err=True)
     with given.working() as work:
         made = work, given.device, SampleRange(seed=given.seed), given.samples, int(given.bits)
         return render_to(given.output, scene, film, rows, *made, text_of(scene))
@@ -136,9 +209,9 @@ def render_passes(renderer: Renderer, scene: Scene, given: RenderOptions, work: 
     if state and Path(state).exists():
         renderer.resume(state)
     try:
-        passes = timed(renderer, samples, given.limit)
-        for done in shown(passes, renderer, scene.name) if given.watch else passes:
-            rate = f"{reached(done)}, {done.rate / 1e6:.2f} M samples/s"
+        passes = limit_time(renderer, samples, given.limit)
+        for done in show_passes(passes, renderer, scene.name) if given.watch else passes:
+            rate = f"{describe_pass(done)}, {done.rate / 1e6:.2f} M samples/s"
             work.progress(rate, fraction(done, renderer, samples))
             if given.pass_images:
                 Path(given.pass_images).mkdir(exist_ok=True)
@@ -154,10 +227,10 @@ def render_passes(renderer: Renderer, scene: Scene, given: RenderOptions, work: 
         if state:
             save_state(renderer, state)
         save(given.output, kept, scene, given.bits, given.threads)
-        raise KeptError(described(given.output, renderer, kept)) from None
+        raise KeptError(describe_picture(given.output, renderer, kept)) from None
 
 
-def shown(passes: Iterator[Pass], renderer: Renderer, name: str) -> Iterator[Pass]:
+def show_passes(passes: Iterator[Pass], renderer: Renderer, name: str) -> Iterator[Pass]:
     """Passes that are shown in a window."""
     from fracslice.viewer import previewed
 
@@ -166,14 +239,14 @@ def shown(passes: Iterator[Pass], renderer: Renderer, name: str) -> Iterator[Pas
 
 def without_noise(renderer: Renderer) -> Pass:
     """Picture of a renderer without noise; note if Open Image Denoise is not installed."""
-    from fracslice.rendering.denoising import advice, denoised
+    from fracslice.rendering.denoising import advice, denoise
 
     if missing := advice():
         click.echo(f"--denoise: {missing}", err=True)
-    return denoised(renderer)
+    return denoise(renderer)
 
 
-def timed(renderer: Renderer, samples: int | None, limit: float | None) -> Iterator[Pass]:
+def limit_time(renderer: Renderer, samples: int | None, limit: float | None) -> Iterator[Pass]:
     """Iterate over passes until a time limit, in seconds, which interrupts a pass.
 
     A limit that ends before the first sample is doubled.
@@ -200,10 +273,10 @@ def timed(renderer: Renderer, samples: int | None, limit: float | None) -> Itera
         if expired.is_set():
             cancel.clear()
     if not renderer.seen().samples:
-        yield from timed(renderer, samples, 2 * limit)
+        yield from limit_time(renderer, samples, 2 * limit)
 
 
-def reached(done: Pass) -> str:
+def describe_pass(done: Pass) -> str:
     """Samples per pixel of a pass and its error, which less than a sample does not tell, as text."""
     samples = f"{done.samples:.1f}" if done.samples >= 1 else f"{done.samples:.1g}"
     error = f"error {done.error:.2g}" if math.isfinite(done.error) else "error unknown"
@@ -215,9 +288,9 @@ def fraction(done: Pass, renderer: Renderer, samples: int | None) -> float:
     return min(done.samples / (samples or renderer.setup.view.film.samples), 1.0)
 
 
-def described(path: str | Path, renderer: Renderer, done: Pass) -> str:
+def describe_picture(path: str | Path, renderer: Renderer, done: Pass) -> str:
     """Line on a written picture."""
-    return f"{path}: {renderer.width} x {renderer.height} pixels, {reached(done)}"
+    return f"{path}: {renderer.width} x {renderer.height} pixels, {describe_pass(done)}"
 
 
 def save(

@@ -11,22 +11,36 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fracslice.common.digits import counted, decimal
+from fracslice.common.messages import decimal, format_count
 from fracslice.errors import keeping
 
-from .closing import of_layers
-from .cluster import ClusterOptions
-from .families import families
 from .inputs import check_targets, load_scene, refuse_options
-from .layers import LAYER, LayerOptions, layer_option, printer_option, read_shift, write_page
-from .options import argument, command, option, output
-from .value_types import AMOUNT, NUMBER, Name, Parsed, Whole
+from .options import (
+    AMOUNT,
+    LAYER,
+    NUMBER,
+    ClusterOptions,
+    LayerOptions,
+    Name,
+    Parsed,
+    Whole,
+    argument,
+    command,
+    layer_option,
+    option,
+    output,
+    printer_option,
+    read_shift,
+    write_page,
+)
+from .summary import of_layers
+from .sweeps import families
 
 if TYPE_CHECKING:
-    from fracslice.export.jobs import SliceRun
     from fracslice.export.resins import Resin
+    from fracslice.export.slice_run import SliceRun
     from fracslice.jobs.completeness import Completeness
-    from fracslice.jobs.slice_recipe import SliceRecipe
+    from fracslice.jobs.slices import SliceRecipe
     from fracslice.scene import Scene
     from fracslice.slicing import SliceJob, Stack
     from fracslice.slicing.printers import Printer
@@ -153,7 +167,7 @@ def slice_(given: SliceOptions) -> int:
         with keeping(f"{output} is written"):
             if given.preview:
                 write_preview(run.stack, given.preview, work)
-            sent = uploaded(output, given.address, work)
+            sent = upload(output, given.address, work)
             complete = layers_amount(run.slicer, work)
             if not given.quiet or given.html:
                 last = list(of_layers(run, given.price).lines())
@@ -162,14 +176,14 @@ def slice_(given: SliceOptions) -> int:
 
                 write_page(run.stack, check_run(run), last, output, given.html, work)
     if not given.quiet:
-        lines = described(run, output, complete)
+        lines = describe_layers(run, output, complete)
         click.echo(os.linesep.join([*lines, *last, *([sent] if sent else [])]))
     return 1 if complete.problems else 0
 
 
 def recipe(given: SliceOptions, scene: Scene, kind: str, resin: Resin | None, work: Work) -> SliceRecipe:
     """Scene and settings of the layers."""
-    from fracslice.jobs.slice_recipe import SliceRecipe
+    from fracslice.jobs.slices import SliceRecipe
     from fracslice.scene.writer import to_xml
 
     return SliceRecipe(
@@ -183,21 +197,21 @@ def recipe(given: SliceOptions, scene: Scene, kind: str, resin: Resin | None, wo
         gamma=given.gamma,
         mirror=given.mirror,
         resin=resin,
-        created=created(),
+        created=creation_date(),
         sections=int(given.sections),
         levels=given.levels,
         blur=given.blur,
     )
 
 
-def described(run: SliceRun, output: str, complete: Completeness) -> list[str]:
+def describe_layers(run: SliceRun, output: str, complete: Completeness) -> list[str]:
     """Lines on the layers, with notes of the stack, on missing volume, exposure and the printer's file."""
     from fracslice.export.layer_files import PRINTS, printers_file, slice_format
 
     stack, screen = run.stack, run.screen
     size = " x ".join(map(decimal, stack.size))
     rows, columns = screen.shape
-    first = f"{output}: {counted(len(stack.z), 'layer')} of {columns} x {rows} pixels, {size} mm"
+    first = f"{output}: {format_count(len(stack.z), 'layer')} of {columns} x {rows} pixels, {size} mm"
     other = printers_file(screen.printer, output) if screen.printer else ""
     lost = [f"would not print: {', '.join(complete.problems)}"] if complete.problems else []
     start = [calibration(run.resin)] if run.resin and slice_format(output) in PRINTS else []
@@ -259,7 +273,7 @@ def refuse_what_no_print_has(given: SliceOptions, kind: str, resin: Resin | None
         raise click.UsageError(f"{output}: an SL1 archive has layers of one height, not a range")
 
 
-def uploaded(output: str, address: str | None, work: Work) -> str | None:
+def upload(output: str, address: str | None, work: Work) -> str | None:
     """Upload the file to an address, if there is one; return the printer's answer."""
     if address is None:
         return None
@@ -278,7 +292,7 @@ def refuse_to_send(output: str, kind: str, address: str) -> None:
     printer_address(address)
 
 
-def created() -> datetime:
+def creation_date() -> datetime:
     """Date of print files, UTC: now, or of SOURCE_DATE_EPOCH."""
     seconds = os.environ.get(DATE)
     if not seconds:

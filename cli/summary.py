@@ -1,15 +1,184 @@
-"""Text summaries of meshes and reports."""
+"""Summaries in text: meshes, layers, reports, amount, cost and time, and what to do next."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from fracslice.common.digits import counted, decimal
+from fracslice.common.messages import decimal, format_count, place, significant
 
 if TYPE_CHECKING:
-    from fracslice.jobs.report import Report
-    from fracslice.mesh.mesh_report import MeshReport
+    import numpy as np
+
+    from fracslice.export.slice_run import SliceRun
+    from fracslice.jobs.report import MeshResult, Report
+    from fracslice.mesh.checks import MeshReport
+    from fracslice.slicing.layer_checks import PrintReport
+    from fracslice.volume import Drain
+
+DENSITIES = {"resin": 1.1, "pla": 1.24, "petg": 1.27, "abs": 1.04, "asa": 1.07, "tpu": 1.22}
+"""Materials and their densities, g/ml; filaments as in PrusaResearch.ini of PrusaSlicer 2.5."""
+
+OF_RESIN = {"cavities", "cups", "traps", "fit"}
+"""Problems of liquid resin, and of the known printers, which are for resin."""
+
+FLAT = 50.0
+"""Mean cross-section per area on the plate from which an object does not stand flat, as in the checks."""
+
+LISTED = 4
+"""Maximum number of drain holes whose places are all named."""
+
+SEALED = 1000
+"""Volume of the solid per volume of sealed cavities above which they are not mentioned."""
+
+CELLS, FINEST = 128, 256
+"""Usual and maximum number of cells along the longest side in the search for cavities."""
+
+Place = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Closing:
+    """Figures of an object that is ready to print. Lengths in mm."""
+
+    volume: float  # volume, mm3, area on the plate, mm2, and height
+    contact: float
+    height: float
+    material: str  # name of the material
+    density: float  # g/ml
+    about: str = ""  # stands before a volume that is an estimate
+    layers: int | None = None  # number of layers; None for a mesh
+    seconds: float | None = None  # time and price of the print; None if unknown
+    cost: float | None = None
+    drains: Sequence[Place] = ()  # openings of drain holes inside the hollow
+    drain: float = 0.0  # diameter of the drain holes
+    cavities: int = 0  # sealed cavities
+    trapped: float = 0.0  # their volume, mm3
+    bodies: int = 1  # connected components
+    bridge: float = 0.0  # minimum diameter of struts
+
+    def lines(self) -> Iterator[str]:
+        """Iterate over the lines, each with the option that mends what it names."""
+        ml = self.volume / 1000
+        amount = [
+            f"{self.about}{millilitres(self.volume)}",
+            f"{significant(ml * self.density)} g of {self.material} ({self.density:g} g/ml)",
+        ]
+        if self.layers is not None:
+            amount.append(format_count(self.layers, "layer"))
+        if self.seconds is not None:
+            amount.append(duration(self.seconds))
+        if self.cost:
+            amount.append(f"cost {self.cost:.2f}")
+        yield ", ".join(amount)
+        if self.drains:
+            places = [place(at, 1) for at in self.drains]
+            where = f"{' and '.join(places)} mm"
+            if len(places) > LISTED:
+                where = f"{places[0]} mm and at {len(places) - 1} other places"
+            yield f"drain holes of {self.drain:g} mm leave the hollow at {where}"
+        if self.cavities and self.trapped * SEALED > self.volume:
+            sealed = "a sealed cavity" if self.cavities == 1 else f"{self.cavities} sealed cavities"
+            mend = "--cavities fill, or --drain 3mm for a hollow"
+            yield f"{millilitres(self.trapped)} trapped in {sealed}: {mend}"
+        if self.bodies > 1:
+            yield f"{self.bodies} loose bodies: --bridge {max(self.bridge, 1):.2g}mm, or --keep largest"
+        if self.contact * FLAT < self.volume / self.height:
+            from fracslice.printing.problems import flat_base
+
+            plate = f"{significant(self.contact, 2)} mm2 on the plate"
+            yield f"does not stand flat, {plate}: --base {flat_base(self.height)}"
+
+
+def millilitres(volume: float) -> str:
+    """Volume in millilitres, mm3 given; in mm3 below a hundredth of one."""
+    return f"{significant(volume / 1000)} ml" if volume >= 10 else f"{significant(volume, 2)} mm3"
+
+
+def duration(seconds: float) -> str:
+    """Duration in hours and minutes, or in seconds."""
+    minutes = round(seconds / 60)
+    if seconds < 60:
+        return f"{max(round(seconds), 1)} s"
+    return f"{minutes // 60} h {minutes % 60} min" if minutes >= 60 else f"{minutes} min"
+
+
+def of_mesh(result: MeshResult, material: str, price: float | None) -> Closing:
+    """Closing figures of a mesh."""
+    from fracslice.meshjob import JOINING  # imports the formulas, which --help does not need
+
+    report = result.report
+    mesh, grams = report.mesh, report.mesh.volume_mm3 / 1000 * DENSITIES[material]
+    return Closing(
+        volume=mesh.volume_mm3,
+        contact=report.contact_mm2,
+        height=mesh.bbox_mm[1][2] - mesh.bbox_mm[0][2],
+        material=material,
+        density=DENSITIES[material],
+        cost=None if price is None else grams * price / 1000,
+        drains=[tuple(p) for p in result.place.mm(starts(result.planned.drains)).tolist()],
+        drain=2 * result.place.scale * max((d.radius for d in result.planned.drains), default=0.0),
+        cavities=mesh.cavities,
+        trapped=report.cavities_mm3,
+        bodies=mesh.components,
+        bridge=JOINING * report.voxel_mm,
+    )
+
+
+def of_material(report: PrintReport, material: str) -> PrintReport:
+    """Report on layers of a key of `DENSITIES`: its weight, and of a filament no problem of resin."""
+    problems = [p for p in report.problems if material == "resin" or p.kind not in OF_RESIN]
+    return replace(report, weight_g=report.volume / 1000 * DENSITIES[material], problems=problems)
+
+
+def of_layers(run: SliceRun, price: float | None) -> Closing:
+    """Closing figures of layers. Areas of layers that another process made are interpolated."""
+    import numpy as np
+
+    stack, resin = run.stack, run.resin
+    known = sorted(run.slicer.areas)
+    areas = np.interp(np.arange(run.layers), known, [run.slicer.areas[k] for k in known])
+    volume = float(areas @ stack.heights)
+    of = price if price is not None else resin.price if resin else None
+    named = resin is not None and resin.name != "unknown"
+    count, hollow = trapped_volume(run)
+    places = (starts(stack.drains) - stack.origin) * stack.scale
+    return Closing(
+        volume=volume,
+        contact=float(areas[0]),
+        height=float(stack.tops[-1]),
+        material=resin.name if resin and named else "resin",
+        density=resin.density if resin else DENSITIES["resin"],
+        about="about " if len(known) < run.layers else "",
+        layers=run.layers,
+        seconds=resin.seconds(run.layers) if resin else None,
+        cost=None if of is None else volume / 1e6 * of,
+        drains=[tuple(p) for p in places.tolist()],
+        drain=2 * stack.scale * max((d.radius for d in stack.drains), default=0.0),
+        cavities=count,
+        trapped=hollow,
+    )
+
+
+def starts(drains: Sequence[Drain]) -> np.ndarray:
+    """Inner ends of drain holes, float64 [n, 3], scene units."""
+    import numpy as np
+
+    return np.array([drain.start for drain in drains], float).reshape(-1, 3)
+
+
+def trapped_volume(run: SliceRun) -> tuple[int, float]:
+    """Number and volume, mm3, of the cavities of a stack."""
+    from fracslice.printing.sealed import count_sealed
+
+    stack = run.stack
+    narrowest = min((2 * drain.radius for drain in stack.drains), default=math.inf)
+    longest = max(stack.outer.size)
+    cell = max(min(longest / CELLS, narrowest / 3), longest / FINEST)
+    count, volume = count_sealed(stack.root, stack.outer, cell, run.work)
+    return count, volume * stack.scale**3
 
 
 def summary(path: str, report: Report) -> str:
@@ -39,7 +208,10 @@ def sizes(mesh: MeshReport) -> str:
     """Triangles, size, volume and bodies of a mesh, in one line."""
     (x0, y0, z0), (x1, y1, z1) = mesh.bbox_mm
     size = " x ".join(map(decimal, (x1 - x0, y1 - y0, z1 - z0))) + " mm"
-    triangles, bodies = counted(mesh.triangles, "triangle"), counted(mesh.components, "body", "bodies")
+    triangles, bodies = (
+        format_count(mesh.triangles, "triangle"),
+        format_count(mesh.components, "body", "bodies"),
+    )
     volume = mesh.volume_mm3
     amount = f"{decimal(volume / 1000)} cm3" if volume >= 1000 else f"{decimal(volume)} mm3"
     return f"{triangles}, {size}, {amount}, {bodies}"

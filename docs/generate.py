@@ -3,9 +3,8 @@
 from pathlib import Path
 
 from fracslice import _WHERE
-from fracslice.scene.manual import markdown
+from fracslice.scene.manual import markdown, package_stub, stub
 from fracslice.scene.schema import OPEN, PATH, open_relaxng, relaxng
-from fracslice.scene.stubs import package_stub, stub
 
 ROOT = Path(__file__).parents[1]
 

@@ -94,11 +94,11 @@ _WHERE = {
 register(
     compiler="fracslice.kernel.tree",
     orbits="fracslice.kernel.orbits",
-    orbit_samples="fracslice.kernel.orbit_samples",
+    orbit_samples="fracslice.kernel.growth",
     growth="fracslice.kernel.growth",
-    orbit_signs="fracslice.kernel.orbit_signs",
+    orbit_signs="fracslice.kernel.growth",
     distances="fracslice.api.distances",
-    parsing="fracslice.kernel.parsing",
+    parsing="fracslice.kernel.language",
     reference="fracslice.kernel.reference",
     files="fracslice.export",
 )

@@ -131,7 +131,7 @@ def climb(
     exact: float,
     threads: int = 0,
 ) -> NDArray[float64]:
-    """Extreme points of a solid in given directions; call `fracslice.volume.climbing.climb`."""
+    """Extreme points of a solid in given directions; call `fracslice.volume.extent.climb`."""
 
 def surface_error(
     field: Entry,
@@ -169,7 +169,7 @@ def project(
     voxel: float,
     threads: int = 0,
 ) -> None:
-    """Project points `first` to `last` - 1, in place; call `fracslice.mesh.projection.project`."""
+    """Project points `first` to `last` - 1, in place; call `fracslice.mesh.contouring.project`."""
 
 class RootLoops:
     """Compiled loops that locate crossings on grid edges; keeps its arguments alive.
@@ -464,7 +464,7 @@ def weld(points: NDArray[float32]) -> tuple[NDArray[int64], NDArray[int32]]:
 def tree(
     vertices: NDArray[float64], triangles: NDArray[int32], threads: int = 0
 ) -> tuple[NDArray[int64], NDArray[float64], NDArray[float64]]:
-    """See `fracslice.mesh.tree.Tree`."""
+    """See `fracslice.mesh.spatial.Tree`."""
 
 def self_intersecting_triangles(
     vertices: NDArray[float64],
@@ -477,7 +477,7 @@ def self_intersecting_triangles(
 ) -> NDArray[bool_]: ...
 
 class Reduction:
-    """See `fracslice.mesh.collapse.Collapse`. Refers to the arrays during its lifetime."""
+    """See `fracslice.mesh.simplify.Collapse`. Refers to the arrays during its lifetime."""
 
     def __init__(self, vertices: NDArray[float64], triangles: NDArray[int32], tolerance: float) -> None: ...
     def renew(self) -> None:
@@ -492,10 +492,10 @@ class Reduction:
     def state(
         self,
     ) -> tuple[NDArray[int32], NDArray[bool_], NDArray[int32], NDArray[bool_], NDArray[int32]]:
-        """See `fracslice.mesh.collapse.Collapsed`."""
+        """See `fracslice.mesh.simplify.Collapsed`."""
 
 class Nearest:
-    """See `fracslice.mesh.nearest.Nearest`. Refers to the arrays during its lifetime."""
+    """See `fracslice.mesh.spatial.Nearest`. Refers to the arrays during its lifetime."""
 
     def __init__(
         self,
@@ -532,7 +532,7 @@ def nesting(
     first: NDArray[int64],
     threads: int = 0,
 ) -> tuple[NDArray[int64], NDArray[int64]]:
-    """Winding numbers and parents; see `fracslice.mesh.nesting.nesting`."""
+    """Winding numbers and parents; see `fracslice.mesh.shells.nesting`."""
 
 def side_of_line(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> int: ...
 def side_of_plane(a: Point, b: Point, c: Point, d: Point) -> int: ...

@@ -150,7 +150,7 @@ class Slab:
         levels: bytes,
         encoding: Encoding,
     ) -> tuple[bytes, float, int]:
-        """Coverage of a layer as shown on a screen, encoded; see `fracslice.slicing.slab.ScreenView`.
+        """Coverage of a layer as shown on a screen, encoded; see `fracslice.slicing.layers.ScreenView`.
 
         Parameters
         ----------

@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from .common.digits import significant
+from .common.messages import significant
 from .errors import SceneError
 from .formulas.material import TRAPS
-from .formulas.parameters import Choice, Number, Vector
-from .formulas.records import attribute, validate
+from .formulas.parameters import Choice, Number, Vector, attribute, validate
 from .scene import Print, Scene
 from .scene.lengths import AnyLength, AnyScale, Length, Percent
 

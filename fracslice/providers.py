@@ -13,22 +13,10 @@ _MODULES: dict[str, str] = {}
 
 
 def register(**modules: str) -> None:
-    """Set the modules of roles.
-
-    Parameters
-    ----------
-    **modules
-        Dotted path of the module of each role; it is imported when it is first asked for.
-    """
+    """Set the modules of roles."""
     _MODULES.update(modules)
 
 
 def provider(role: str) -> Any:
-    """Return the module of a role.
-
-    Parameters
-    ----------
-    role
-        Role, such as "compiler".
-    """
+    """Return the module of a role."""
     return import_module(_MODULES[role])

@@ -12,8 +12,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from .common.cache_files import Kept
-from .common.keys import key, program
+from .common.cache import Kept, key, program
 from .errors import ExportError, VolumeError
 from .kernel import Field
 from .kernel.host import toolchain
@@ -26,38 +25,15 @@ class Store:
     """Cache of arrays in files named by the hash of everything that they depend on.
 
     An unreadable or incomplete file is recomputed. A folder that other users can write to is not used
-    (`common.cache_files.Kept`).
-
-    Attributes
-    ----------
-    folder
-        Cache folder, created by the first write.
+    (`common.cache.Kept`).
     """
 
-    folder: Path
+    folder: Path  # cache folder, created by the first write
 
     def get(self, made_of: tuple[object, ...], make: Callable[[], Arrays]) -> Arrays:
-        """Return cached arrays, or compute and cache them.
-
-        Parameters
-        ----------
-        made_of
-            Values that the arrays depend on, as for `keys.key`; the program's own text is added.
-        make
-            Computes the arrays.
-
-        Returns
-        -------
-        Mapping
-            Arrays by name.
-
-        Raises
-        ------
-        VolumeError
-            If the folder cannot be written.
-        """
+        """Return cached arrays, or compute and cache them."""
         kept, name = Kept(self.folder), f"{key(program(), toolchain(), *made_of)}.npz"
-        value = kept.get(name, _read)
+        value = kept.get(name, _read_arrays)
         if value is not None:
             return value
         made = make()
@@ -69,33 +45,11 @@ class Store:
 
 
 def stored(store: Store | None, parts: tuple[object, ...], root: Field, make: Callable[[], Arrays]) -> Arrays:
-    """Return the arrays of a field: cached if there is a store, else computed.
-
-    Parameters
-    ----------
-    store
-        Cache, or None to compute without one.
-    parts
-        Values that the arrays depend on, besides the field.
-    root
-        Field.
-    make
-        Computes the arrays.
-
-    Returns
-    -------
-    Mapping
-        Arrays by name.
-
-    Raises
-    ------
-    VolumeError
-        If the folder of the store cannot be written.
-    """
+    """Return the arrays of a field: cached if there is a store, else computed."""
     return make() if store is None else store.get((*parts, root.key), make)
 
 
-def _read(file: BinaryIO) -> Arrays | None:
+def _read_arrays(file: BinaryIO) -> Arrays | None:
     """Read the arrays of a file; None if it is incomplete."""
     try:
         with np.load(file, allow_pickle=False) as arrays:

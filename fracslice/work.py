@@ -1,4 +1,4 @@
-"""Execution of a job: threads, progress and cancellation."""
+"""Execution of a job: threads, tasks in the background, progress and cancellation."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from itertools import islice
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -81,11 +82,13 @@ class Work:
             from .cluster import Workers
 
             object.__setattr__(self, "cluster", Workers.of(self.cluster))
-        from .formulas.parameters import Count  # imports NumPy, which --help does not need
-        from .formulas.records import validated
+        from .formulas.parameters import (
+            Count,  # imports NumPy, which --help does not need
+            validate_value,
+        )
 
         kind = Count(1, "how many", least=1, most=1024)
-        object.__setattr__(self, "threads", validated("threads", self.threads, kind, SceneError))
+        object.__setattr__(self, "threads", validate_value("threads", self.threads, kind, SceneError))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle and copy without progress, cancellation and pool, which belong to a process."""
@@ -244,18 +247,30 @@ class Work:
 
 
 def chunks(count: int, size: int) -> list[slice]:
-    """Split a range of indices into slices.
-
-    Parameters
-    ----------
-    count
-        Number of items.
-    size
-        Largest number of items per slice.
-
-    Returns
-    -------
-    list of slice
-        Consecutive slices that cover all items.
-    """
+    """Split a range of indices into slices."""
     return [slice(i, min(i + size, count)) for i in range(0, count, size)]
+
+
+@contextmanager
+def in_background(task: Callable[[], R], threads: int) -> Iterator[Callable[[], R]]:
+    """Run a task in another thread during a block; without other threads, when its result is asked for."""
+    if threads == 1:
+        yield cache(task)
+        return
+    begun = POOL.submit(task)
+    try:
+        yield begun.result
+    finally:
+        begun.cancel()
+        wait([begun])
+
+
+def ahead(items: Iterator[T]) -> Iterator[T]:
+    """Compute each item in another thread while the consumer uses the one before."""
+    coming = POOL.submit(next, items, None)
+    try:
+        while (item := coming.result()) is not None:
+            coming = POOL.submit(next, items, None)
+            yield item
+    finally:
+        wait([coming])

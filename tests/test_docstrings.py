@@ -40,8 +40,7 @@ def test_no_two_public_classes_have_one_name(trees: dict[Path, ast.Module]) -> N
 
 
 TWINS = {
-    "arrays", "camera", "cells", "cpu", "cuda", "cuda_loops", "definitions", "field", "film", "identity",
-    "implicit", "intrinsics", "machine", "model", "orbits", "tree",
+    "cpu", "cuda", "cuda_loops", "definitions", "field", "film", "implicit", "machine", "model", "orbits", "slices",
 }  # fmt: skip
 """Modules of one name in two packages: mostly two sides of one thing, such as a formula and its kernel."""
 

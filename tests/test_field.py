@@ -13,8 +13,8 @@ from fracslice.formulas.field import Field, Precision
 from fracslice.kernel import reference
 from fracslice.kernel.loops import points as points_loop
 from fracslice.printing.edits import Does, EditedField, edited_field
-from fracslice.printing.offset_field import OffsetField
 from fracslice.printing.samples import Samples
+from fracslice.printing.thin_features import OffsetField
 from fracslice.volume import Bricks, Lattice, sample
 
 Values = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]

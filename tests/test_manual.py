@@ -17,7 +17,7 @@ from fracslice.export import write
 
 from .mesh import shapes
 
-for name in ("animation.film", "jobs.slice_recipe", "jobs.stack_model"):
+for name in ("animation.film", "jobs.slices"):
     import_module(f"fracslice.{name}")  # before a test replaces what they import
 
 ROOT = Path(__file__).parents[1]
@@ -96,7 +96,7 @@ def begin(*_: object, **__: object) -> None:
 
 OWN = """
 from fracslice.formulas import orbit
-from fracslice.formulas.verbs import ball, fold
+from fracslice.formulas.orbits import ball, fold
 
 @orbit()
 def own(w, c):

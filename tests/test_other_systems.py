@@ -28,7 +28,7 @@ os.open = without_descriptors
 JOB = """
 from pathlib import Path
 from fracslice import sphere, make_mesh
-from fracslice.export.jobs import SliceRun
+from fracslice.export.slice_run import SliceRun
 from fracslice.export.layer_files import write_slices
 from fracslice.slicing import SliceJob, plan_stack
 from fracslice.slicing.raster import Screen

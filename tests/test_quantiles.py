@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fracslice.common.quantiles import quantile, weighted_quantiles
+from fracslice.common.arrays import quantile, weighted_quantiles
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 1000])

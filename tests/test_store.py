@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fracslice import MeshJob, Work, make_mesh
-from fracslice.common import keys
+from fracslice.common import cache
 from fracslice.errors import FracsliceWarning, VolumeError
 from fracslice.formulas import Box, Node, mandelbulb, offset, sphere
 from fracslice.kernel import Field, compile_scene
@@ -78,7 +78,7 @@ def test_samples_follow_from_the_guard(tmp_path: Path, monkeypatch: pytest.Monke
     assert sampled(work, sphere())[0] > 0
 
 
-CHANGED = ["formulas/primitives.py", "kernel/linker.py", "common/rows.py", "_native"]
+CHANGED = ["formulas/primitives.py", "kernel/linker.py", "common/arrays.py", "_native"]
 
 
 @pytest.mark.parametrize("changed", CHANGED)
@@ -90,21 +90,21 @@ def test_what_is_kept_follows_from_the_program(
     def edited(self: Path) -> bytes:
         return read(self) + b"#" * (changed in str(self))
 
-    before = keys.program()
+    before = cache.program()
     monkeypatch.setattr(Path, "read_bytes", edited)
     monkeypatch.setenv("FRACSLICE_CACHE", str(tmp_path / "cache"))
-    keys.program.cache_clear()
-    after = keys.program()
+    cache.program.cache_clear()
+    after = cache.program()
     monkeypatch.undo()
-    keys.program.cache_clear()
-    assert after != before == keys.program()
+    cache.program.cache_clear()
+    assert after != before == cache.program()
 
 
 def test_keys_tell_arrays_of_other_shapes_and_types_apart() -> None:
     a = np.zeros((2, 3), np.float32)
     parts = [(a,), (a.T,), (a.astype(np.int32),), (a, a), ("a", "b"), ("ab",), (1,), (1.0,), (True,), (b"1",)]
-    assert len({keys.key(*p) for p in parts}) == len(parts)
-    assert keys.key(a.T) == keys.key(np.ascontiguousarray(a.T))
+    assert len({cache.key(*p) for p in parts}) == len(parts)
+    assert cache.key(a.T) == cache.key(np.ascontiguousarray(a.T))
 
 
 def test_an_edited_field_is_kept_and_known_by_all_its_parts(tmp_path: Path) -> None:
@@ -158,16 +158,16 @@ def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
 
 def test_files_of_the_program_are_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """And again when one of them changes, even to as many bytes."""
-    package, hashed, texts = tmp_path / "package", [], keys.texts
+    package, hashed, texts = tmp_path / "package", [], cache.texts
     (package / "inner").mkdir(parents=True)
     for name in ("a.py", "inner/b.py", "inner/c.txt"):
         (package / name).write_text("1")
     monkeypatch.setenv("FRACSLICE_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(keys, "PACKAGE", package)
-    monkeypatch.setattr(keys, "texts", lambda *paths: hashed.append(paths) or texts(*paths))
+    monkeypatch.setattr(cache, "PACKAGE", package)
+    monkeypatch.setattr(cache, "texts", lambda *paths: hashed.append(paths) or texts(*paths))
 
     def program() -> str:
-        return str(keys.program.__wrapped__())
+        return str(cache.program.__wrapped__())
 
     before = program()
     assert program() == before

@@ -20,9 +20,9 @@ from fracslice.formulas import Node, names, sphere
 from fracslice.formulas import get as formula
 from fracslice.formulas.parameters import AUTO, REQUIRED, Count, Number, Vector
 from fracslice.formulas.registry import Formula
-from fracslice.kernel.devices import chosen
+from fracslice.kernel.devices import choose_device
 from fracslice.mesh.simplify import simplify
-from fracslice.printing.limits import Limits
+from fracslice.printing.problems import Limits
 from fracslice.rendering import Renderer
 from fracslice.scene import Print, parse_length, scene
 from fracslice.scene.view import PARTS, Camera, Film, View
@@ -81,7 +81,7 @@ NUMBERS: dict[str, Callable[[Any], Any]] = {
     "Limits.thin": lambda v: Limits(thin=v),
     "Limits.density": lambda v: Limits(density=v),
     "Work.threads": lambda v: Work(threads=v),
-    "Work.device": chosen,
+    "Work.device": choose_device,
     "BenchmarkTask.resolutions": lambda v: BenchmarkTask(resolutions=(v,)),
     "BenchmarkTask.repeats": lambda v: BenchmarkTask(repeats=v),
     "BenchmarkTask.limit_s": lambda v: BenchmarkTask(limit_s=v),

@@ -11,9 +11,8 @@ from contextlib import suppress
 import pytest
 
 import fracslice.work
-from fracslice.background import ahead, in_background
 from fracslice.errors import Cancelled
-from fracslice.work import Work
+from fracslice.work import Work, ahead, in_background
 
 
 @pytest.mark.parametrize("threads", [1, 2, 7])

@@ -2,7 +2,7 @@
 
 from .encode import ENDINGS, check_film, encode, sheet_frames
 from .film import FilmJob
-from .flight import flown
+from .flight import with_flight
 from .frames import write_frames
 from .timeline import Timeline
 
@@ -12,7 +12,7 @@ __all__ = [
     "Timeline",
     "check_film",
     "encode",
-    "flown",
     "sheet_frames",
+    "with_flight",
     "write_frames",
 ]

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..common.extras import lacking
+from ..common.messages import lacking
 from ..errors import ExportError
 from ..export import replacing
 from ..work import Work
@@ -82,7 +82,7 @@ def encode(frames: Sequence[Path], path: Path, fps: float, work: Work) -> None:
     pictures = _pictures(frames, work)
     with replacing(path) as file:
         if ending in CODECS:
-            file.write(_encoded(pictures, ending, fps))
+            file.write(_encode_film(pictures, ending, fps))
         elif ending == ".png":
             _contact_sheet(pictures, len(frames)).save(file, "png")
         elif ending == ".gif":
@@ -140,11 +140,11 @@ def _pictures(frames: Sequence[Path], work: Work) -> Iterator[Any]:
     """Pictures of the frames, one by one."""
     for done, frame in enumerate(frames, 1):
         work.check()
-        yield _opened(frame)
+        yield _open_picture(frame)
         work.progress("film", done / len(frames))
 
 
-def _opened(path: Path) -> Any:
+def _open_picture(path: Path) -> Any:
     """Picture of a file; the file is closed."""
     from PIL import Image
 
@@ -152,7 +152,7 @@ def _opened(path: Path) -> Any:
         return picture.convert("RGB")
 
 
-def _encoded(pictures: Iterator[Any], ending: str, fps: float) -> bytes:
+def _encode_film(pictures: Iterator[Any], ending: str, fps: float) -> bytes:
     """Film made by ffmpeg, in a process of its own."""
     import imageio_ffmpeg
 

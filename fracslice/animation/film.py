@@ -1,4 +1,4 @@
-"""Frames of a film, one by one."""
+"""Frames of a film, one by one, with automatic depths that change without a jump."""
 
 from __future__ import annotations
 
@@ -8,22 +8,42 @@ from pathlib import Path
 
 import numpy as np
 
-from ..common.keys import key, program
+from ..common.cache import key, program
 from ..errors import RenderError
 from ..export import application
 from ..export.images import encoded_image
-from ..formulas.parameters import Number
-from ..formulas.records import validated
+from ..formulas.parameters import Number, validate_value
 from ..formulas.registry import Node
-from ..kernel.devices import chosen
+from ..kernel.depth import resolve_depths
+from ..kernel.devices import choose_device
 from ..rendering import Renderer, develop, picture
-from ..rendering.picture_layers import layers
+from ..rendering.progressive import layers
 from ..rendering.sequence import SampleRange
-from ..rendering.setup import default_lights
+from ..rendering.setup import DETAIL, default_lights, footprint, surroundings
 from ..scene.model import Scene
+from ..scene.view import Camera
 from ..work import Work
-from .depths import gradual_depths
 from .timeline import Timeline
+
+SPAN = 4.0
+"""Ratio of the coarsest detail of a frame to its finest one."""
+
+
+def gradual_depths(root: Node, camera: Camera, size: tuple[int, int], count: int) -> list[Node]:
+    """Resolve the depths of a frame for a range of details.
+
+    A depth is a whole number, so a picture of one depth jumps to the next one. The mean of pictures over a
+    range of details changes from one depth to the next as gradually as the camera moves.
+
+    `size` in pixels. Returns the coarsest of half a pixel.
+    """
+    growth, base = footprint(camera, size)
+    detail = DETAIL * (growth * (surroundings(root, camera, growth) if growth else 0.0) + base)
+    coarsest = resolve_depths(root, detail)
+    if coarsest is root:
+        return [root] * count
+    return [resolve_depths(root, detail * SPAN ** (-(k + 0.5) / count)) for k in range(count)]
+
 
 TURNS = 5
 """Step through the depths from one time of the shutter to the next, so that a late one is not a deep one."""
@@ -60,7 +80,7 @@ class FilmJob:
     layers: bool = False
 
     def __post_init__(self) -> None:
-        validated("fps", self.fps, Number(24.0, "", above=0, most=1000), RenderError)
+        validate_value("fps", self.fps, Number(24.0, "", above=0, most=1000), RenderError)
 
     @property
     def frames(self) -> int:
@@ -77,7 +97,7 @@ class FilmJob:
         names = [light.file for light in scene.view.lights]
         names += [node.values.get("texture") for node in scene.root.walk()]
         pictures = [path.read_bytes() for path in map(Path, filter(None, names)) if path.is_file()]
-        about = self.size, self.samples, self.fps, self.ending, self.layers, chosen(self.device)
+        about = self.size, self.samples, self.fps, self.ending, self.layers, choose_device(self.device)
         return key(program(), scene.hash, *about, *pictures)
 
     def path(self, folder: Path, number: int) -> Path:

@@ -12,8 +12,8 @@ from ..formulas.registry import Node
 from ..kernel.depth import resolve_depths
 from ..rendering.setup import prepare
 from ..scene.animation import Animation, Keyframes, Track
-from ..scene.camera import Camera
 from ..scene.model import Scene
+from ..scene.view import Camera
 
 Points = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ KEYS, SHARE = 2.0, 0.01
 """Keyframes per second; clearance of a scene without one, relative to the size of the object."""
 
 
-def flown(scene: Scene, seconds: float, size: tuple[int, int]) -> Scene:
+def with_flight(scene: Scene, seconds: float, size: tuple[int, int]) -> Scene:
     """Return a scene with a flight.
 
     Parameters
@@ -77,26 +77,7 @@ def flight(root: Node, camera: Camera, least: float, steps: int) -> tuple[Points
     near the surface. A step is shorter than the distance to the surface less the clearance, and the field
     over its Lipschitz bound is a lower bound of this distance, so the clearance is guaranteed between points.
 
-    Parameters
-    ----------
-    root : Node
-        Root of the formula tree; depths may be "auto".
-    camera : Camera
-        First camera.
-    least : float
-        Clearance, scene units.
-    steps : int
-        Number of points of the path.
-
-    Returns
-    -------
-    points, targets : ndarray of float64, shape (steps, 3)
-        Positions of the eye, and points ahead of them.
-
-    Raises
-    ------
-    SceneError
-        If the camera begins nearer to the surface than the clearance.
+    `least` in scene units. Returns points, targets float64 (steps, 3).
     """
     known = resolve_depths(root, least / 2)
     kernel, bound = known.kernel("cpu", "float64"), known.bounds.lipschitz

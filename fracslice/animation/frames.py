@@ -10,12 +10,11 @@ from functools import lru_cache
 from pathlib import Path
 
 from ..cluster import Shard
-from ..common.digits import counted
-from ..common.files import replacing, reported
-from ..common.keys import key
-from ..common.locks import locked_folder
+from ..common.cache import key
+from ..common.files import locked_folder, replacing, reporting_errors
+from ..common.messages import format_count
 from ..errors import RenderError, SharedError
-from ..kernel.devices import chosen
+from ..kernel.devices import choose_device
 from ..kernel.host import toolchain
 from ..scene.reader import reads
 from ..scene.writer import to_xml
@@ -35,41 +34,21 @@ UNFINISHED = ".f*.part"
 
 @dataclass(frozen=True)
 class FrameTask:
-    """Frame of a film as a task of a cluster.
+    """Frame of a film as a task of a cluster."""
 
-    Attributes
-    ----------
-    scene, title : str
-        XML and name of the scene.
-    size, samples, fps, ending, layers
-        As for `FilmJob`.
-    job : str
-        Key of the film.
-    number : int
-        Number of the frame, from 0.
-    """
-
-    scene: str
+    scene: str  # XML and name of the scene
     title: str
-    size: tuple[int, int]
+    size: tuple[int, int]  # as for `FilmJob`
     samples: int
     fps: float
     ending: str
     layers: bool
-    job: str
-    number: int
+    job: str  # key of the film
+    number: int  # number of the frame, from 0
 
     @classmethod
     def all(cls, job: FilmJob, numbers: Sequence[int]) -> list[FrameTask]:
-        """Tasks of some frames.
-
-        Parameters
-        ----------
-        job : FilmJob
-            The film.
-        numbers : sequence of int
-            Numbers of the frames, from 0.
-        """
+        """Tasks of some frames."""
         scene, film = job.timeline.scene, key(toolchain(), job.key)
         about = job.size, job.samples, job.fps, job.ending, job.layers, film
         return [cls(to_xml(scene), scene.name, *about, number) for number in numbers]
@@ -125,8 +104,8 @@ def write_frames(job: FilmJob, numbers: Sequence[int], folder: Path, resume: boo
         job = replace(job, device="cpu")  # that of the tasks
     if isinstance(work.cluster, Shard) and not work.cluster.first:
         count = work.cluster.share(FrameTask.all(job, numbers), work)
-        raise SharedError(f"this shard made {counted(count, 'frame')}; shard 1 writes them")
-    with reported(folder):
+        raise SharedError(f"this shard made {format_count(count, 'frame')}; shard 1 writes them")
+    with reporting_errors(folder):
         folder.mkdir(exist_ok=True)
     with locked_folder(folder):
         _claim(job, folder, resume)
@@ -156,7 +135,7 @@ def _write_here(
 ) -> None:
     """Make frames in this process, some at once: the end of one frame does not keep all threads busy."""
     at_once = min(AT_ONCE, work.threads, max(1, MOST_PIXELS // math.prod(job.size)))
-    if chosen(job.device) != "cpu":
+    if choose_device(job.device) != "cpu":
         at_once = 1
     own = replace(work, threads=work.threads // at_once, progress=lambda *_: None)
     crew = replace(work, threads=at_once)
@@ -173,7 +152,7 @@ def _claim(job: FilmJob, folder: Path, resume: bool) -> None:
     if journal.exists():
         for path in folder.glob(UNFINISHED):
             path.unlink(missing_ok=True)
-        known = _known(journal)
+        known = _film_key(journal)
         if known == job.key:
             return
         if resume:
@@ -188,7 +167,7 @@ def _claim(job: FilmJob, folder: Path, resume: bool) -> None:
         file.write(json.dumps({"key": job.key, "fps": job.fps}).encode())
 
 
-def _known(journal: Path) -> str:
+def _film_key(journal: Path) -> str:
     """Key of the film whose frames are in a folder."""
     try:
         return str(json.loads(journal.read_text())["key"])

@@ -1,21 +1,177 @@
-"""Scene at a time: the values of all tracks, and a camera that keeps its distance to the surface."""
+"""Scene at a time: the values of all tracks, by the kind of motion, and a camera that keeps its distance
+to the surface.
+
+Smooth curves are monotone cubics (Fritsch and Carlson 1980; slopes of Fritsch and Butland 1984), which do not
+overshoot. Rotations are cubic splines of rotation vectors (Park and Ravani 1997). A path is a cubic spline
+through the points, over their centripetal parameters (Lee 1989), travelled by arc length.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from itertools import pairwise
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import SceneError
 from ..formulas.parameters import Number, Vector
+from ..formulas.registry import Node
+from ..kernel.depth import resolve_depths
 from ..scene.animation import Animation, Track
 from ..scene.model import Scene
 from ..scene.overrides import kind_of
-from .clearance import kept_clear
-from .motion_curves import CURVES, eased
+from ..scene.view import Camera
+
+STEPS = 256
+"""Most steps away from the surface."""
+MARGIN = 1.01
+"""Factor on a step, so that the distance is reached."""
+
+
+def kept_clear(root: Node, camera: Camera, least: float) -> Camera:
+    """Move a camera away from the surface until it is far enough.
+
+    Newton steps lead the eye along the gradient. It is measured over the clearance, so that it leads out of
+    narrower holes. The field over its Lipschitz bound is a lower bound of the distance, so the clearance is
+    guaranteed.
+
+    `least` in scene units.
+    """
+    known = resolve_depths(root, least / 2)
+    kernel, bound = known.kernel("cpu", "float64"), known.bounds.lipschitz
+    eye, offsets = np.array(camera.eye), least * np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])
+    for _ in range(STEPS):
+        f = kernel.points(*(eye + offsets).T)
+        missing = least - f[0] / bound
+        if missing <= 0:
+            return camera if np.array_equal(eye, camera.eye) else replace(camera, eye=tuple(eye.tolist()))
+        gradient = (f[1:4] - f[4:]) / (2 * least)
+        steepness = float(np.linalg.norm(gradient))
+        if not steepness > 0:
+            break
+        eye = eye + MARGIN * min(missing * bound / steepness, least) * gradient / steepness
+    raise camera.fail(f"eye: expected a place {least:g} away from the surface, and none was reached")
+
+
+Values = NDArray[np.float64]
+Curve = Callable[[float], Values]
+Ease = Literal["none", "in", "out", "both"]
+FINE = 256
+"""Points per segment of a path at which its arc length is measured."""
+
+
+def smooth(times: Values, values: Values) -> Curve:
+    """Return the monotone cubic through the keyframes.
+
+    `times`: float64 (n,); `values`: float64 (n, d).
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    curve: Curve = PchipInterpolator(times, values)
+    return curve
+
+
+def linear(times: Values, values: Values) -> Curve:
+    """Return the polygon through the keyframes; parameters as in `smooth`."""
+    return lambda time: np.array([np.interp(time, times, column) for column in values.T])
+
+
+def logarithmic(times: Values, values: Values) -> Curve:
+    """Return the curve of positive values whose logarithm is smooth; parameters as in `smooth`."""
+    if not (values > 0).all():
+        raise ValueError("values above zero")
+    inner = smooth(times, np.log(values))
+    return lambda time: np.exp(inner(time))
+
+
+def path(times: Values, values: Values) -> Curve:
+    """Return a curve in space whose pace has no jumps; parameters as in `smooth`."""
+    from scipy.interpolate import CubicSpline, PchipInterpolator
+
+    gaps = np.sqrt(np.linalg.norm(np.diff(values, axis=0), axis=1))
+    if not gaps.all():  # a rest: a spline needs distinct points
+        return smooth(times, values)
+    knots = np.concatenate([[0.0], np.cumsum(gaps)])
+    spline = CubicSpline(knots, values)
+    pieces = [np.linspace(a, b, FINE, endpoint=False) for a, b in pairwise(knots)]
+    fine = np.concatenate([*pieces, knots[-1:]])
+    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(spline(fine), axis=0), axis=1))])
+    travelled, place = PchipInterpolator(times, lengths[::FINE]), PchipInterpolator(lengths, fine)
+    return lambda time: np.asarray(spline(place(travelled(time))))
+
+
+def rotation(times: Values, values: Values) -> Curve:
+    """Return the rotation through keyframes of an axis and an angle in degrees; parameters as in `smooth`.
+
+    About a common axis, the angle is smooth, over any number of turns; between other rotations, the way is
+    the shortest.
+    """
+    from scipy.spatial.transform import Rotation, RotationSpline
+
+    axes = values[:, :3] / np.linalg.norm(values[:, :3], axis=1, keepdims=True)
+    if np.allclose(axes, axes[0]):
+        angle = smooth(times, values[:, 3:])
+        return lambda time: np.append(axes[0], angle(time))
+    spline = RotationSpline(times, Rotation.from_rotvec(axes * np.radians(values[:, 3:])))
+
+    def rotated(time: float) -> Values:
+        vector = spline(time).as_rotvec()
+        angle = float(np.linalg.norm(vector))
+        return np.append(vector / angle if angle else axes[0], np.degrees(angle))
+
+    return rotated
+
+
+def zoom(times: Values, values: Values) -> Curve:
+    """Return the curve of vectors whose direction and logarithm of length are smooth; as in `smooth`."""
+    lengths = np.linalg.norm(values, axis=1, keepdims=True)
+    if not lengths.all():
+        raise ValueError("points other than the target")
+    direction, length = smooth(times, values / lengths), logarithmic(times, lengths)
+
+    def vector(time: float) -> Values:
+        towards = direction(time)
+        return towards / np.linalg.norm(towards) * length(time)
+
+    return vector
+
+
+CURVES: dict[str, Callable[[Values, Values], Curve]] = {
+    "smooth": smooth,
+    "linear": linear,
+    "log": logarithmic,
+    "path": path,
+    "rotation": rotation,
+    "zoom": zoom,
+}
+
+
+def ease_time(times: Sequence[float], ease: str, time: float) -> float:
+    """Return the time at which a curve is read so that it begins or ends at rest.
+
+    Only the first and the last segment change; keyframes keep their times, and the pace is continuous.
+
+    `time` in seconds. Returns a value in seconds.
+    """
+    time = min(max(time, times[0]), times[-1])
+    if len(times) < 2 or ease == "none":
+        return time
+    first, last = times[1] - times[0], times[-1] - times[-2]
+    if ease == "both" and len(times) == 2:
+        part = (time - times[0]) / first
+        return times[0] + first * part * part * (3 - 2 * part)
+    if ease != "out" and time < times[1]:
+        part = (time - times[0]) / first
+        return times[0] + first * part * part * (2 - part)
+    if ease != "in" and time > times[-2]:
+        part = (times[-1] - time) / last
+        return times[-1] - last * part * part * (2 - part)
+    return time
+
 
 AUTOMATIC = {"camera.eye": "path", "transform.rotate": "rotation"}
 """Curves of attributes that are not plain numbers."""
@@ -80,7 +236,7 @@ class Timeline:
             raise track.fail(f"keys of {track.of}: expected {error}") from None
 
         def value(time: float) -> Any:
-            numbers = curve(eased(times, track.ease, time)) + origin(time)
+            numbers = curve(ease_time(times, track.ease, time)) + origin(time)
             return kind.check(numbers.tolist() if isinstance(kind, Vector) else float(numbers[0]))
 
         return value

@@ -7,24 +7,22 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Unpack
 
-from ..common.digits import counted
+from ..common.messages import format_count
 from ..jobs.mesh import make_mesh as make_mesh_job
-from ..jobs.mesh_result import MeshResult
+from ..jobs.report import MeshResult
 from ..mesh import Mesh
 from ..meshjob import MeshJob
 from ..scene import parse_length
 from ..scene.lengths import AnyLength, AnyScale
 from ..work import Work
-from .options import Options, keywords, print_of, work_of
-from .sources import Source, as_scene
+from .options import Options, Source, as_scene, keywords, print_of, work_of
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
     from ..formulas.field import Field
-    from ..jobs.placement import Placement
-    from ..jobs.report import Report
+    from ..jobs.report import Placement, Report
     from ..volume import Bricks
 
 
@@ -52,7 +50,9 @@ class Result(Mesh):
         if self.made.whole is not None:
             return super().__repr__()
         made = self.report.mesh
-        counts = f"{counted(made.triangles, 'triangle')}, {counted(made.vertices, 'vertex', 'vertices')}"
+        counts = (
+            f"{format_count(made.triangles, 'triangle')}, {format_count(made.vertices, 'vertex', 'vertices')}"
+        )
         return f"<Result of {counts}, only in its file>"
 
     def _repr_png_(self) -> bytes | None:

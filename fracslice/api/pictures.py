@@ -11,13 +11,12 @@ import numpy as np
 
 from ..errors import RenderError
 from ..formulas import Node
-from ..formulas.records import validated
+from ..formulas.parameters import validate_value
 from ..kernel.devices import for_picture
 from ..rendering import Renderer
 from ..rendering.progressive import SIZE
 from ..scene.view import Camera, Film, Light, View
-from .options import WorkOptions, keywords, work_of
-from .sources import Source, resolve
+from .options import Source, WorkOptions, keywords, resolve, work_of
 
 FILM = Film(width=640, height=480, samples=16)
 """Film of a shape without a scene, for a quick picture."""
@@ -101,9 +100,9 @@ def render(
     given: dict[str, Any] = {"camera": camera, "lights": None if lights is None else tuple(lights)}
     view = replace(view, **{name: value for name, value in given.items() if value is not None})
     most = view.film.samples if samples is None else samples
-    most = validated("samples", most, Film.kinds()["samples"], RenderError)
+    most = validate_value("samples", most, Film.kinds()["samples"], RenderError)
     pixels = (view.film.width, view.film.height) if size is None else size
-    film = validated("size", pixels, SIZE, RenderError)
+    film = validate_value("size", pixels, SIZE, RenderError)
     device = for_picture(options.get("device") or "auto", film, most)
     renderer = Renderer(root, view, film, work, device)
     seen = renderer.seen()

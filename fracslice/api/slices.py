@@ -10,16 +10,14 @@ from typing import TYPE_CHECKING, Generic, TypeVar, Unpack, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.digits import counted
-from ..common.extras import lacking
+from ..common.messages import format_count, lacking
 from ..errors import SliceError
 from ..scene import parse_length
 from ..scene.lengths import AnyLength, AnyScale
 from ..slicing import Contours, Layer, SliceJob, Slicer, Stack, adapted, plan_stack
 from ..volume.sizing import sizing
 from ..work import Work
-from .options import Options, keywords, print_of, work_of
-from .sources import Source, as_scene
+from .options import Options, Source, as_scene, keywords, print_of, work_of
 
 if TYPE_CHECKING:
     from shapely import MultiPolygon
@@ -65,7 +63,9 @@ class Layers(Sequence[T_co], Generic[T_co]):
 
     def __repr__(self) -> str:
         x, y, z = self.stack.size
-        return f"<{type(self).__name__}: {counted(len(self), 'layer')} of {x:.6g} x {y:.6g} x {z:.6g} mm>"
+        return (
+            f"<{type(self).__name__}: {format_count(len(self), 'layer')} of {x:.6g} x {y:.6g} x {z:.6g} mm>"
+        )
 
     @overload
     def __getitem__(self, index: int) -> T_co: ...

@@ -10,7 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..common.extras import lacking
+from ..common.messages import lacking
 from ..errors import BenchError
 from ..export import replacing
 from ..version import __version__
@@ -36,37 +36,13 @@ LABELS = {
 
 
 def require_plots() -> None:
-    """Check that matplotlib is installed.
-
-    Raises
-    ------
-    BenchError
-        If it is missing.
-    """
+    """Check that matplotlib is installed."""
     if reason := lacking("matplotlib", "plots need"):
         raise BenchError(reason)
 
 
 def write_report(measured: list[Measurement], folder: Path) -> list[Path]:
-    """Write report.md, numbers.json and the plots.
-
-    Parameters
-    ----------
-    measured : list of Measurement
-        The measurements.
-    folder : Path
-        Existing folder.
-
-    Returns
-    -------
-    list of Path
-        Files written.
-
-    Raises
-    ------
-    ExportError
-        If a file cannot be written.
-    """
+    """Write report.md, numbers.json and the plots."""
     about = {"version": __version__, "machine": _machine()}
     numbers = about | {"measurements": [asdict(one) for one in measured]}
     texts = {"report.md": _page(measured, about), "numbers.json": json.dumps(numbers, indent=1) + "\n"}

@@ -16,29 +16,17 @@ from ..common.memory import peak_rss_mb
 from ..mesh import Mesh
 from ..volume.accuracy import surface_error
 from ..work import Work
-from .workloads import WORKLOADS, Workload
+from .methods import WORKLOADS, Workload
 
 SAMPLES = 50_000
 WARM = 24
 """Resolution of the warm-up run."""
 
 
-def measured(method: str, what: Workload, resolution: int, work: Work) -> dict[str, Any]:
+def measure(method: str, what: Workload, resolution: int, work: Work) -> dict[str, Any]:
     """Measure time, memory and errors of a method after a warm-up run.
 
-    Parameters
-    ----------
-    method : str
-        Name in `METHODS`.
-    resolution : int
-        Voxels along the cube.
-    work : Work
-        Threads.
-
-    Returns
-    -------
-    dict
-        wall_s, cpu_s (seconds), peak_mb, evaluations, kept (samples), and the figures of `errors`.
+    Returns cpu_s (seconds).
     """
     from .methods import METHODS
 
@@ -71,20 +59,17 @@ def errors(mesh: Mesh, what: Workload, resolution: int) -> dict[str, Any]:
         points spread evenly over the surface. volume, area: relative errors, if the exact values are known.
     """
     voxel = what.voxel(resolution)
-    off = surface_error(what.root, spread(mesh, SAMPLES), voxel) / voxel
+    off = surface_error(what.root, surface_points(mesh, SAMPLES), voxel) / voxel
     result = {"triangles": len(mesh.triangles), "error_voxels": float(off.mean())}
     if what.volume is not None and what.area is not None:
         result |= {"volume": mesh.volume / what.volume - 1, "area": mesh.area / what.area - 1}
     return result
 
 
-def spread(mesh: Mesh, count: int) -> np.ndarray:
+def surface_points(mesh: Mesh, count: int) -> np.ndarray:
     """Sample points on a surface, uniformly by area and deterministically.
 
-    Returns
-    -------
-    ndarray of float64, shape (count, 3)
-        The points.
+    Returns float64 (count, 3).
     """
     rng, ends = np.random.default_rng(1), np.cumsum(np.linalg.norm(mesh.normals, axis=1))
     triangles = np.minimum(np.searchsorted(ends, rng.random(count) * ends[-1]), len(ends) - 1)
@@ -103,7 +88,7 @@ def main() -> None:
 
         figures = errors(read_mesh(asked["mesh"]), what, resolution)
     else:
-        figures = measured(asked["method"], what, resolution, Work(threads=asked["threads"]))
+        figures = measure(asked["method"], what, resolution, Work(threads=asked["threads"]))
     json.dump(figures, sys.stdout)
 
 

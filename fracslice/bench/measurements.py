@@ -1,9 +1,12 @@
-"""Benchmark runs: every measurement in its own child process, one after the other."""
+"""Benchmark runs of fracslice and of other programs: every measurement in its own child process, one after
+the other.
+"""
 
 from __future__ import annotations
 
 import json
 import os
+import shlex
 import subprocess
 import sys
 import tempfile
@@ -17,16 +20,39 @@ from statistics import median
 from typing import Any
 
 from ..cluster import Shard
-from ..common.digits import counted
-from ..common.keys import key, program
+from ..common.cache import key, program
 from ..common.memory import MAXRSS, own_peak_mb, peak_rss_mb
+from ..common.messages import format_count
 from ..errors import BenchError, FracsliceError, SharedError
-from ..formulas.parameters import Count, Number
-from ..formulas.records import attribute, validate, validated
+from ..formulas.parameters import Count, Number, attribute, validate, validate_value
 from ..work import Work
-from .methods import METHODS
-from .peers import Peer
-from .workloads import WORKLOADS
+from .methods import METHODS, WORKLOADS
+
+PLACES = ("{workload}", "{resolution}", "{output}")
+
+
+@dataclass(frozen=True)
+class Peer:
+    """External program to compare with."""
+
+    name: str  # name in the report
+    # command with {workload}, {resolution} and {output}, the mesh file in scene units that it writes
+    command: tuple[str, ...]
+
+    @classmethod
+    def read(cls, text: str) -> Peer:
+        """Parse NAME=COMMAND."""
+        name, _, command = text.partition("=")
+        missing = [place for place in PLACES if place not in command]
+        if not name or missing:
+            raise BenchError(
+                f"peer {text!r}: expected NAME=COMMAND with {{workload}}, {{resolution}} and {{output}}"
+            )
+        try:
+            return cls(name, tuple(shlex.split(command)))
+        except ValueError as error:
+            raise BenchError(f"peer {text!r}: {str(error).lower()}") from None
+
 
 FIGURES = ("wall_s", "cpu_s", "peak_mb", "evaluations")
 """Figures that a peer may report itself, in place of those of its process."""
@@ -34,31 +60,14 @@ FIGURES = ("wall_s", "cpu_s", "peak_mb", "evaluations")
 
 @dataclass(frozen=True)
 class BenchmarkTask:
-    """Benchmark task.
+    """Benchmark task."""
 
-    Attributes
-    ----------
-    workloads : tuple of str
-        Names in `WORKLOADS`.
-    resolutions : tuple of int
-        Voxels along the cube.
-    peers : tuple of Peer
-        External programs.
-    repeats : int
-        Runs per measurement; their median is reported.
-    limit_s : float
-        Time limit per run, seconds. A slower method is not run at finer resolutions of the workload.
-
-    Raises
-    ------
-    BenchError
-        If a value is invalid.
-    """
-
-    workloads: tuple[str, ...] = tuple(WORKLOADS)
-    resolutions: tuple[int, ...] = (64, 128, 256)
-    peers: tuple[Peer, ...] = ()
+    workloads: tuple[str, ...] = tuple(WORKLOADS)  # names in `WORKLOADS`
+    resolutions: tuple[int, ...] = (64, 128, 256)  # voxels along the cube
+    peers: tuple[Peer, ...] = ()  # external programs
+    # runs per measurement; their median is reported
     repeats: int = attribute(Count, 3, "runs of each", least=1, most=100)
+    # time limit per run, seconds. A slower method is not run at finer resolutions of the workload
     limit_s: float = attribute(Number, 60.0, "seconds", above=0)
 
     def __post_init__(self) -> None:
@@ -67,7 +76,7 @@ class BenchmarkTask:
                 raise BenchError(f"workload {name!r}: expected one of {', '.join(WORKLOADS)}")
         validate(self, BenchError)
         for n in self.resolutions:
-            validated("resolution", n, RESOLUTION, BenchError)
+            validate_value("resolution", n, RESOLUTION, BenchError)
 
 
 RESOLUTION = Count(256, "voxels along the cube", least=16, most=2048)
@@ -75,49 +84,18 @@ RESOLUTION = Count(256, "voxels along the cube", least=16, most=2048)
 
 @dataclass(frozen=True)
 class Measurement:
-    """Result of one method.
+    """Result of one method."""
 
-    Attributes
-    ----------
-    workload : str
-        Name of the workload.
-    resolution : int
-        Voxels along the cube.
-    method : str
-        Name of the method or peer.
-    numbers : dict of str to float
-        wall_s, cpu_s, error_voxels and other figures of the method; empty if it failed.
-    failed : str
-        Error message, or "".
-    """
-
-    workload: str
-    resolution: int
-    method: str
+    workload: str  # name of the workload
+    resolution: int  # voxels along the cube
+    method: str  # name of the method or peer
+    # wall_s, cpu_s, error_voxels and other figures of the method; empty if it failed
     numbers: dict[str, float]
-    failed: str = ""
+    failed: str = ""  # error message, or ""
 
 
 def measure(task: BenchmarkTask, work: Work) -> list[Measurement]:
-    """Run a benchmark. A failed method is reported, and the others continue.
-
-    Parameters
-    ----------
-    task : BenchmarkTask
-        The task.
-    work : Work
-        Threads or pool, progress and cancellation. A worker measures with one thread.
-
-    Returns
-    -------
-    list of Measurement
-        One for each workload, resolution and method.
-
-    Raises
-    ------
-    Cancelled
-        If the work was cancelled.
-    """
+    """Run a benchmark. A failed method is reported, and the others continue."""
     methods: list[str | Peer] = [name for name in METHODS if "scikit" not in name or find_spec("skimage")]
     result: dict[tuple[int, int, int], Measurement] = {}
     slow = set[tuple[str, int]]()
@@ -146,7 +124,7 @@ def _results(cases: Sequence[MeasureTask], work: Work) -> Iterator[bytes]:
             work.progress("measuring", done / len(cases))
             yield case.make(work)
     elif isinstance(pool, Shard) and not pool.first:
-        made = counted(pool.share(cases, work), "measurement")
+        made = format_count(pool.share(cases, work), "measurement")
         raise SharedError(f"this shard made {made}; shard 1 writes the report")
     else:
         yield from pool.results(cases, work, "measuring")
@@ -155,24 +133,12 @@ def _results(cases: Sequence[MeasureTask], work: Work) -> Iterator[bytes]:
 
 @dataclass(frozen=True)
 class MeasureTask:
-    """Measurement as a task.
+    """Measurement as a task."""
 
-    Attributes
-    ----------
-    workload : str
-        Name of the workload.
-    resolution : int
-        Voxels along the cube.
-    method : str or Peer
-        Workloads, resolutions, peers and repeats.
-    repeats : int
-        Runs, of which the median is reported.
-    """
-
-    workload: str
-    resolution: int
-    method: str | Peer
-    repeats: int
+    workload: str  # name of the workload
+    resolution: int  # voxels along the cube
+    method: str | Peer  # workloads, resolutions, peers and repeats
+    repeats: int  # runs, of which the median is reported
 
     @property
     def job(self) -> str:
@@ -212,7 +178,7 @@ def _runs(
 
 
 def _child(asked: dict[str, Any], work: Work) -> dict[str, float]:
-    output, _ = _run([sys.executable, "-m", "fracslice.bench.measure"], json.dumps(asked), work)
+    output, _ = _run_command([sys.executable, "-m", "fracslice.bench.measure"], json.dumps(asked), work)
     figures: dict[str, float] = json.loads(output)
     return figures
 
@@ -226,7 +192,7 @@ def _peer(peer: Peer, about: dict[str, Any], work: Work) -> dict[str, float]:
         path = Path(folder) / "mesh.ply"
         places = {"workload": about["workload"], "resolution": about["resolution"], "output": path}
         command = [word.format(**places) for word in peer.command]
-        output, used = _run(command, "", work)
+        output, used = _run_command(command, "", work)
         with suppress(ValueError, IndexError):
             figures = json.loads(output.splitlines()[-1])
             used |= {key: float(figures[key]) for key in FIGURES if key in figures}
@@ -235,7 +201,7 @@ def _peer(peer: Peer, about: dict[str, Any], work: Work) -> dict[str, float]:
         return used | _child(about | {"mesh": str(path)}, work)
 
 
-def _run(command: list[str], text: str, work: Work) -> tuple[str, dict[str, float]]:
+def _run_command(command: list[str], text: str, work: Work) -> tuple[str, dict[str, float]]:
     """Run a command; return its output, time and memory. Raises `_FailedError`, `Cancelled`."""
     start = time.perf_counter()
     with tempfile.TemporaryFile() as fed, tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
@@ -245,7 +211,7 @@ def _run(command: list[str], text: str, work: Work) -> tuple[str, dict[str, floa
             child = subprocess.Popen(command, stdin=fed, stdout=out, stderr=err)
         except OSError as error:
             raise _FailedError(f"{command[0]}: {error.strerror}") from None
-        status, usage, peak = _ended(child, work)
+        status, usage, peak = _wait_for_child(child, work)
         wall = time.perf_counter() - start
         out.seek(0)
         err.seek(0)
@@ -256,7 +222,7 @@ def _run(command: list[str], text: str, work: Work) -> tuple[str, dict[str, floa
         return out.read().decode(errors="replace"), used
 
 
-def _ended(child: subprocess.Popen[bytes], work: Work) -> tuple[int, Any, float]:
+def _wait_for_child(child: subprocess.Popen[bytes], work: Work) -> tuple[int, Any, float]:
     """Wait for a child process; stop it if the work is cancelled. Returns its status, usage and peak memory,
     MiB.
     """

@@ -1,10 +1,8 @@
 """One job on several machines: tasks are made by workers, and their results are files that all can reach."""
 
-from .arrays import Files, packed, unpacked
-from .connection import connected
-from .pool import Pool, Task
-from .result_folder import PAGE, Contents, ResultFolder
-from .shards import Shard
+from .connection import connect
+from .pool import Pool, Shard, Task
+from .result_folder import PAGE, Contents, Files, ResultFolder, pack_arrays, unpack_arrays
 from .workers import HIDDEN, Workers
 
 __all__ = [
@@ -17,7 +15,7 @@ __all__ = [
     "Shard",
     "Task",
     "Workers",
-    "connected",
-    "packed",
-    "unpacked",
+    "connect",
+    "pack_arrays",
+    "unpack_arrays",
 ]

@@ -10,7 +10,7 @@ from contextlib import ExitStack, contextmanager
 from multiprocessing import resource_tracker
 from typing import Any
 
-from ..common.extras import lacking
+from ..common.messages import lacking
 from ..errors import ClusterError
 from . import workers
 from .result_folder import ResultFolder
@@ -30,7 +30,7 @@ share one heap of glibc, which keeps freed memory for the next task; a heap of a
 
 
 @contextmanager
-def connected(where: str, store: str, threads: int = 1) -> Iterator[workers.Workers]:
+def connect(where: str, store: str, threads: int = 1) -> Iterator[workers.Workers]:
     """Connect to a scheduler, or start workers here.
 
     Parameters

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 import os
 import posixpath
 from collections.abc import Iterable, Sequence
@@ -12,8 +14,11 @@ from functools import cached_property
 from secrets import token_hex
 from typing import Any, BinaryIO, Protocol
 
-from ..common.extras import lacking
-from ..common.files import appended
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common.files import append_file
+from ..common.messages import lacking
 from ..errors import ClusterError
 
 Contents = bytes | Sequence[bytes | memoryview]
@@ -156,7 +161,7 @@ class ResultFolder:
             return file.write(self.read(job, name))
         try:
             with open(f"{self._place[1]}/{job}/{name}", "rb") as source:
-                return appended(source, file)
+                return append_file(source, file)
         except FileNotFoundError as error:
             raise ClusterError(f"{self.url}: {job}/{name}: {error}") from None
 
@@ -254,3 +259,55 @@ def _empty(folder: str) -> None:
 
     with ThreadPoolExecutor() as threads:
         list(threads.map(remove, (entry.path for entry in os.scandir(folder))))
+
+
+Files = dict[str, NDArray[Any]]
+"""Arrays by name."""
+
+ALIGNED = 64
+"""Bytes to whose multiples arrays are aligned in a file."""
+
+
+def pack_arrays(**arrays: NDArray[Any]) -> list[bytes | memoryview]:
+    """Blocks of arrays: a header line of JSON, then the arrays, without copies and checksums.
+
+    Parameters
+    ----------
+    **arrays : ndarray
+        Arrays by name.
+
+    Returns
+    -------
+    list of bytes-like
+        For `unpack_arrays`, one after another; they view the arrays.
+    """
+    about, end = dict[str, tuple[str, tuple[int, ...], int]](), 0
+    blocks = list[bytes | memoryview]()
+    for name, array in arrays.items():
+        plain = np.ascontiguousarray(array)
+        about[name] = plain.dtype.str, np.shape(array), end
+        blocks += [plain.reshape(-1).view(np.uint8).data, bytes(-plain.nbytes % ALIGNED)]
+        end += plain.nbytes + len(blocks[-1])
+    head = json.dumps(about).encode()
+    return [head + b" " * (-len(head) % ALIGNED + ALIGNED - 1) + b"\n", *blocks]
+
+
+def unpack_arrays(data: bytes) -> Files:
+    """Arrays from bytes of `pack_arrays`.
+
+    Parameters
+    ----------
+    data : bytes
+        The blocks in one, which the arrays view.
+
+    Returns
+    -------
+    dict
+        Arrays by name, read-only.
+    """
+    start = data.index(b"\n") + 1
+    arrays: Files = {}
+    for name, (kind, shape, begin) in json.loads(data[:start]).items():
+        count = math.prod(shape)
+        arrays[name] = np.frombuffer(data, kind, count, start + begin).reshape(shape)
+    return arrays

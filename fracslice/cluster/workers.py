@@ -1,9 +1,10 @@
-"""Workers of a Dask cluster."""
+"""Workers of a Dask cluster, and the identity by which two processes make the same bytes."""
 
 from __future__ import annotations
 
 import os
 import pickle
+import platform
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -11,17 +12,48 @@ from dataclasses import dataclass
 from secrets import token_hex
 from typing import TYPE_CHECKING, Any
 
-from ..common.cache_files import warn
+from ..common.cache import program, warn
 from ..common.memory import keep_memory_of_tasks
 from ..errors import ClusterError
-from .identity import Identity
-from .pool import Pool, Task, run
+from ..version import __version__
+from .pool import Pool, Task, run_task
 from .result_folder import ResultFolder
 
 if TYPE_CHECKING:
     from distributed import Client, Future
 
     from ..work import Work
+
+
+@dataclass(frozen=True)
+class Identity:
+    """What two processes must share to make the same bytes."""
+
+    # version of fracslice and of Python; keys of the program's text and of the processor's instructions
+    version: str
+    python: str
+    program: str
+    processor: str
+
+    @classmethod
+    def here(cls) -> Identity:
+        """Identity of this process."""
+        from ..kernel.host import toolchain
+
+        return cls(__version__, platform.python_version(), program(), toolchain())
+
+    def difference(self, expected: Identity) -> str:
+        """Describe the first difference; "" if there is none."""
+        for name, own, other in (
+            ("fracslice", self.version, expected.version),
+            ("Python", self.python, expected.python),
+            ("program text", self.program[:8], expected.program[:8]),
+            ("processor", self.processor[:8], expected.processor[:8]),
+        ):
+            if own != other:
+                return f"{name} {own}, expected {other}"
+        return ""
+
 
 HIDDEN = ".fracslice-pieces"
 """Folder of the results where none is named."""
@@ -49,20 +81,6 @@ def on_worker(pickled: bytes, pieces: ResultFolder, expected: Identity) -> None:
 
     Nothing is returned: a value would have to be fetched from a worker that may be gone. Exceptions travel
     through the scheduler.
-
-    Parameters
-    ----------
-    pickled : bytes
-        The task; another fracslice may lack its class, so the identity is compared first.
-    pieces : ResultFolder
-        Where its result belongs.
-    expected : Identity
-        Identity of the process that started the job.
-
-    Raises
-    ------
-    UnfitWorkerError
-        If this process is of another identity.
     """
     from distributed import get_worker
 
@@ -71,7 +89,7 @@ def on_worker(pickled: bytes, pieces: ResultFolder, expected: Identity) -> None:
     if difference := Identity.here().difference(expected):
         raise UnfitWorkerError(get_worker().address, difference)
     keep_memory_of_tasks()  # Dask starts workers with MALLOC_TRIM_THRESHOLD_=65536
-    run(pickle.loads(pickled), pieces, Work(threads=1))
+    run_task(pickle.loads(pickled), pieces, Work(threads=1))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,7 @@
-"""Loops over samples, written in Python and compiled by Numba."""
+"""Loops over arrays, compiled by Numba; disjoint sets among them.
+
+Importing this module imports Numba.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import numba
+import numpy as np
 
-from .cache_files import Kept, cache_folder
-from .keys import PACKAGE, texts
+from .cache import PACKAGE, Kept, cache_folder, texts
 
 CONFIG: Any = numba.config
 
@@ -20,11 +23,6 @@ def compiled(function: Callable[..., Any]) -> Any:
 
     Machine code is cached in the folder of the kernels unless other users can write there: Numba would load
     any file.
-
-    Returns
-    -------
-    Callable
-        Numba dispatcher of the function.
     """
     folder = _folder()
     if folder is None:
@@ -43,3 +41,65 @@ def _folder() -> Path | None:
     """
     own = [path for path in sorted(PACKAGE.rglob("*.py")) if b"@compiled\n" in path.read_bytes()]
     return Kept(cache_folder() / "loops" / texts(*own)).place()
+
+
+@compiled
+def find(parent, i):  # type: ignore[no-untyped-def]
+    """Return the root of element i; halve its path.
+
+    `parent`: int [n]; `i`: element index.
+    """
+    while parent[i] != i:
+        parent[i] = parent[parent[i]]
+        i = parent[i]
+    return i
+
+
+@compiled
+def unite(parent, a, b):  # type: ignore[no-untyped-def]
+    """Merge the sets of a and b; the smaller root remains.
+
+    `parent`: int [n]; `a`, `b`: element indices.
+    """
+    a, b = find(parent, a), find(parent, b)
+    if a < b:
+        parent[b] = a
+    else:
+        parent[a] = b
+
+
+@compiled
+def unite_all(parent, some, others):  # type: ignore[no-untyped-def]
+    """Merge the sets of each pair.
+
+    `parent`: int [n]; `some`, `others`: int [k] each.
+    """
+    for i in range(len(some)):
+        unite(parent, some[i], others[i])
+
+
+@compiled
+def number_sets(parent):  # type: ignore[no-untyped-def]
+    """Replace each parent by the number of its set, from 0 in the order of the smallest elements.
+
+    `parent`: int [n].
+    """
+    count = 0
+    for i in range(len(parent)):  # a parent is a smaller element, which already has its number
+        if parent[i] == i:
+            parent[i] = count
+            count += 1
+        else:
+            parent[i] = parent[parent[i]]
+    return count
+
+
+def connected_components(count: int, some: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, int]:
+    """Number the connected components of a graph.
+
+    `some`, `others`: int [k] each.
+    """
+    parent = np.arange(count)
+    unite_all(parent, some, others)
+    components = number_sets(parent)
+    return parent, components

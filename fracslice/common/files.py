@@ -1,10 +1,16 @@
-"""Atomic and flushed file writes, with errors of one line."""
+"""Files: atomic and flushed writes, locks against other processes, and files that no other user can have
+written.
+
+Windows has neither the permissions nor the flags that this checks; there, folders in the user's profile are
+private by inheritance.
+"""
 
 from __future__ import annotations
 
 import errno
 import os
 import shutil
+import stat
 import tempfile
 import threading
 from collections.abc import Iterator
@@ -12,10 +18,111 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from secrets import token_hex
-from typing import BinaryIO
+from typing import BinaryIO, Literal
 
 from ..errors import ExportError
-from .private import NO_LINK
+
+try:
+    import grp
+    import pwd
+
+    POSIX = True
+except ImportError:
+    POSIX = False
+
+OWNER_ONLY, BY_OTHERS = 0o600, 0o022
+NO_LINK = getattr(os, "O_NOFOLLOW", 0)
+NO_WAIT = getattr(os, "O_NONBLOCK", 0)
+"""Flag without which opening a pipe would block."""
+
+
+class NotPrivateError(PermissionError):
+    """Another user can write to this place."""
+
+
+@contextmanager
+def open_private(
+    path: str | Path,
+    mode: Literal["rb", "r+b"],
+    flags: int = 0,
+    folder: int | None = None,
+    buffering: int = -1,
+) -> Iterator[BinaryIO]:
+    """Open a file that no other user can write; do not follow a symbolic link."""
+
+    def opener(name: str, by_mode: int) -> int:
+        return os.open(name, by_mode | flags | NO_LINK | NO_WAIT, OWNER_ONLY, dir_fd=folder)
+
+    with open(path if folder is None else Path(path).name, mode, buffering, opener=opener) as file:
+        status = os.fstat(file.fileno())
+        if not stat.S_ISREG(status.st_mode) or not _is_private(status):
+            raise NotPrivateError(f"{path}: others can write this file")
+        yield file
+
+
+@contextmanager
+def private_folder(folder: Path) -> Iterator[int | None]:
+    """Open a folder whose contents and path no other user can change; create it if it does not exist.
+
+    Descends from the root and keeps each folder open while it checks the next one, so that nothing already
+    checked can be exchanged.
+    """
+    path = Path(os.path.realpath(folder))
+    if not POSIX:
+        path.mkdir(parents=True, exist_ok=True)
+        yield None
+        return
+    here = _folder(path.anchor, None)
+    try:
+        for place in [*reversed(path.parents), path][1:]:
+            if _lets_exchange(os.fstat(here)):
+                raise NotPrivateError(f"{place.parent}: others can write in this folder")
+            above, here = here, _folder(place.name, here)
+            os.close(above)
+        if not _is_private(os.fstat(here)):
+            raise NotPrivateError(f"{path}: others can write in this folder")
+        yield here
+    finally:
+        os.close(here)
+
+
+def _folder(name: str, within: int | None) -> int:
+    """Open a folder; create it for this user alone if it does not exist."""
+    flags = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
+    try:
+        return os.open(name, flags, dir_fd=within)
+    except FileNotFoundError:
+        with suppress(FileExistsError):
+            os.mkdir(name, 0o700, dir_fd=within)
+        return os.open(name, flags, dir_fd=within)
+
+
+def _is_private(status: os.stat_result) -> bool:
+    """True if no other user can write."""
+    return not POSIX or (status.st_uid in _trusted_users() and not status.st_mode & BY_OTHERS)
+
+
+def _trusted_users() -> tuple[int, int]:
+    """User ids whose files are trusted: this user's and root's, which could change any file anyway."""
+    return 0, os.geteuid()
+
+
+def _lets_exchange(status: os.stat_result) -> bool:
+    """True if others can replace an entry of this user in a folder."""
+    others = status.st_mode & stat.S_IWOTH or (status.st_mode & stat.S_IWGRP and not _alone_in(status.st_gid))
+    return status.st_uid not in _trusted_users() or bool(others and not status.st_mode & stat.S_ISVTX)
+
+
+def _alone_in(group: int) -> bool:
+    """True if a group is the user's private group. Debian creates one per user, with write permission on the
+    user's files.
+    """
+    try:
+        user, entry = pwd.getpwuid(os.geteuid()), grp.getgrgid(group)
+    except KeyError:
+        return False
+    return (group, entry.gr_name) == (user.pw_gid, user.pw_name) and set(entry.gr_mem) <= {user.pw_name}
+
 
 FLUSH_S = 0.05
 """Seconds between two flushes of a file that is being written; small ones are complete before the first."""
@@ -32,19 +139,8 @@ FULL = errno.ENOSPC, errno.EDQUOT
 
 
 @contextmanager
-def reported(path: str | Path) -> Iterator[None]:
-    """Raise errors of the file system as `ExportError`, with the path and the reason in one line.
-
-    Parameters
-    ----------
-    path
-        File or folder that the message names.
-
-    Raises
-    ------
-    ExportError
-        For an error of the file system.
-    """
+def reporting_errors(path: str | Path) -> Iterator[None]:
+    """Raise errors of the file system as `ExportError`, with the path and the reason in one line."""
     try:
         yield
     except OSError as error:
@@ -112,7 +208,7 @@ def replacing(path: str | Path, mode: int | None = None) -> Iterator[BinaryIO]:
         For an error of the file system.
     """
     target = check_target(path)
-    with reported(path):
+    with reporting_errors(path):
         handle, part = tempfile.mkstemp(".part", f".{target.name[:100]}.", target.parent)
         try:
             with os.fdopen(handle, "wb", BUFFER) as file:
@@ -127,14 +223,8 @@ def replacing(path: str | Path, mode: int | None = None) -> Iterator[BinaryIO]:
             raise
 
 
-def linked(source: str, path: str | Path) -> None:
-    """Give a complete file another name atomically; copy it where the file system cannot link it.
-
-    Raises
-    ------
-    ExportError
-        For an error of the file system.
-    """
+def link_or_copy(source: str, path: str | Path) -> None:
+    """Give a complete file another name atomically; copy it where the file system cannot link it."""
     target = check_target(path)
     part = str(target.with_name(f".{target.name[:100]}.{token_hex(8)}.part"))
     try:
@@ -149,21 +239,13 @@ def linked(source: str, path: str | Path) -> None:
         with suppress(FileNotFoundError):
             os.unlink(part)
         with replacing(path) as file, open(source, "rb") as whole:
-            appended(whole, file)
+            append_file(whole, file)
 
 
-def appended(source: BinaryIO, target: BinaryIO) -> int:
+def append_file(source: BinaryIO, target: BinaryIO) -> int:
     """Append a file to another one, by the kernel where it can.
 
-    Parameters
-    ----------
-    source, target : file
-        Binary files, open for reading and for writing.
-
-    Returns
-    -------
-    int
-        Number of bytes.
+    Returns number of bytes.
     """
     count, copy = os.fstat(source.fileno()).st_size, getattr(os, "copy_file_range", None)
     with suppress(OSError):  # of memory, on other file systems, or in an old kernel
@@ -209,22 +291,10 @@ def flushing(file: BinaryIO) -> Iterator[None]:
     flushed.result()
 
 
-def put(path: str, data: bytes) -> None:
+def write_small_file(path: str, data: bytes) -> None:
     """Write one of many files with as few system calls as possible, neither atomically nor flushed to disk.
 
     The caller must check the files that an interrupted job left before using them.
-
-    Parameters
-    ----------
-    path
-        File to write; links are not followed.
-    data
-        Contents.
-
-    Raises
-    ------
-    OSError
-        For an error of the file system.
     """
     flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | NO_LINK | getattr(os, "O_BINARY", 0)
     handle = os.open(path, flags, 0o666)
@@ -244,7 +314,7 @@ def _permissions(target: Path) -> int:
 
 def _replace(part: str, target: Path) -> None:
     """Move a file to its name; another thread releases a large one that had it."""
-    old = _held(target)
+    old = _hold_open(target)
     try:
         os.replace(part, target)
         _flush_folder(target.parent)
@@ -253,7 +323,7 @@ def _replace(part: str, target: Path) -> None:
             threading.Thread(target=os.close, args=(old,)).start()
 
 
-def _held(target: Path) -> int | None:
+def _hold_open(target: Path) -> int | None:
     """Open a large file before it is replaced. It is released when closed, a third of a second per GB."""
     with suppress(OSError):
         if os.name == "posix" and target.stat().st_size >= LARGE:
@@ -269,3 +339,35 @@ def _flush_folder(folder: Path) -> None:
             os.fsync(handle)
         finally:
             os.close(handle)
+
+
+def lock(handle: int, path: str | Path) -> None:
+    """Lock an open file or folder until it is closed, where the file system supports it."""
+    try:
+        try:
+            import fcntl
+        except ImportError:
+            import msvcrt
+
+            msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined]
+        else:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except (BlockingIOError, PermissionError):
+        raise ExportError(f"{path}: another process is writing it") from None
+    except OSError:
+        pass  # some file systems have no locks
+
+
+@contextmanager
+def locked_folder(folder: Path) -> Iterator[None]:
+    """Lock a folder during a block, where the system can open folders."""
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError:  # Windows opens no folders
+        yield
+        return
+    try:
+        lock(handle, folder)
+        yield
+    finally:
+        os.close(handle)

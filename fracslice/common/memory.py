@@ -48,13 +48,7 @@ def _tell_glibc(values: dict[int, int]) -> None:
 
 
 def peak_rss_mb() -> float:
-    """Return the peak resident set size of this process.
-
-    Returns
-    -------
-    float
-        Peak memory, MiB; 0 on a system that does not report it.
-    """
+    """Return the peak resident set size of this process."""
     if peak := own_peak_mb(os.getpid()):
         return peak
     try:
@@ -68,16 +62,6 @@ def own_peak_mb(process: int) -> float:
     """Return the peak resident set size of a running process, as Linux has it.
 
     The maximum of ``getrusage`` begins with the memory of the process that started it.
-
-    Parameters
-    ----------
-    process : int
-        Number of the process.
-
-    Returns
-    -------
-    float
-        Peak memory, MiB; 0 if it is unknown.
     """
     with suppress(OSError), open(f"/proc/{process}/status") as status:
         return next((int(line.split()[1]) / 1024 for line in status if line.startswith("VmHWM:")), 0.0)
@@ -87,11 +71,7 @@ def own_peak_mb(process: int) -> float:
 def available_bytes() -> int:
     """Return the memory that this process can still allocate.
 
-    Returns
-    -------
-    int
-        Free memory in bytes, within the limits of the process's control group; the address space on a system
-        that reports neither.
+    Returns free memory in bytes.
     """
     free = sys.maxsize
     if hasattr(os, "sysconf"):

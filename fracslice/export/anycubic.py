@@ -11,7 +11,7 @@ from itertools import accumulate
 from typing import BinaryIO
 
 from .._slices import Encoding
-from .prints import ADDRESSED, PrintData, pixel_format, rgb565
+from .layer_formats import ADDRESSED, PrintData, pixel_format, rgb565
 
 PREVIEW = 224, 168
 """Width and height of the preview, pixels."""

@@ -16,10 +16,10 @@ from .._slices import Encoding
 from ..errors import ExportError
 from ..version import __version__
 from . import png
-from .colour_png import write_png
-from .jobs import SliceRun
-from .prints import PrintData, PrintFormat
-from .ranges import Encode
+from .layer_formats import PrintData, PrintFormat
+from .layer_tasks import Encode
+from .png import write_png
+from .slice_run import SliceRun
 
 MOST_MEMBERS = 65_535
 

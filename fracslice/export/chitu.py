@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from .._slices import Encoding
 from ..slicing import Layer
-from .jobs import SliceRun
-from .prints import ADDRESSED, PrintData, PrintFormat, pixel_format, rgb565
+from .layer_formats import ADDRESSED, PrintData, PrintFormat, pixel_format, rgb565
+from .slice_run import SliceRun
 
 CTB, CBDDLP = 0x12FD0086, 0x12FD0019
 LEVELS = 4

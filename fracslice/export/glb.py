@@ -11,7 +11,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.srgb import to_linear
+from ..common.arrays import to_linear
 from ..errors import ExportError
 from ..mesh.model import Mesh
 from ..work import Work

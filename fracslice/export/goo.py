@@ -10,7 +10,7 @@ from typing import BinaryIO
 
 from .._slices import Encoding
 from ..version import __version__
-from .prints import PrintData, pixel_format, rgb565
+from .layer_formats import PrintData, pixel_format, rgb565
 
 MAGIC = b"\x07\0\0\0DLP\0"
 DELIMITER = b"\r\n"

@@ -2,17 +2,90 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import shutil
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import BinaryIO
 
 import numpy as np
 
 from ..common.files import replacing
 from ..errors import ExportError
-from ..work import Work
-from .colour_png import levels, write_png
-from .scanlines import write_exr, write_tiff
+from ..work import Work, chunks
+from .png import STRIP, levels, write_png
+
+
+@contextmanager
+def _named_temporary(file: BinaryIO, folder: Path | None) -> Iterator[Path]:
+    """Temporary file, for libraries that only write to named ones; its contents are copied to the file."""
+    with TemporaryDirectory(prefix=".fracslice-", dir=folder) as temporary:
+        yield (path := Path(temporary) / "picture")
+        with open(path, "rb") as written:
+            shutil.copyfileobj(written, file)
+
+
+def write_tiff(
+    file: BinaryIO,
+    shape: tuple[int, ...],
+    bands: Iterable[np.ndarray],
+    text: Mapping[str, str],
+    folder: Path | None = None,
+) -> None:
+    """Write a TIFF file by tifffile: 32-bit floats, uncompressed.
+
+    The bytes do not depend on the bands.
+    """
+    from tifffile import imwrite
+
+    def strips() -> Iterator[bytes]:
+        for band in bands:
+            for rows in chunks(len(band), STRIP):
+                yield np.ascontiguousarray(band[rows], "<f4").tobytes()
+
+    with _named_temporary(file, folder) as path:
+        imwrite(
+            path,
+            strips(),
+            shape=shape,
+            dtype="<f4",
+            rowsperstrip=STRIP,
+            photometric="rgb",
+            extrasamples=["assocalpha"] if shape[2] == 4 else None,
+            description="\n".join(f"{k}: {v}" for k, v in text.items()).encode(),
+            metadata=None,
+            software=False,
+        )
+
+
+def write_exr(
+    file: BinaryIO,
+    shape: tuple[int, ...],
+    bands: Iterable[np.ndarray],
+    names: Sequence[str],
+    text: Mapping[str, str],
+    folder: Path | None = None,
+) -> None:
+    """Write an OpenEXR file (Academy Software Foundation): 32-bit floats, losslessly compressed.
+
+    The bytes do not depend on the bands.
+    """
+    import Imath
+    import OpenEXR
+
+    header = OpenEXR.Header(shape[1], shape[0])
+    header["compression"] = Imath.Compression(Imath.Compression.ZIP_COMPRESSION)
+    header["channels"] = {name: Imath.Channel(Imath.PixelType(Imath.PixelType.FLOAT)) for name in names}
+    header |= {keyword: value.encode() for keyword, value in text.items()}
+    with _named_temporary(file, folder) as path:
+        output = OpenEXR.OutputFile(str(path), header)
+        for band in bands:
+            rows = {name: np.ascontiguousarray(band[..., k], "<f4") for k, name in enumerate(names)}
+            output.writePixels({name: values.tobytes() for name, values in rows.items()}, len(band))
+        output.close()
+
 
 IMAGES = (".png", ".jpg", ".jpeg", ".webp", ".exr", ".tif", ".tiff")
 LINEAR = (".exr", ".tif", ".tiff")
@@ -34,23 +107,7 @@ LAYERS = {
 
 
 def check_image(path: str | Path) -> str:
-    """Extension of an image file.
-
-    Parameters
-    ----------
-    path : str or path
-        The file to write.
-
-    Returns
-    -------
-    str
-        Extension in lower case, one of `IMAGES`.
-
-    Raises
-    ------
-    ExportError
-        For an unknown extension; the message lists the known ones.
-    """
+    """Extension of an image file."""
     ending = Path(path).suffix.lower()
     if ending not in IMAGES:
         raise ExportError(f"{path}: unknown kind of picture; known are {', '.join(IMAGES)}")
@@ -68,28 +125,7 @@ def write_image(
 ) -> Path:
     """Write an image to a file, in the format of its extension.
 
-    Parameters
-    ----------
-    path : str or path
-        The file to write.
-    shown : ndarray, float32 [height, width, 3 or 4]
-        sRGB in [0, 1], and unassociated alpha, for PNG, JPEG (without alpha) and WebP.
-    light : ndarray, float32 [height, width, 3 or 4]
-        Linear light, and alpha that it is multiplied by, for OpenEXR and TIFF.
-    bits : {8, 16}
-        Bits per channel of a PNG.
-    text : mapping of str to str, optional
-        Keywords and texts of the metadata.
-    work : Work, optional
-        Threads that compress a PNG; one by default.
-    layers : mapping of str to ndarray, float32 [height, width] or [height, width, 3], optional
-        Further layers of an OpenEXR file; see `LAYERS`.
-
-    Raises
-    ------
-    ExportError
-        For an unknown extension, another number of bits, layers of another format, or an error of the file
-        system.
+    `shown`: sRGB in [0, 1].
     """
     if bits not in (8, 16):
         raise ExportError(f"{path}: {bits} bits: expected 8 or 16")
@@ -110,15 +146,7 @@ def encoded_image(
     work: Work | None = None,
     layers: Mapping[str, np.ndarray] | None = None,
 ) -> bytes:
-    """Encode an image, in the format of an extension.
-
-    Parameters
-    ----------
-    ending : str
-        Extension, one of `IMAGES`.
-    shown, light, bits, text, work, layers
-        As for `write_image`.
-    """
+    """Encode an image, in the format of an extension."""
     metadata = text or {}
     if ending in LOSSY:
         return lossy(shown, LOSSY[ending], metadata)
@@ -126,7 +154,7 @@ def encoded_image(
     if ending == ".png":
         write_png(file, shown.shape, [shown], bits, metadata, work)
     elif ending == ".exr":
-        channels, names = _layered(light, layers or {})
+        channels, names = _layer_channels(light, layers or {})
         write_exr(file, channels.shape, [channels], names, metadata)
     else:
         write_tiff(file, light.shape, [light], metadata)
@@ -136,19 +164,7 @@ def encoded_image(
 def lossy(shown: np.ndarray, kind: str, text: Mapping[str, str]) -> bytes:
     """Encode a JPEG or WebP file by Pillow, with sRGB of 8 bits and a description.
 
-    Parameters
-    ----------
-    shown : ndarray, float [height, width, 3 or 4]
-        sRGB in [0, 1], and alpha, which JPEG leaves out.
-    kind : {"JPEG", "WEBP"}
-        The format.
-    text : mapping of str to str
-        Keywords and texts of the metadata.
-
-    Raises
-    ------
-    ExportError
-        If the format cannot hold the size.
+    `shown`: sRGB in [0, 1].
     """
     from PIL import Image
 
@@ -163,7 +179,7 @@ def lossy(shown: np.ndarray, kind: str, text: Mapping[str, str]) -> bytes:
     return file.getvalue()
 
 
-def _layered(light: np.ndarray, layers: Mapping[str, np.ndarray]) -> tuple[np.ndarray, list[str]]:
+def _layer_channels(light: np.ndarray, layers: Mapping[str, np.ndarray]) -> tuple[np.ndarray, list[str]]:
     """Linear light and the layers of `LAYERS` as channels, and their names."""
     names = [*"RGBA"[: light.shape[2]], *(name for layer in layers for name in LAYERS[layer])]
     return np.concatenate([light, *map(np.atleast_3d, layers.values())], 2), names
@@ -180,18 +196,7 @@ def write_bands(
 ) -> None:
     """Write an image to a file while it is made; the file is the same as that of `write_image`.
 
-    Parameters
-    ----------
-    path : str or path
-        The file to write, of a kind of `BANDED`.
-    size : tuple of int
-        Width and height, pixels.
-    bands : iterable of tuple of ndarray
-        Consecutive rows: sRGB and light, as for `write_image`.
-    channels : {3, 4}
-        Channels of the image.
-    bits, text, work
-        As for `write_image`.
+    `size` in pixels.
     """
     shape, ending, folder = (size[1], size[0], channels), check_image(path), Path(path).parent
     with replacing(path) as file:

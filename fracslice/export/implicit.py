@@ -60,23 +60,7 @@ def write_implicit(
 ) -> Path:
     """Write an object as a formula.
 
-    Parameters
-    ----------
-    operations : sequence of Operation
-        Operations of the formula, mm; the last one is the value.
-    box : Box
-        Bounds of the object, mm.
-    finest : float
-        Size of the smallest feature, mm.
-    path : str or path
-        The file to write.
-    metadata : mapping of str to str
-        Names and values.
-
-    Raises
-    ------
-    ExportError
-        For an error of the file system.
+    `operations`, `box`, `finest` in mm.
     """
     with replacing(path) as file:
         package(file, _model(operations, box, finest, metadata), False, LEVEL)

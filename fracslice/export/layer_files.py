@@ -9,8 +9,8 @@ from ..common.files import check_target
 from ..errors import ExportError
 from ..slicing.printers import Printer
 from . import anycubic, archives, chitu, goo, outlines, png, slices3mf
-from .jobs import SliceRun
-from .layerformats import FolderFormat, LayerFormat
+from .layer_formats import FolderFormat, LayerFormat
+from .slice_run import SliceRun
 
 PRINTS = {form.name: form for form in (*archives.FORMATS, goo.FORMAT, *chitu.FORMATS, anycubic.FORMAT)}
 """Formats of printers; they need a printer and a resin."""
@@ -56,25 +56,7 @@ ALIASES = {".sl1": (".sl1s",), ".prz": (".goo",), ".photon": (".cbddlp",)}
 
 
 def slice_format(path: str | Path, name: str | None = None) -> str:
-    """Name of the layer format of a file or folder, which is checked to be writable.
-
-    Parameters
-    ----------
-    path : str or path
-        The file or folder to write.
-    name : str, optional
-        Name of the format; by default, the extension of `path` selects it.
-
-    Returns
-    -------
-    str
-        A key of `FORMATS`.
-
-    Raises
-    ------
-    ExportError
-        For an unknown format or extension, or a path that cannot be written.
-    """
+    """Name of the layer format of a file or folder, which is checked to be writable."""
     ending = Path(path).suffix.lower()
     if Path(path).name.lower().endswith(".encrypted.ctb"):
         raise ExportError(
@@ -95,13 +77,7 @@ def slice_format(path: str | Path, name: str | None = None) -> str:
 
 
 def printers_file(printer: Printer, output: str | Path) -> str:
-    """Compare the file to write with the one that a printer reads.
-
-    Returns
-    -------
-    str
-        Which file to make instead, in one line; empty if the printer reads this one.
-    """
+    """Compare the file to write with the one that a printer reads."""
     path, ending = Path(output), f".{printer.file}"
     own = {ending, *ALIASES.get(ending, ())}
     if not printer.file or path.suffix.lower() in own:
@@ -119,26 +95,7 @@ def is_convertible(output: str | Path) -> bool:
 
 
 def write_slices(run: SliceRun, path: str | Path, name: str | None = None) -> Path:
-    """Slice a planned stack and write the layers to a file or folder.
-
-    Parameters
-    ----------
-    run : SliceRun
-        The layers to write.
-    path : str or path
-        The file or folder.
-    name : str, optional
-        Name of the format; by default, the extension of `path` selects it.
-
-    Raises
-    ------
-    ExportError
-        For an unknown format, or an error of the file system.
-    SliceError
-        If the layers cannot be cut.
-    Cancelled
-        When the work is cancelled.
-    """
+    """Slice a planned stack and write the layers to a file or folder."""
     form = slice_format(path, name)
     if form not in PICTURES and (run.sections > 1 or run.screen.compensation):
         raise ExportError(f"{path}: contours are of one section per layer, without compensation")

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..mesh.model import Mesh
 from ..work import Work
-from .text import number_rows
+from .packages import number_rows
 
 
 def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str], work: Work) -> None:

@@ -12,8 +12,8 @@ import numpy as np
 from isal.isal_zlib import crc32
 
 from ..slicing import Contours, Layer
-from .jobs import SliceRun
-from .layerformats import FileFormat, FolderFormat
+from .layer_formats import FileFormat, FolderFormat
+from .slice_run import SliceRun
 
 MICRON = 0.001
 """Unit of Common Layer Interface files, mm."""
@@ -102,7 +102,7 @@ def _cli_head(run: SliceRun, kind: str) -> bytes:
     return "\n".join(["$$HEADERSTART", *lines, "$$HEADEREND"]).encode()
 
 
-def _closed(points: np.ndarray) -> np.ndarray:
+def _close_outline(points: np.ndarray) -> np.ndarray:
     return np.concatenate([points, points[:1]]) / MICRON
 
 
@@ -110,7 +110,7 @@ def _cli_text(_: SliceRun, layer: Layer) -> bytes:
     rings = layer.contours
     lines = [f"$$LAYER/{layer.top / MICRON:.3f}"]
     for i, hole in enumerate(_holes(rings)):
-        points = _closed(rings[i])
+        points = _close_outline(rings[i])
         lines.append(f"$$POLYLINE/1,{0 if hole else 1},{len(points)}," + _pairs(points, "%.3f,%.3f", ","))
     return ("\n".join(lines) + "\n").encode()
 
@@ -119,7 +119,7 @@ def _cli_bytes(_: SliceRun, layer: Layer) -> bytes:
     rings = layer.contours
     commands = [struct.pack("<Hf", 127, layer.top / MICRON)]
     for i, hole in enumerate(_holes(rings)):
-        points = _closed(rings[i])
+        points = _close_outline(rings[i])
         commands += [
             struct.pack("<Hiii", 130, 1, 0 if hole else 1, len(points)),
             points.astype("<f4").tobytes(),

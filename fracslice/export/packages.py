@@ -1,13 +1,16 @@
-"""Packages of 3MF: ZIP archives with a model, in one stream or joined from deflated blocks."""
+"""Packages of 3MF: ZIP archives with a model as text, in one stream or joined from deflated blocks."""
 
 from __future__ import annotations
 
 import zipfile
 import zlib
-from collections.abc import Callable, Iterable
-from typing import BinaryIO, NamedTuple
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from typing import Any, BinaryIO, NamedTuple
 
+import numpy as np
 from isal.isal_zlib import crc32, crc32_combine
+from numpy.typing import NDArray
 
 HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
 TYPES = (
@@ -31,15 +34,9 @@ LAST_BLOCK = zlib.compressobj(wbits=-zlib.MAX_WBITS).flush()
 
 
 class TextSum(NamedTuple):
-    """Checksum and length of a text.
+    """Checksum and length of a text."""
 
-    Attributes
-    ----------
-    crc, size : int
-        CRC-32, and bytes.
-    """
-
-    crc: int
+    crc: int  # CRC-32, and bytes
     size: int
 
 
@@ -47,57 +44,26 @@ Fragment = Callable[[BinaryIO], TextSum]
 """Appends a text to a file, deflated and ended at a byte, so that another one may follow."""
 
 
-def deflated(text: bytes) -> tuple[bytes, TextSum]:
-    """Deflate a text by itself.
-
-    Returns
-    -------
-    bytes
-        Blocks of a deflate stream, none of them the last; they end at a byte.
-    TextSum
-        Checksum and length.
-    """
+def deflate(text: bytes) -> tuple[bytes, TextSum]:
+    """Deflate a text by itself."""
     packer = zlib.compressobj(LEVEL, zlib.DEFLATED, -zlib.MAX_WBITS)
     blocks = packer.compress(text) + packer.flush(zlib.Z_FULL_FLUSH)
     return blocks, TextSum(crc32(text), len(text))
 
 
 def append(blocks: tuple[bytes, TextSum], file: BinaryIO) -> TextSum:
-    """Append a deflated text to a file; a `Fragment` once its first argument is given.
-
-    Parameters
-    ----------
-    blocks : tuple
-        As from `deflated`.
-    file : file
-        Binary file, open for writing.
-
-    Returns
-    -------
-    TextSum
-        Checksum and length of the text.
-    """
+    """Append a deflated text to a file; a `Fragment` once its first argument is given."""
     file.write(blocks[0])
     return blocks[1]
 
 
-def followed(one: TextSum, other: TextSum) -> TextSum:
+def combine_checksums(one: TextSum, other: TextSum) -> TextSum:
     """Checksum and length of two texts, one after the other."""
     return TextSum(crc32_combine(one.crc, other.crc, other.size), one.size + other.size)
 
 
 def join(file: BinaryIO, fragments: Iterable[Fragment], is_large: bool) -> None:
-    """Write a package whose model is made of fragments. Its members carry no time.
-
-    Parameters
-    ----------
-    file : file
-        Binary file, open for writing and able to seek.
-    fragments : iterable of callable
-        Text of the model.
-    is_large : bool
-        True if the text may exceed 2 GiB.
-    """
+    """Write a package whose model is made of fragments. Its members carry no time."""
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=LEVEL) as archive:
         for name, text in SMALL:
             archive.writestr(zipfile.ZipInfo(name), text, zipfile.ZIP_DEFLATED)
@@ -107,7 +73,7 @@ def join(file: BinaryIO, fragments: Iterable[Fragment], is_large: bool) -> None:
         file.write(info.FileHeader(is_large))
         start = file.tell()
         for fragment in fragments:
-            whole = followed(whole, fragment(file))
+            whole = combine_checksums(whole, fragment(file))
         file.write(LAST_BLOCK)
         archive.start_dir = file.tell()
         info.CRC, info.file_size, info.compress_size = *whole, archive.start_dir - start
@@ -118,20 +84,41 @@ def join(file: BinaryIO, fragments: Iterable[Fragment], is_large: bool) -> None:
 
 
 def package(file: BinaryIO, model: Iterable[bytes], is_large: bool, level: int) -> None:
-    """Write a package with one model, deflated as one stream. Its members carry no time.
-
-    Parameters
-    ----------
-    file : file
-        Binary file, open for writing.
-    model : iterable of bytes
-        Text of the model.
-    is_large : bool
-        True if the text may exceed 2 GiB.
-    level : int
-        Level of deflate.
-    """
+    """Write a package with one model, deflated as one stream. Its members carry no time."""
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=level) as archive:
         for name, texts in (*((name, [text]) for name, text in SMALL), ("3D/3dmodel.model", model)):
             with archive.open(name, "w", force_zip64=is_large) as member:
                 member.writelines(texts)
+
+
+ROWS = 1 << 16
+"""Rows of a block."""
+
+Text = Callable[[], bytes]
+"""Makes a part of a text."""
+
+
+def number_rows(before: tuple[str, ...], end: str, values: NDArray[Any]) -> Iterator[Text]:
+    """Format each row of a large array, in blocks that threads can make at once."""
+    for begin in range(0, len(values), ROWS):
+        yield partial(_block, before, end, values[begin : begin + ROWS])
+
+
+def _block(before: tuple[str, ...], end: str, values: NDArray[Any]) -> bytes:
+    from .._native import text_rows
+
+    whole = values.dtype.kind in "iu"
+    given: NDArray[Any] = np.ascontiguousarray(values, np.int64 if whole else np.float32)
+    return text_rows(before, end, given)
+
+
+def rows(template: str, values: NDArray[Any]) -> Iterator[bytes]:
+    """Format each row of an array by a %-template, in blocks of bounded size.
+
+    One formatting call per block is several times faster than one per row.
+    """
+    block = template * ROWS
+    for begin in range(0, len(values), ROWS):
+        part = values[begin : begin + ROWS]
+        text = block if len(part) == ROWS else template * len(part)
+        yield (text % tuple(part.ravel().tolist())).encode("ascii")

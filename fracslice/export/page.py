@@ -26,25 +26,7 @@ def page(
 ) -> bytes:
     """Compose a summary page.
 
-    Parameters
-    ----------
-    title : str
-        Heading.
-    lines : sequence of str
-        Figures, a paragraph each.
-    verdict : str
-        Whether the object would print.
-    problems : sequence of str
-        Problems, a list item each.
-    tops, areas : float64 [n]
-        Upper face, mm, and area, mm2, of each layer.
-    picture : bytes
-        PNG of the worst layers.
-
-    Returns
-    -------
-    bytes
-        HTML, UTF-8.
+    `tops`, `areas`: float64 [n], mm, mm2.
     """
     image = b64encode(picture).decode("ascii")
     text = [
@@ -68,15 +50,7 @@ def page(
 def plot(tops: NDArray[np.float64], areas: NDArray[np.float64]) -> str:
     """Plot areas over height as SVG.
 
-    Parameters
-    ----------
-    tops, areas : float64 [n]
-        Upper face, mm, and area, mm2, of each layer.
-
-    Returns
-    -------
-    str
-        The SVG element. Each column of pixels shows the largest area in it.
+    `tops`, `areas`: float64 [n], mm, mm2.
     """
     most, high = max(float(areas.max(initial=0)), 1e-9), float(tops[-1])
     inner, tall = WIDTH - 2 * MARGIN, HEIGHT - 2 * MARGIN

@@ -13,55 +13,32 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.tables import read_table, read_text
+from ..common.settings import read_table, read_text
 from ..errors import ExportError
-from ..formulas.parameters import REQUIRED, Count, Label, Number
-from ..formulas.records import attribute, from_table, validate
+from ..formulas.parameters import REQUIRED, Count, Label, Number, attribute, from_table, validate
 from ..slicing.printers import PRINTERS, Printer
 
 
 @dataclass(frozen=True)
 class Resin:
-    """Settings of a resin on a printer.
+    """Settings of a resin on a printer."""
 
-    Attributes
-    ----------
-    exposure, bottom_exposure : float
-        Exposure of a layer, and of a bottom layer, s.
-    name : str
-        Name of the resin.
-    bottom_layers : int
-        Number of layers with the bottom exposure.
-    transition_layers : int
-        Number of layers above them over which the exposure falls linearly.
-    lift : float
-        Distance by which the platform rises after a layer, mm.
-    lift_speed, retract_speed : float
-        Speeds up and down, mm/min.
-    wait : float
-        Rest before a layer is exposed, s.
-    density : float
-        g/ml.
-    price : float
-        Price of a litre.
-
-    Raises
-    ------
-    ExportError
-        For an invalid value.
-    """
-
+    # exposure of a layer, and of a bottom layer, s
     exposure: float = attribute(Number, REQUIRED, "seconds of each layer", above=0, most=1000)
     bottom_exposure: float = attribute(Number, REQUIRED, "seconds of each bottom layer", above=0, most=1000)
-    name: str = attribute(Label, "unknown", "name of the resin")
+    name: str = attribute(Label, "unknown", "name of the resin")  # name of the resin
+    # number of layers with the bottom exposure
     bottom_layers: int = attribute(Count, 5, "bottom layers", most=200)
+    # number of layers above them over which the exposure falls linearly
     transition_layers: int = attribute(Count, 5, "transition layers", most=200)
+    # distance by which the platform rises after a layer, mm
     lift: float = attribute(Number, 5.0, "mm after each layer", above=0, most=100)
-    lift_speed: float = attribute(Number, 65.0, "mm/min", above=0, most=10_000)
+    lift_speed: float = attribute(Number, 65.0, "mm/min", above=0, most=10_000)  # speeds up and down, mm/min
     retract_speed: float = attribute(Number, 150.0, "mm/min", above=0, most=10_000)
+    # rest before a layer is exposed, s
     wait: float = attribute(Number, 0.5, "seconds before each layer", least=0, most=1000)
-    density: float = attribute(Number, 1.1, "g/ml", above=0, most=100)
-    price: float = attribute(Number, 0.0, "of a litre", least=0)
+    density: float = attribute(Number, 1.1, "g/ml", above=0, most=100)  # g/ml
+    price: float = attribute(Number, 0.0, "of a litre", least=0)  # price of a litre
 
     def __post_init__(self) -> None:
         validate(self, ExportError)
@@ -69,10 +46,7 @@ class Resin:
     def exposures(self, layers: int) -> NDArray[np.float64]:
         """Exposure of each layer.
 
-        Returns
-        -------
-        float64 [layers]
-            Seconds.
+        Returns float64 [layers].
         """
         above = np.arange(layers) - self.bottom_layers + 1
         share = np.clip(above / (self.transition_layers + 1), 0, 1)
@@ -87,20 +61,7 @@ class Resin:
 def resin(name: str, printer: Printer | None, layer: float) -> Resin:
     """Look up a resin in the table, or read it from a file.
 
-    Parameters
-    ----------
-    name : str
-        Name in the table for the printer, or a file: .toml with the attributes of `Resin`, or a resin profile
-        (.ini) of PrusaSlicer.
-    printer : Printer or None
-        The printer.
-    layer : float
-        Layer height, mm; the nearest one in the table counts.
-
-    Raises
-    ------
-    ExportError
-        For an unknown resin, or a file that cannot be read or has an invalid value.
+    `layer` in mm.
     """
     ending = Path(name).suffix.lower()
     if ending == ".ini":
@@ -123,18 +84,7 @@ def resin(name: str, printer: Printer | None, layer: float) -> Resin:
 def default_resin(printer: Printer, layer: float) -> Resin | None:
     """Settings of the printer's own resin.
 
-    Parameters
-    ----------
-    printer : Printer
-        The printer.
-    layer : float
-        Layer height, mm.
-
-    Returns
-    -------
-    Resin or None
-        Settings for the nearest layer height; where the maker publishes none, `START` for a printer of the
-        table, to calibrate it, and None for another one.
+    `layer` in mm.
     """
     if printer.settings:
         return moving(of_table(printer.name, dict(printer.settings)), printer, printer.settings)
@@ -144,29 +94,13 @@ def default_resin(printer: Printer, layer: float) -> Resin | None:
 
 
 def resin_names(printer: Printer | None) -> list[str]:
-    """Names of the resins of the table for a printer, or for any.
-
-    Parameters
-    ----------
-    printer : Printer or None
-        The printer; None for all.
-    """
+    """Names of the resins of the table for a printer, or for any."""
     tables = _table().values() if printer is None else [_table().get(printer.name, {})]
     return sorted({name for table in tables for name in table})
 
 
 def moving(resin: Resin, printer: Printer | None, but: Collection[tuple[str, Any]] = ()) -> Resin:
-    """Take the motion of a printer.
-
-    Parameters
-    ----------
-    resin : Resin
-        Settings.
-    printer : Printer or None
-        The printer.
-    but : collection of (str, value), optional
-        Settings that stay.
-    """
+    """Take the motion of a printer."""
     if printer is None:
         return resin
     motion: dict[str, Any] = dict(
@@ -176,20 +110,7 @@ def moving(resin: Resin, printer: Printer | None, but: Collection[tuple[str, Any
 
 
 def of_table(where: str, values: Mapping[str, Any]) -> Resin:
-    """Make settings from the keys and values of a file.
-
-    Parameters
-    ----------
-    where : str
-        File, for messages.
-    values : mapping
-        Attributes of `Resin`.
-
-    Raises
-    ------
-    ExportError
-        For an unknown or missing key, or an invalid value.
-    """
+    """Make settings from the keys and values of a file."""
     return from_table(Resin, where, {"name": Path(where).stem, **values}, ExportError)
 
 

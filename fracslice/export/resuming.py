@@ -15,10 +15,18 @@ from typing import BinaryIO
 
 from isal.isal_zlib import crc32
 
-from ..common.files import BUFFER, FULL, check_target, replacing, reported
-from ..common.locks import lock, locked_folder
-from ..common.private import OWNER_ONLY, opened
-from ..common.seals import seal
+from ..common.cache import seal
+from ..common.files import (
+    BUFFER,
+    FULL,
+    OWNER_ONLY,
+    check_target,
+    lock,
+    locked_folder,
+    open_private,
+    replacing,
+    reporting_errors,
+)
 from ..errors import ExportError, FracsliceWarning
 
 JOB = "job.json"
@@ -46,24 +54,12 @@ _HEAD = struct.Struct("<II")
 
 @dataclass(eq=False)
 class Journal:
-    """The finished layers of a job.
+    """The finished layers of a job."""
 
-    Attributes
-    ----------
-    file : file
-        Binary file, open for reading and writing.
-    size : int
-        Size of the file, bytes.
-    begins : list of bytes
-        The first `BEGIN` bytes of each layer.
-    sizes : list of int
-        Size of each layer, bytes.
-    """
-
-    file: BinaryIO
-    size: int = 0
-    begins: list[bytes] = field(default_factory=list)
-    sizes: list[int] = field(default_factory=list)
+    file: BinaryIO  # binary file, open for reading and writing
+    size: int = 0  # size of the file, bytes
+    begins: list[bytes] = field(default_factory=list)  # the first `BEGIN` bytes of each layer
+    sizes: list[int] = field(default_factory=list)  # size of each layer, bytes
 
     @property
     def count(self) -> int:
@@ -71,13 +67,7 @@ class Journal:
         return len(self.sizes)
 
     def append(self, layer: bytes) -> None:
-        """Append the next layer, which survives the process.
-
-        Parameters
-        ----------
-        layer : bytes
-            The encoded layer.
-        """
+        """Append the next layer, which survives the process."""
         self.file.write(_HEAD.pack(len(layer), crc32(layer)) + layer)
         self.file.flush()
         self.add(layer)
@@ -95,15 +85,7 @@ class Journal:
     def groups(self) -> Iterator[list[bytes]]:
         """Iterate over all layers in groups, each of which is read in one go.
 
-        Yields
-        ------
-        list of bytes
-            Consecutive layers, at least `GROUP` bytes of them, or the last ones.
-
-        Raises
-        ------
-        ExportError
-            If a record cannot be read back.
+        Yields at least `GROUP` bytes of them.
         """
         self.file.seek(0)
         group, size = list[bytes](), 0
@@ -118,25 +100,7 @@ class Journal:
 
 
 def whole_layers(file: BinaryIO, count: int) -> Iterator[bytes]:
-    """Read layers that `Journal.append` wrote.
-
-    Parameters
-    ----------
-    file : file
-        Binary file at the first layer.
-    count : int
-        Number of layers.
-
-    Yields
-    ------
-    bytes
-        An encoded layer.
-
-    Raises
-    ------
-    ExportError
-        If one is missing, incomplete or damaged.
-    """
+    """Read layers that `Journal.append` wrote."""
     made = 0
     for layer in islice(_readable(file), count):
         yield layer
@@ -163,25 +127,15 @@ def journal(path: str | Path, job: str) -> Iterator[Journal]:
     the block ends and kept when it is interrupted. A journal of another job or another user is discarded
     with a warning.
 
-    Parameters
-    ----------
-    path : str or path
-        The file that the job writes.
-    job : str
-        Key of everything that determines the bytes.
-
-    Raises
-    ------
-    ExportError
-        For an error of the file system, or if another process is writing the same file.
+    `job`: key of everything that determines the bytes.
     """
     target = check_target(path)
     part, manifest = (target.with_name(f".{target.name}.{end}") for end in ("part", "job"))
-    with _resumed(path):
+    with _reporting_resumption(path):
         _remove_foreign(part)
-        with opened(part, "r+b", os.O_CREAT, buffering=BUFFER) as file:
+        with open_private(part, "r+b", os.O_CREAT, buffering=BUFFER) as file:
             lock(file.fileno(), path)
-            if _read(manifest) != _manifest(job):
+            if _read_job_file(manifest) != _manifest(job):
                 if os.fstat(file.fileno()).st_size:
                     _warn_discarded(path)
                 manifest.unlink(missing_ok=True)
@@ -206,32 +160,14 @@ def resumable_folder(
 
     Layers of another interrupted job are removed with a warning.
 
-    Parameters
-    ----------
-    folder : Path
-        The folder.
-    job : str
-        Key of everything that determines the bytes.
-    name : callable
-        File name of the layer with a given index.
-    is_whole : callable
-        True if the bytes are a complete layer file.
-
-    Yields
-    ------
-    int
-        Index of the first layer to write.
-
-    Raises
-    ------
-    ExportError
-        For a folder with other files, an error of the file system, or if another process is writing there.
+    `job`: key of everything that determines the bytes; `is_whole`: true if the bytes are a complete layer
+    file.
     """
-    with reported(folder):
+    with reporting_errors(folder):
         folder.mkdir(exist_ok=True)
-    with _resumed(folder), locked_folder(folder):
+    with _reporting_resumption(folder), locked_folder(folder):
         names = set(os.listdir(folder))
-        manifest = _read(folder / JOB)
+        manifest = _read_job_file(folder / JOB)
         if names and not (manifest.startswith(OURS) and all(n == JOB or LAYER.fullmatch(n) for n in names)):
             raise ExportError(f"{folder}: the folder is not empty, and its files are no interrupted job")
         if manifest != _manifest(job):
@@ -249,10 +185,10 @@ def resumable_folder(
 
 
 @contextmanager
-def _resumed(path: str | Path) -> Iterator[None]:
-    """`reported`, which says of a full disk that finished layers are kept."""
+def _reporting_resumption(path: str | Path) -> Iterator[None]:
+    """`reporting_errors`, which says of a full disk that finished layers are kept."""
     try:
-        with reported(path):
+        with reporting_errors(path):
             yield
     except ExportError as error:
         if isinstance(error.__cause__, OSError) and error.__cause__.errno in FULL:
@@ -260,10 +196,10 @@ def _resumed(path: str | Path) -> Iterator[None]:
         raise
 
 
-def _read(manifest: Path) -> bytes:
+def _read_job_file(manifest: Path) -> bytes:
     """Contents of a job file; empty if it is missing or others can have written it."""
     try:
-        with opened(manifest, "rb") as file:
+        with open_private(manifest, "rb") as file:
             return file.read()
     except OSError:
         return b""
@@ -286,7 +222,7 @@ def _warn_discarded(path: str | Path) -> None:
 def _remove_foreign(part: Path) -> None:
     """Remove an entry in place of the journal, such as a link, that others can write."""
     try:
-        with opened(part, "rb"):
+        with open_private(part, "rb"):
             return
     except FileNotFoundError:
         return

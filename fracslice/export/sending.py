@@ -18,8 +18,8 @@ from io import BufferedReader
 from pathlib import Path
 from urllib.parse import quote, urlsplit
 
-from ..common.files import reported
-from ..common.tables import read_text
+from ..common.files import reporting_errors
+from ..common.settings import read_text
 from ..errors import ExportError
 from ..work import Work
 
@@ -37,25 +37,7 @@ KEY, KEY_FILE = "FRACSLICE_KEY", "FRACSLICE_KEY_FILE"
 
 
 def printer_address(text: str) -> tuple[str, str, int, str]:
-    """Parse the address of a printer.
-
-    Parameters
-    ----------
-    text : str
-        "prusalink://HOST", with "/local" for a storage other than "usb", or "sdcp://HOST"; both with an
-        optional port.
-
-    Returns
-    -------
-    protocol, host : str
-    port : int
-    storage : str
-
-    Raises
-    ------
-    ExportError
-        For any other text, or if PrusaLink has no key.
-    """
+    """Parse the address of a printer."""
     try:
         url = urlsplit(text)
         host, port = url.hostname, url.port
@@ -70,27 +52,10 @@ def printer_address(text: str) -> tuple[str, str, int, str]:
 
 
 def send(path: str | Path, address: str, work: Work) -> str:
-    """Upload a file to a printer.
-
-    Parameters
-    ----------
-    path : str or path
-        The file.
-    address : str
-        As for `printer_address`.
-    work : Work
-        Progress and cancellation.
-
-    Raises
-    ------
-    ExportError
-        If the printer cannot be reached or refuses the file.
-    Cancelled
-        When the work is cancelled.
-    """
+    """Upload a file to a printer."""
     protocol, host, port, storage = printer_address(address)
     upload = partial(_prusalink, storage) if protocol == "prusalink" else _sdcp
-    with reported(Path(path)), open(path, "rb") as file:
+    with reporting_errors(Path(path)), open(path, "rb") as file:
         connection = HTTPConnection(host, port, timeout=TIMEOUT)
         try:
             upload(connection, Path(path).name, file, os.fstat(file.fileno()).st_size, work)
@@ -139,7 +104,7 @@ def _prusalink(
     }
     url = f"/api/v1/files/{storage}/{quote(name)}"
     connection.request("PUT", url, _packets(file, size, work), headers)
-    status = _answered(connection.getresponse()).status
+    status = _read_response(connection.getresponse()).status
     if status in (401, 403):
         raise ExportError("the printer refuses the key")
     if status == 404:
@@ -170,7 +135,7 @@ def _sdcp(connection: HTTPConnection, name: str, file: BufferedReader, size: int
         offset += len(packet)
 
 
-def _answered(response: HTTPResponse) -> HTTPResponse:
+def _read_response(response: HTTPResponse) -> HTTPResponse:
     """A response whose contents have been read."""
     response.read()
     return response

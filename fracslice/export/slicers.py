@@ -37,35 +37,17 @@ _LOG = re.compile(r"^\[[^]]*\]\s*\[[^]]*\]\s*\[(\w+)\]\s*")
 
 @dataclass(frozen=True)
 class FilamentSlicer:
-    """A slicer with a command line.
+    """A slicer with a command line."""
 
-    Attributes
-    ----------
-    title : str
-        Name in messages.
-    programs : tuple of str
-        Names of the program.
-    model, output : str
-        Extensions of the file that it reads and of the one that it writes.
-    command : callable
-        Makes its command line.
-    """
-
-    title: str
-    programs: tuple[str, ...]
-    model: str
+    title: str  # name in messages
+    programs: tuple[str, ...]  # names of the program
+    model: str  # extensions of the file that it reads and of the one that it writes
     output: str
-    command: Command
+    command: Command  # makes its command line
 
     @property
     def program(self) -> str:
-        """Path of the program.
-
-        Raises
-        ------
-        ExportError
-            If it is not installed.
-        """
+        """Path of the program."""
         for name in self.programs:
             if path := shutil.which(name):
                 return path
@@ -74,57 +56,22 @@ class FilamentSlicer:
         )
 
     def check(self, profiles: Sequence[str]) -> None:
-        """Check that the program is installed and its profiles can be passed to it.
-
-        Parameters
-        ----------
-        profiles : sequence of str
-            Profiles of the slicer.
-
-        Raises
-        ------
-        ExportError
-            If the program is missing, or a profile is of no known type.
-        """
+        """Check that the program is installed and its profiles can be passed to it."""
         self.command(self.program, profiles, Path(self.model), Path(self.output))
 
     def slice(self, model: Path, profiles: Sequence[str], path: Path, work: Work) -> list[str]:
-        """Slice a model.
-
-        Parameters
-        ----------
-        model : path
-            The model.
-        profiles : sequence of str
-            Profiles of the slicer.
-        path : path
-            The file to write.
-        work : Work
-            Cancellation.
-
-        Returns
-        -------
-        list of str
-            Warnings of the slicer.
-
-        Raises
-        ------
-        ExportError
-            If the program is missing or fails, or the file cannot be written.
-        Cancelled
-            When the work is cancelled; the program is stopped.
-        """
+        """Slice a model."""
         program, target = self.program, check_target(path)
         with tempfile.TemporaryDirectory(prefix=".fracslice-", dir=target.parent) as folder:
             made = Path(folder) / target.name
-            output = _run(self.command(program, profiles, model, made), work, self.title)
+            output = _run_program(self.command(program, profiles, model, made), work, self.title)
             if not made.exists():
                 raise ExportError(f"{self.title} wrote no file: {_last(output)}")
             os.replace(made, target)
         return _warnings(output)
 
 
-def _run(command: Sequence[str], work: Work, title: str) -> list[str]:
+def _run_program(command: Sequence[str], work: Work, title: str) -> list[str]:
     """Run a program; return the lines that it prints."""
     with tempfile.TemporaryFile() as output:
         process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=output, stderr=output)

@@ -10,11 +10,10 @@ import numpy as np
 
 from ..errors import ExportError
 from ..slicing import Layer
-from .jobs import SliceRun
-from .layerformats import FileFormat
-from .packages import package
-from .ranges import Encode
-from .text import rows
+from .layer_formats import FileFormat
+from .layer_tasks import Encode
+from .packages import package, rows
+from .slice_run import SliceRun
 
 LEVEL = 1
 HEAD = (

@@ -7,10 +7,9 @@ import os
 from collections.abc import Iterable, Iterator, Mapping
 from typing import BinaryIO
 
-from ..background import ahead
 from ..errors import ExportError
 from ..mesh.model import Mesh
-from ..work import Work
+from ..work import Work, ahead
 
 HEADER, TRIANGLE = 84, 50
 """Bytes before the first triangle, and of a triangle."""
@@ -54,7 +53,7 @@ def _append(mesh: Mesh, file: BinaryIO, work: Work) -> None:
     start = file.tell()
 
     def put(begin: int) -> None:
-        block, place = _encoded(mesh, begin, 1), start + TRIANGLE * begin
+        block, place = _encode_block(mesh, begin, 1), start + TRIANGLE * begin
         while block:
             written = os.pwrite(file.fileno(), block, place)
             block, place = block[written:], place + written
@@ -66,22 +65,7 @@ def _append(mesh: Mesh, file: BinaryIO, work: Work) -> None:
 def header(count: int, metadata: Mapping[str, str]) -> bytes:
     """Begin of a file.
 
-    Parameters
-    ----------
-    count : int
-        Number of triangles.
-    metadata : mapping of str to str
-        Names and values; the header holds Application.
-
-    Returns
-    -------
-    bytes
-        `HEADER` bytes.
-
-    Raises
-    ------
-    ExportError
-        For more than 4294967295 triangles.
+    Returns `HEADER` bytes.
     """
     if count >= 2**32:
         raise ExportError("STL cannot hold more than 4294967295 triangles")
@@ -92,23 +76,13 @@ def header(count: int, metadata: Mapping[str, str]) -> bytes:
 def blocks(mesh: Mesh, threads: int = 0) -> Iterator[memoryview]:
     """Encode the triangles of a mesh.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        The mesh, mm.
-    threads : int, optional
-        Threads; 0 for all cores.
-
-    Yields
-    ------
-    memoryview
-        Triangles of 50 bytes.
+    `mesh` in mm. Yields triangles of 50 bytes.
     """
     for begin in range(0, len(mesh.triangles), BLOCK):
-        yield _encoded(mesh, begin, threads)
+        yield _encode_block(mesh, begin, threads)
 
 
-def _encoded(mesh: Mesh, begin: int, threads: int) -> memoryview:
+def _encode_block(mesh: Mesh, begin: int, threads: int) -> memoryview:
     """Encode the block of triangles from number `begin` on."""
     from .._native import stl
 

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from ..mesh.model import Mesh
 from ..work import Work
-from .packages import HEAD, Fragment, append, deflated, join
-from .text import Text, number_rows, rows
+from .packages import HEAD, Fragment, Text, append, deflate, join, number_rows, rows
 
 MODEL = (
     HEAD + '<model unit="millimeter" xml:lang="en-US" '
@@ -55,7 +54,7 @@ def write(mesh: Mesh, file: BinaryIO, metadata: Mapping[str, str], work: Work) -
     """
     coloured = mesh.colours is not None
     is_large = _is_large(len(mesh.vertices), len(mesh.triangles), coloured)
-    blocks = work.ordered(lambda text: deflated(text()), _model(mesh, metadata))
+    blocks = work.ordered(lambda text: deflate(text()), _model(mesh, metadata))
     join(file, (partial(append, block) for block in blocks), is_large)
 
 
@@ -65,18 +64,10 @@ def write_fragments(
     file: BinaryIO,
     metadata: Mapping[str, str],
 ) -> None:
-    """Write a mesh whose rows are deflated.
-
-    Parameters
-    ----------
-    vertices, triangles : tuple
-        Number of rows, and fragments of `vertex_rows` and of `triangle_rows`.
-    file, metadata
-        As for `write`.
-    """
+    """Write a mesh whose rows are deflated."""
 
     def texts(*blocks: bytes) -> Iterator[Fragment]:
-        return (partial(append, deflated(text)) for text in blocks)
+        return (partial(append, deflate(text)) for text in blocks)
 
     fragments = chain(
         texts(*_head(metadata), PLAIN, VERTICES),
@@ -124,17 +115,7 @@ def _texts(*blocks: bytes) -> Iterator[Text]:
 def mesh_element(mesh: Mesh, colours: NDArray[np.int32] | None = None) -> Iterator[Text]:
     """Encode a mesh as the mesh element of an object, in blocks.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        The mesh, mm.
-    colours : ndarray of int32, shape (n,), optional
-        Number of each vertex's colour in the group of colours.
-
-    Yields
-    ------
-    callable
-        Makes a part of the element.
+    `mesh` in mm; `colours`: int32 (n,).
     """
     yield from _texts(VERTICES)
     yield from vertex_rows(mesh.vertices)
@@ -150,10 +131,7 @@ def mesh_element(mesh: Mesh, colours: NDArray[np.int32] | None = None) -> Iterat
 def vertex_rows(vertices: NDArray[np.floating]) -> Iterator[Text]:
     """Encode vertices, in blocks of `text.ROWS`.
 
-    Parameters
-    ----------
-    vertices : ndarray of float, shape (n, 3)
-        Vertices, mm.
+    `vertices`: float (n, 3), mm.
     """
     return number_rows(('<vertex x="', '" y="', '" z="'), END_OF_ROW, vertices)
 
@@ -161,9 +139,6 @@ def vertex_rows(vertices: NDArray[np.floating]) -> Iterator[Text]:
 def triangle_rows(triangles: NDArray[np.integer]) -> Iterator[Text]:
     """Encode triangles, in blocks of `text.ROWS`.
 
-    Parameters
-    ----------
-    triangles : ndarray of int, shape (n, 3)
-        Indices of vertices.
+    `triangles`: int (n, 3).
     """
     return number_rows(TRIANGLE, END_OF_ROW, triangles)

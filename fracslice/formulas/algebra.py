@@ -17,16 +17,7 @@ SMALL = 2.0**-52
 def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Matrix product.
 
-    Parameters
-    ----------
-    a : ndarray [n, k]
-        Matrix.
-    b : ndarray [k, m] or [k]
-        Matrix or vector.
-
-    Returns
-    -------
-    ndarray [n, m] or [n]
+    `a`: matrix; `b`: matrix or vector.
     """
     terms = [np.multiply.outer(a[:, k], b[k]) for k in range(a.shape[1])]
     total: np.ndarray = terms[0]
@@ -49,17 +40,7 @@ def length(vector: np.ndarray) -> float:
 
 
 def inverse(matrix: np.ndarray) -> np.ndarray:
-    """Inverse by Gauss-Jordan elimination with partial pivoting.
-
-    Parameters
-    ----------
-    matrix : ndarray [3, 3]
-        Invertible matrix.
-
-    Returns
-    -------
-    ndarray, float64 [3, 3]
-    """
+    """Inverse by Gauss-Jordan elimination with partial pivoting."""
     rows = np.hstack([np.asarray(matrix, float), np.eye(3)])
     for k in range(3):
         pivot = k + int(np.abs(rows[k:, k]).argmax())
@@ -75,15 +56,6 @@ def stretches(matrix: np.ndarray) -> np.ndarray:
 
     One-sided Jacobi rotations make the columns orthogonal (Hestenes 1958, "Inversion of matrices by
     biorthogonalization and related results").
-
-    Parameters
-    ----------
-    matrix : ndarray [3, 3]
-        Matrix.
-
-    Returns
-    -------
-    ndarray, float64 [3]
     """
     columns = np.array(matrix, float).T.copy()
     for _ in range(SWEEPS):

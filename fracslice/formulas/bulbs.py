@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from . import power_maps
-from .orbits import orbit
+from .orbits import LENGTHS, orbit, positive, turn
 from .parameters import Count, Number
 from .powers import calm_power, power_length, square, square_length
 from .powers import power as raised
 from .registry import Node
-from .verbs import LENGTHS, positive, turn
 from .vocabulary import absolute, atan2, cos, exp, floor, log, maximum, rsqrt, sin, sqrt, where
 
 POWER = Number(8.0, "the exponent", least=2, most=16)

@@ -6,9 +6,8 @@ import math
 
 from .box import Box
 from .field import Bounds
-from .hooks import always_keeps_sign
 from .parameters import REQUIRED, Number, Vector
-from .registry import Fixed, Node, domain_operator
+from .registry import Fixed, Node, always_keeps_sign, domain_operator
 from .vocabulary import absolute, any_of, floor, maximum, minimum
 
 # An operator that confines its child returns ``maximum(d, minimum(child, 2 m - d))``, where d is the signed
@@ -96,12 +95,7 @@ def offset_slope(node: Node) -> float:
 def moved_slope(inner: Bounds, distance: float) -> float:
     """Lipschitz bound of a field minus a constant.
 
-    Parameters
-    ----------
-    inner : Bounds
-        Bounds of the field.
-    distance : float
-        The constant, scene units.
+    `distance` in scene units.
     """
     n = inner.steepening
     # The stretch along circles of latitude ends within 1/n, in narrow rings within 3/n^2.

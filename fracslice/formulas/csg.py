@@ -43,14 +43,7 @@ def conservative_union(a, b, smooth, steepest):  # type: ignore[no-untyped-def]
     of escape-time fractals are steeper there (`Bounds.steepening`), by about the factor `steepest`; elsewhere
     the seam does not loosen the bound. L = maximum of the elements'.
 
-    Parameters
-    ----------
-    a, b
-        Values of conservative fields of the elements.
-    smooth
-        Width of the seam, scene units.
-    steepest
-        Ratio of the steepest slope in the seam to the Lipschitz bound.
+    `a`, `b`: values of conservative fields of the elements; `smooth` in scene units.
     """
     low, high = minimum(a, b), maximum(a, b)
     return minimum(low, maximum(low - seam(a, b, smooth), high - 1.25 * smooth) / steepest)
@@ -127,11 +120,6 @@ def csg_slope(node: Node) -> float:
     elements'. A seam follows level sets other than the surface, where the field of an escape-time fractal is
     steeper than its bound. The factors for one such field and for several are measured
     (`docs/how/accuracy.md`).
-
-    Parameters
-    ----------
-    node : Node
-        A union, intersection or difference.
     """
     fields = [child.bounds for child in node.children]
     seams = not (csg_unordered(node) or _needs_conservative(node))

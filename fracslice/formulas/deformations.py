@@ -8,9 +8,8 @@ from __future__ import annotations
 import math
 
 from .box import Box
-from .hooks import always_keeps_sign
 from .parameters import REQUIRED, SMALLEST, Axis, Number
-from .registry import Node, domain_operator
+from .registry import Node, always_keeps_sign, domain_operator
 from .transforms import chosen_axis
 from .vocabulary import absolute, any_of, atan2, cos, maximum, minimum, sin, sqrt, where
 

@@ -35,18 +35,7 @@ def potential_distance(r2, slope2, level, first_level, last_level, least):  # ty
     is nearly always below the distance to the surface; deep sets have exceptions, so interior values bound
     nothing (`registry.Bounds`).
 
-    Parameters
-    ----------
-    r2
-        |w|^2 where the orbit stopped.
-    slope2
-        Square of the largest bound of the norm of the derivative of w along the orbit, at least 1.
-    level
-        log R^2 / p^(N-n): the value of log |w|^2 on the surface.
-    first_level, last_level
-        The same for n = 0 and n = N.
-    least
-        Lower limit of r2, below R^2.
+    `r2`: |w|^2 where the orbit stopped.
     """
     r2 = minimum(maximum(r2, least), 1e30)
     level = minimum(level, last_level)
@@ -64,80 +53,26 @@ def sure_distance(margin, slope, bend):  # type: ignore[no-untyped-def]
     addition of the start point keep this form: a is multiplied, and bend grows by slope * b. So e is at least
     ``margin / (slope + bend * margin)``: the method of majorants (Cauchy 1842). The bound holds for
     disconnected sets, too, but for connected ones it is several times less than that of the potential.
-
-    Parameters
-    ----------
-    margin
-        Displacement of the n-th point of the orbit.
-    slope
-        Bound of the norm of the derivative of w_n at the start point.
-    bend
-        Sum over the steps k < n of ``slope_k (p - 1) / (2 |w_k|)``.
     """
     margin = maximum(margin, 1e-30)
     return margin / minimum(slope + bend * margin, 1e30)
 
 
 def levels(power: float, iterations: int, bailout: float) -> tuple[float, float, float]:
-    """Level parameters of an escape-time formula, as `potential_distance` takes them.
-
-    Parameters
-    ----------
-    power : float
-        Exponent of the formula.
-    iterations : int
-        Steps of the orbit, N.
-    bailout : float
-        Bailout radius, R.
-
-    Returns
-    -------
-    (float, float, float)
-        first_level, last_level and the lower limit of r2.
-    """
+    """Level parameters of an escape-time formula, as `potential_distance` takes them."""
     steps = min(iterations, int(30 / math.log10(power)))
     last = 2 * math.log(bailout)
     return last / power**steps, last, bailout**2 * math.exp(-max(0.2 / bailout, 1e-4))
 
 
 def stop(power: float, bailout: float, escaped: float) -> float:
-    """Radius where an orbit stops.
-
-    Parameters
-    ----------
-    power : float
-        Exponent of the formula.
-    bailout : float
-        Bailout radius, R.
-    escaped : float
-        |w| one step past the radius: E^power.
-
-    Returns
-    -------
-    float
-        E, at least R.
-    """
+    """Radius where an orbit stops."""
     return float(max(bailout, escaped ** (1 / power)))
 
 
 def enclosing_radius(power: float, bailout: float, steps: int, constant: float) -> float:
-    """Bound of the radius of the solid of some steps: |w_n+1| >= |w_n|^power - |c| bounds |w_n| backwards.
-
-    Parameters
-    ----------
-    power : float
-        Exponent of the formula.
-    bailout : float
-        Bailout radius.
-    steps : int
-        Number of steps.
-    constant : float
-        Norm of the constant added in each step.
-
-    Returns
-    -------
-    float
-        Largest distance from the origin.
+    """Bound of the radius of the solid of some steps: |w_n+1| >= |w_n|^power - |c| bounds |w_n|
+    backwards.
     """
     radius = bailout
     for _ in range(steps):
@@ -146,22 +81,7 @@ def enclosing_radius(power: float, bailout: float, steps: int, constant: float) 
 
 
 def farthest(power: float, bailout: float, constant: float) -> float:
-    """Bound of the solid's radius for any number of steps.
-
-    Parameters
-    ----------
-    power : float
-        Exponent of the formula.
-    bailout : float
-        Bailout radius.
-    constant : float
-        Norm of the constant added in each step.
-
-    Returns
-    -------
-    float
-        Largest distance from the origin.
-    """
+    """Bound of the solid's radius for any number of steps."""
     first = radius = (bailout + constant) ** (1 / power)
     for _ in range(100):
         radius = (radius + constant) ** (1 / power)

@@ -19,34 +19,21 @@ Device = Literal["cpu", "cuda"]
 
 @dataclass(frozen=True)
 class Bounds:
-    """Properties of a field that hold without evaluating it.
+    """Properties of a field that hold without evaluating it."""
 
-    Attributes
-    ----------
-    box : Box
-        Encloses all points where the field is negative, in the node's own coordinates.
-    lipschitz : float
-        L such that ``|f(p) - f(q)| <= L |p - q|``. For a field with an escape-time fractal: L such that a
-        point outside is at least ``f(p) / L`` away from the surface.
-    exterior_only : bool
-        True if the field contains an escape-time fractal. Its interior values are much smaller than the
-        distance to the surface and bound nothing: none proves that its neighbourhood is inside.
-    steepening : float
-        For such a field, the highest power n in it. Along circles of latitude the derivative changes n times
-        within 2/n of the poles, so level sets other than the surface are steeper; by how much is measured
-        (`docs/how/accuracy.md`).
-    boxless : tuple of str
-        Names of the formulas in the field that state no box.
-    measured : tuple of str
-        Names of the formulas in the field whose L is measured, not proved.
-    """
-
-    box: Box
+    box: Box  # encloses all points where the field is negative, in the node's own coordinates
+    # L such that ``|f(p) - f(q)| <= L |p - q|``. For a field with an escape-time fractal: L such that a point
+    # outside is at least ``f(p) / L`` away from the surface
     lipschitz: float
+    # true if the field contains an escape-time fractal. Its interior values are much smaller than the
+    # distance to the surface and bound nothing: none proves that its neighbourhood is inside
     exterior_only: bool
+    # for such a field, the highest power n in it. Along circles of latitude the derivative changes n times
+    # within 2/n of the poles, so level sets other than the surface are steeper; by how much is measured
+    # (`docs/how/accuracy.md`)
     steepening: float = 0.0
-    boxless: tuple[str, ...] = ()
-    measured: tuple[str, ...] = ()
+    boxless: tuple[str, ...] = ()  # names of the formulas in the field that state no box
+    measured: tuple[str, ...] = ()  # names of the formulas in the field whose L is measured, not proved
 
 
 class Kernel(Protocol):
@@ -109,53 +96,20 @@ class FieldLoop(Protocol):
     """A loop over a field."""
 
     def __call__(self, frame: np.ndarray, rows: np.ndarray, out: np.ndarray) -> None:
-        """Run the loop.
-
-        Parameters
-        ----------
-        frame
-            Parameters of the loop.
-        rows
-            Input rows, C-contiguous.
-        out
-            Receives the output rows, C-contiguous.
-        """
+        """Run the loop."""
 
     def native(self, frame: np.ndarray) -> tuple[Any, ...] | Callable[..., None]:
-        """Entry point for native code.
-
-        Parameters
-        ----------
-        frame
-            Parameters of the loop.
-
-        Returns
-        -------
-        tuple or callable
-            Machine code, parameters and frame; or a function of input rows and output rows.
-        """
+        """Entry point for native code."""
 
 
 @dataclass(frozen=True, eq=False)
 class Loops:
-    """Compiled loops over a field.
+    """Compiled loops over a field."""
 
-    Attributes
-    ----------
-    width : int
-        The number of points in a call is a multiple of it.
-    batch : int
-        Points that make a call worthwhile.
-    runs : mapping of str to CompiledLoop
-        The loops by name.
-    on_gpu : bool
-        Whether they can be launched on arrays in GPU memory.
-    """
-
-    width: int
-    batch: int
-    runs: Mapping[str, FieldLoop]
-    on_gpu: bool = False
+    width: int  # the number of points in a call is a multiple of it
+    batch: int  # points that make a call worthwhile
+    runs: Mapping[str, FieldLoop]  # the loops by name
+    on_gpu: bool = False  # whether they can be launched on arrays in GPU memory
 
 
 class Cells(Protocol):
@@ -164,18 +118,7 @@ class Cells(Protocol):
     def __call__(self, centres: np.ndarray, half: float) -> tuple[np.ndarray, np.ndarray]:
         """Prove cells to be empty or full.
 
-        Parameters
-        ----------
-        centres
-            Centres of the cells, [3, n], scene units.
-        half
-            Half the size of the cells, scene units.
-
-        Returns
-        -------
-        (ndarray, ndarray)
-            Masks of the cells that are proved to be empty, and of those proved to be full, bool [n]. The
-            others are unknown.
+        `centres`: [3, n], scene units; `half` in scene units. Returns bool [n].
         """
         ...
 

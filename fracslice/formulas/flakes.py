@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 from .box import Box
+from .orbits import mirror
 from .parameters import Choice, Count
 from .registry import Fixed, Node, shape
-from .verbs import mirror
 from .vocabulary import orbit
 
 Triple = tuple[float, float, float]

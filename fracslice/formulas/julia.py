@@ -8,11 +8,10 @@ from typing import Any
 
 from .box import Box
 from .escape import CORE, enclosing_radius, levels, potential_distance, stop
-from .orbits import escape_sign, rounds, single
+from .orbits import ITERATIONS, REPEAT, Stepped, escape_sign, rounds, single
 from .parameters import Number, Vector
 from .powers import square
 from .registry import Fixed, Node, shape
-from .rounds import ITERATIONS, REPEAT, Stepped
 from .vocabulary import any_of, maximum, orbit, where
 
 ESCAPED = 256.0

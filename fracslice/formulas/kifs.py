@@ -9,9 +9,8 @@ import math
 from typing import Any
 
 from .flakes import CORNERS, MIRRORS, folded
-from .orbits import orbit
+from .orbits import mirror, orbit, turn
 from .parameters import Number
-from .verbs import mirror, turn
 
 
 def turned(scale: float) -> dict[str, Any]:

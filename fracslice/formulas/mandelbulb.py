@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from . import power_maps
-from .orbits import orbit
+from .orbits import ITERATIONS, REPEAT, orbit
 from .parameters import Number, Vector
 from .powers import calm_power
 from .registry import Node
-from .rounds import ITERATIONS, REPEAT
 
 
 @orbit(

@@ -65,13 +65,6 @@ def menger_visible(node: Node, voxel: float) -> Node:
 
     Thinner bars fall between samples. The sponge contains all edges of its cells, so no point of the returned
     solid is farther than sqrt(2) / 6 cells, 0.71 voxels, from the sponge of full depth.
-
-    Parameters
-    ----------
-    node : Node
-        A Menger sponge.
-    voxel : float
-        Voxel size in the node's own units.
     """
     deepest = max(math.ceil(math.log(2.0 / voxel, 3.0) - 1e-6) - 1, 0)
     return node if node["level"] <= deepest else node.changed(level=deepest)

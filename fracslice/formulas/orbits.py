@@ -1,15 +1,106 @@
-"""Escape-time fractals from their step, and hybrids: rounds of several steps."""
+"""Escape-time fractals from their step: maps of space, rounds of several steps, and hybrids.
+
+A verb takes a point w = (x, y, z) first and returns its image and its stretch: a bound of how far the images
+of two points move apart, per distance of the points, near w. `over` gives the stretch over a ball around w,
+which bounds the image of the whole ball. All are written in the language of formulas.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
+import numpy as np
+
 from ..providers import provider
+from .algebra import inverse, product, stretches
 from .box import Box
-from .parameters import AUTO, Count, Parameter
-from .registry import Formula, Node, register, shape
-from .rounds import JULIA, OWN, orbit_step, steps, taken
+from .parameters import AUTO, Count, Parameter, Vector
+from .powers import (
+    calm_length,
+    calm_majorant,
+    calm_power,
+    power,
+    power_length,
+    power_majorant,
+    power_over,
+    square,
+    square_length,
+    square_majorant,
+)
+from .registry import Fixed, Formula, Node, register, shape
+from .transforms import affine
+from .vocabulary import absolute, cos, floor, maximum, minimum, ratio, sin, sqrt
+
+Stepped = tuple[Callable[..., Any], dict[str, Any], tuple[float, ...] | None]
+"""Step ``f(w, c, ...)``, the values of its other parameters, and its own constant or None."""
+
+Affine = tuple[np.ndarray, np.ndarray]
+
+REPEAT = Count(1, "times that the step is taken in each round of an <orbit>", least=1, most=8)
+ITERATIONS = Count(
+    AUTO,
+    'steps of the orbit; "auto": until one more moves most by less than 1/512 of the size',
+    least=1,
+    words=(AUTO,),
+)
+JULIA = Vector(
+    None, "adds this point in each step instead of the start point: a Julia set", least=-100, most=100
+)
+OWN = {"iterations": ITERATIONS, "julia": JULIA, "repeat": REPEAT}
+"""Parameters of every orbit."""
+
+
+def orbit_step(node: Node) -> Stepped:
+    own = {name: value for name, value in node.values.items() if name not in OWN}
+    values = {name: Fixed(v) if isinstance(v, (int, str)) else v for name, v in own.items()}
+    return node.formula.function, values, node["julia"]
+
+
+def steps_of_round(node: Node) -> Iterator[tuple[Node, Affine | None]]:
+    """Steps of a round, and the maps of the transforms around them."""
+    if not node.children:
+        yield node, None
+        return
+    for child in node.children:
+        inner, linear, offset = child, np.eye(3), np.zeros(3)
+        while inner.formula.name == "transform" and len(inner.children) == 1:
+            (a, b), inner = affine(inner), inner.children[0]
+            linear, offset = product(linear, a), product(linear, b) + offset
+        moved = (linear != np.eye(3)).any() or offset.any()
+        for _ in range(inner.values.get("repeat", 1)):
+            yield inner, (linear, offset) if moved else None
+
+
+def _step(node: Node, alone: bool) -> Stepped:
+    function, values, constant = node.formula.hooks["step"](node)
+    only = node.formula.hooks.get("alone") if alone else None
+    return function, {**values, **(only(node) if only else {})}, constant
+
+
+def steps(node: Node, alone: bool = True) -> tuple[tuple[Any, ...], dict[str, Any]]:
+    """Return the steps of a round as code, and the values of their arguments."""
+    code, codes, values = provider("orbits").Code, [], dict[str, Any]()
+    for place, (step, moved) in enumerate(steps_of_round(node)):
+        function, own, constant = _step(step, alone and step is node)
+        fixed = tuple((name, v.value) for name, v in own.items() if isinstance(v, Fixed))
+        passed = {name: v for name, v in own.items() if not isinstance(v, Fixed)}
+        sizes = tuple((name, len(v) if isinstance(v, tuple) else 1) for name, v in passed.items())
+        values |= {f"v{place}_{name}": v for name, v in passed.items()}
+        if moved:
+            linear, offset = moved
+            undone, spread = inverse(linear), stretches(linear)
+            values[f"back{place}"] = (*undone.ravel().tolist(), *(-product(undone, offset)).tolist())
+            values[f"forth{place}"] = (*linear.ravel().tolist(), *offset.tolist())
+            values |= {f"spread{place}": float(spread[0] / spread[-1]), f"shrink{place}": float(spread[-1])}
+        if constant is None and node["julia"] is not None:
+            point = np.array(node["julia"])
+            constant = tuple((product(undone, point - offset) if moved else point).tolist())
+        if constant is not None:
+            values[f"c{place}"] = constant
+        codes.append(code(function, sizes, fixed, constant is not None, moved is not None))
+    return tuple(codes), values
+
 
 Growth = Any
 """`kernel.growth.Growth`, a layer above."""
@@ -25,30 +116,10 @@ class _Orbit(Formula):
         """Make a hybrid of some steps, or register the escape-time fractal of a step ``f(w, c, ...)``.
 
         A step returns the next point from the last one, w, and a constant c: the start point, or that of a
-        Julia set. It is written with arithmetic on points, the verbs of `fracslice.formulas.verbs`, and on
+        Julia set. It is written with arithmetic on points, the verbs of `fracslice.formulas.orbits`, and on
         their coordinates, ``x, y, z = w``, with the vocabulary. A second returned value is its stretch by w,
         if the one derived from the text is not good enough. Everything else follows from the step: its
         derivative, the radius of escape, the box, the field, and the kernels.
-
-        Parameters
-        ----------
-        *steps : Node
-            Escape-time fractals whose steps are taken in turn; none for the decorator.
-        place : str, optional
-            "file:line" of the element.
-        **values
-            Of a hybrid: its parameters. Of the decorator: kinds of the step's parameters by name; `Count` and
-            `Choice` are compiled into the kernel.
-
-        Returns
-        -------
-        Node or callable
-            Hybrid, or the decorator that turns a step into a `Formula`.
-
-        Raises
-        ------
-        SceneError
-            If an element has no step, a value is invalid, or another formula has this name.
         """
         if steps or place or not all(isinstance(kind, Parameter) for kind in values.values()):
             return super().__call__(*steps, place=place, **values)
@@ -64,14 +135,8 @@ def _registered(parameters: dict[str, Any]) -> Callable[[Callable[..., Any]], Fo
     return decorate
 
 
-def grown(node: Node) -> Growth:
-    """`kernel.growth.Growth` of a node's orbits.
-
-    Raises
-    ------
-    SceneError
-        If they do not escape, or grow too fast to compute.
-    """
+def growth_of(node: Node) -> Growth:
+    """`kernel.growth.Growth` of a node's orbits."""
     if known := node.formula.hooks.get("growth"):
         return provider("growth").Growth(**known(node))
     made, values = steps(node, alone=False)
@@ -84,29 +149,12 @@ def grown(node: Node) -> Growth:
 
 
 def rounds(node: Node) -> int:
-    """Return the number of rounds, 1 where it is automatic.
-
-    Parameters
-    ----------
-    node : Node
-        Orbit.
-    """
+    """Return the number of rounds, 1 where it is automatic."""
     return 1 if node["iterations"] == AUTO else int(node["iterations"])
 
 
 def single(node: Node) -> None:
-    """Check that a node is not repeated; called where it is a solid of its own.
-
-    Parameters
-    ----------
-    node : Node
-        Escape-time fractal.
-
-    Raises
-    ------
-    SceneError
-        If `repeat` is not 1.
-    """
+    """Check that a node is not repeated; called where it is a solid of its own."""
     if node["repeat"] != 1:
         raise node.fail(f"repeat={node['repeat']}: expected it inside an <orbit>")
 
@@ -114,19 +162,19 @@ def single(node: Node) -> None:
 def orbit_bounds(node: Node) -> Box:
     if node.formula is not orbit:
         single(node)
-    return Box.centred(*grown(node).half)
+    return Box.centred(*growth_of(node).half)
 
 
 def orbit_arguments(node: Node) -> dict[str, object]:
     made, values = steps(node)
-    own = {**provider("growth").arguments(made, grown(node), node["iterations"]), **values}
+    own = {**provider("growth").arguments(made, growth_of(node), node["iterations"]), **values}
     code = orbit_select(node).__code__
     return {name: own[name] for name in code.co_varnames[3 : code.co_argcount]}
 
 
 def orbit_sign(node: Node) -> tuple[Callable[..., Any], dict[str, object]] | None:
     code, values = steps(node)
-    grown_by = grown(node)
+    grown_by = growth_of(node)
     own = provider("orbit_signs").sign_arguments(code, grown_by, node["iterations"])
     return (provider("orbit_signs").sign(code, grown_by.scaled), {**own, **values}) if own else None
 
@@ -135,25 +183,14 @@ def orbit_proved_bounds(node: Node) -> Box:
     if "growth" in node.formula.hooks:
         return orbit_bounds(node)
     code, values = steps(node)
-    box: Box = provider("orbit_signs").proved_box(code, tuple(values.items()), grown(node), rounds(node))
+    box: Box = provider("orbit_signs").proved_box(code, tuple(values.items()), growth_of(node), rounds(node))
     return box
 
 
 def escape_sign(node: Node, radius: float, escape2: float) -> tuple[Callable[..., Any], dict[str, object]]:
     """Function with the sign of an escape-time fractal's field, and its arguments.
 
-    Parameters
-    ----------
-    node : Node
-        Escape-time fractal with a step.
-    radius : float
-        Bailout radius.
-    escape2 : float
-        Square of the radius where its orbits stop, which is not smaller.
-
-    Returns
-    -------
-    (callable, dict)
+    `escape2`: square of the radius where its orbits stop.
     """
     code, values = steps(node)
     own = {"iterations": node["iterations"], "radius2": radius**2, "stop0": escape2}
@@ -163,7 +200,7 @@ def escape_sign(node: Node, radius: float, escape2: float) -> tuple[Callable[...
 def orbit_select(node: Node) -> Callable[..., Any]:
     code = steps(node)[0]
     function: Callable[..., Any] = provider("orbits").field(
-        code, grown(node).form(code, node.is_conservative)
+        code, growth_of(node).form(code, node.is_conservative)
     )
     return function
 
@@ -173,22 +210,22 @@ def orbit_slope(node: Node) -> float:
 
     Of a field that stays below twice the sure distance, that is 2.
     """
-    bound = grown(node)
+    bound = growth_of(node)
     sure = bound.form(steps(node)[0], True).sure
     return float(bound.lipschitz or (LIPSCHITZ if sure else node.formula.lipschitz))
 
 
 def orbit_proves_slope(node: Node) -> bool:
-    return grown(node).lipschitz is not None
+    return growth_of(node).lipschitz is not None
 
 
 def orbit_steepening(node: Node) -> float:
-    return max(2.0, float(grown(node).power))
+    return max(2.0, float(growth_of(node).power))
 
 
 def orbit_potential(node: Node) -> bool:
     """True if the field is that of a potential, far from its bound inside."""
-    return bool(grown(node).by_power)
+    return bool(growth_of(node).by_power)
 
 
 def _default(node: Node, name: str) -> Any:
@@ -198,7 +235,7 @@ def _default(node: Node, name: str) -> Any:
 
 def orbit_check(node: Node) -> None:
     """Refuse steps that are not in the language, elements without a step, and values of the whole in them."""
-    for step, _ in taken(node):
+    for step, _ in steps_of_round(node):
         if "step" not in step.formula.hooks:
             raise step.fail("has no step: expected an escape-time fractal inside <orbit>, or one transformed")
         for name in ("iterations", "bailout"):
@@ -250,3 +287,155 @@ orbit = register(
     exterior_only=True,
 )(_hybrid)
 orbit.hooks.update(HOOKS)
+
+
+OVER: dict[Callable[..., Any], Callable[..., Any]] = {power: power_over}
+"""Stretch of each verb over the ball of radius e around a point: a function of the point, e and the verb's
+other arguments.
+"""
+
+NAMES = ("ball", "fold", "fold_to", "inversion", "mirror", "modulo", "positive", "power", "turn")
+"""Verbs whose arguments are points and numbers."""
+
+MAJORANTS: dict[Callable[..., Any], Callable[..., Any]] = {
+    power: power_majorant,
+    calm_power: calm_majorant,
+    square: square_majorant,
+}
+"""Bend (`escape.sure_distance`) and distance to the tear of each verb that has a majorant: a function of the
+verb's arguments.
+"""
+
+LENGTHS: dict[Callable[..., Any], Callable[..., Any]] = {
+    power: power_length,
+    calm_power: calm_length,
+    square: square_length,
+}
+"""Length of the image, for verbs where it depends on that of the point alone: a function of the length and of
+the verb's other arguments.
+"""
+
+Verb = Callable[..., Any]
+
+
+def over(verb: Verb) -> Callable[[Verb], Verb]:
+    """Decorate the stretch of a verb over a ball."""
+
+    def decorate(function: Verb) -> Verb:
+        OVER[verb] = function
+        return function
+
+    return decorate
+
+
+def fold(w, limit):  # type: ignore[no-untyped-def]
+    """Reflect every coordinate beyond the limit back (Lowe 2010, "What is a Mandelbox?")."""
+    x, y, z = w
+    image = (
+        2.0 * minimum(maximum(x, -limit), limit) - x,
+        2.0 * minimum(maximum(y, -limit), limit) - y,
+        2.0 * minimum(maximum(z, -limit), limit) - z,
+    )
+    return image, 1.0
+
+
+def fold_to(w, size):  # type: ignore[no-untyped-def]
+    """Reflect every coordinate beyond its own limit back."""
+    x, y, z = w
+    a, b, c = size
+    image = (
+        2.0 * minimum(maximum(x, -a), a) - x,
+        2.0 * minimum(maximum(y, -b), b) - y,
+        2.0 * minimum(maximum(z, -c), c) - z,
+    )
+    return image, 1.0
+
+
+def ball(w, inner):  # type: ignore[no-untyped-def]
+    """Invert in the unit sphere what is inside it; within the inner radius scale instead (Lowe 2010)."""
+    x, y, z = w
+    k = maximum(ratio(1.0, maximum(x * x + y * y + z * z, inner * inner)), 1.0)
+    return (k * x, k * y, k * z), k
+
+
+@over(ball)
+def ball_over(w, e, inner):  # type: ignore[no-untyped-def]
+    x, y, z = w
+    near = maximum(sqrt(x * x + y * y + z * z) - e, inner)
+    return maximum(ratio(1.0, near * near), 1.0)
+
+
+def ball_majorant(w, inner):  # type: ignore[no-untyped-def]
+    """Inwards from r <= 1, the stretch 1 / s^2 adds up to (1 / r^2) e / (1 - e / r)."""
+    x, y, z = w
+    return ratio(1.0, maximum(minimum(sqrt(x * x + y * y + z * z), 1.0), inner)), 1e30
+
+
+def ball_length(r, inner):  # type: ignore[no-untyped-def]
+    return maximum(ratio(r, maximum(r * r, inner * inner)), r)
+
+
+MAJORANTS[ball], LENGTHS[ball] = ball_majorant, ball_length
+
+
+def inversion(w, radius):  # type: ignore[no-untyped-def]
+    """Invert in the sphere of this radius around the origin."""
+    x, y, z = w
+    k = radius * radius * ratio(1.0, maximum(x * x + y * y + z * z, 1e-12))
+    return (k * x, k * y, k * z), k
+
+
+@over(inversion)
+def inversion_over(w, e, radius):  # type: ignore[no-untyped-def]
+    x, y, z = w
+    near = maximum(sqrt(x * x + y * y + z * z) - e, 1e-6)
+    return radius * radius * ratio(1.0, near * near)
+
+
+def mirror(w, normal):  # type: ignore[no-untyped-def]
+    """Reflect the points behind a plane through the origin to its front; the normal has any length."""
+    x, y, z = w
+    a, b, c = normal
+    s = 2.0 / (a * a + b * b + c * c) * minimum(a * x + b * y + c * z, 0.0)
+    return (x - s * a, y - s * b, z - s * c), 1.0
+
+
+def positive(w):  # type: ignore[no-untyped-def]
+    """Reflect into the octant of positive coordinates."""
+    x, y, z = w
+    return (absolute(x), absolute(y), absolute(z)), 1.0
+
+
+def turn(w, axis, degrees):  # type: ignore[no-untyped-def]
+    """Rotate about an axis of length 1, by Rodrigues' formula."""
+    x, y, z = w
+    a, b, c = axis
+    cosine, sine = cos(degrees * 0.017453292519943295), sin(degrees * 0.017453292519943295)
+    u, v, s = (1.0 - cosine) * a, (1.0 - cosine) * b, (1.0 - cosine) * c
+    image = (
+        (cosine + u * a) * x + (u * b - sine * c) * y + (u * c + sine * b) * z,
+        (u * b + sine * c) * x + (cosine + v * b) * y + (v * c - sine * a) * z,
+        (u * c - sine * b) * x + (v * c + sine * a) * y + (cosine + s * c) * z,
+    )
+    return image, 1.0
+
+
+def modulo(w, period):  # type: ignore[no-untyped-def]
+    """Move by whole periods along each axis into the cube around the origin.
+
+    The map tears space at the faces of the cubes.
+    """
+    x, y, z = w
+    image = (
+        x - period * floor(x / period + 0.5),
+        y - period * floor(y / period + 0.5),
+        z - period * floor(z / period + 0.5),
+    )
+    return image, 1.0
+
+
+CENTRAL = frozenset({mirror, positive, turn})
+"""Verbs that keep the length."""
+
+RIGID = frozenset({fold, fold_to, mirror, positive, turn})
+"""Verbs that neither stretch, bend nor tear."""

@@ -1,4 +1,4 @@
-"""Kinds of formula parameters: parsing, validation, writing and description.
+"""Parameters of formulas and of records: kinds, conversion from and to text, validation and description.
 
 Each kind parses text from a scene file (`read`), validates a value (`check`, which raises a `ValueError` that
 says what is expected) and writes it back (`text`). The schema and the documentation are made from the same
@@ -9,11 +9,54 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
-from numbers import Integral
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from numbers import Integral, Real
+from typing import Any, TypeVar
 
-from .conversion import finite, items, plain, shortest
+
+def short_repr(value: Any) -> str:
+    """Representation of any value on one line of at most 60 characters."""
+    try:
+        line = " ".join(repr(value).split())
+    except ValueError:  # a whole number with more digits than Python prints
+        line = f"a huge {type(value).__name__}"
+    return line if len(line) <= 60 else line[:57] + "..."
+
+
+def printable(text: str) -> str:
+    """Text with "?" for what cannot be printed, such as a byte of a file's name that is not UTF-8."""
+    return "".join(c if c.isprintable() else "?" for c in text)
+
+
+def finite(value: Any) -> float | None:
+    """Convert a real number to a float."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return None
+    try:
+        number = float(value)
+    except OverflowError:
+        return None
+    return number if math.isfinite(number) else None
+
+
+def items(value: Any) -> Sequence[Any]:
+    """Items of a sequence or an array; any other value is one item."""
+    value = value.tolist() if hasattr(value, "tolist") else value
+    return value if isinstance(value, Sequence) and not isinstance(value, (str, bytes)) else (value,)
+
+
+def plain(text: str) -> str:
+    """Reject numbers in Python's extended syntax: underscores and non-ASCII digits."""
+    if "_" in text or not text.isascii():
+        raise ValueError
+    return text
+
+
+def shortest(value: Any) -> str:
+    """Shortest text of a number that reads back as the same."""
+    return repr(int(value)) if float(value).is_integer() and abs(value) < 1e15 else repr(float(value))
+
 
 REQUIRED: Any = ...
 AUTO = "auto"
@@ -268,3 +311,48 @@ class File(Parameter):
         if not isinstance(value, str) or not value.isprintable():
             raise ValueError(self.expects)
         return value.strip()
+
+
+R = TypeVar("R")
+
+
+def attribute(kind: type[Parameter], *values: Any, **limits: Any) -> Any:
+    """Return a dataclass field of a parameter kind."""
+    made = kind(*values, **limits)
+    return field(default=made.default, metadata={"kind": made})
+
+
+def kinds_of(record: Any) -> dict[str, Any]:
+    """Return the parameter kinds of a record's fields."""
+    return {f.name: f.metadata["kind"] for f in fields(record) if "kind" in f.metadata}
+
+
+def validate(record: Any, fail: Callable[[str], Exception]) -> None:
+    """Validate and convert fields of a frozen record in place. None is kept where it is the default."""
+    for name, kind in kinds_of(record).items():
+        value = getattr(record, name)
+        if value is not None or kind.default is not None:
+            object.__setattr__(record, name, validate_value(name, value, kind, fail))
+
+
+def validate_value(name: str, value: Any, kind: Any, fail: Callable[[str], Exception]) -> Any:
+    """Validate and convert one value."""
+    try:
+        return kind.check(value)
+    except ValueError as error:
+        raise fail(f"{name}={short_repr(value)}: expected {error}") from None
+
+
+def from_table(
+    kind: type[R], where: str, values: Mapping[str, Any], fail: type[Exception], also: str = "", **given: Any
+) -> R:
+    """Make a record from the values of a file."""
+    known = {f.name: f.default for f in fields(kind) if f.name not in given}  # type: ignore[arg-type]
+    if unknown := sorted(values.keys() - known.keys()):
+        raise fail(f"{where}: {unknown[0]!r}: unknown; expected {', '.join(known)}{also}")
+    if missing := [name for name, default in known.items() if default is REQUIRED and name not in values]:
+        raise fail(f"{where}: {missing[0]} is missing")
+    try:
+        return kind(**values, **given)
+    except fail as error:
+        raise fail(f"{where}: {error}") from None

@@ -19,18 +19,7 @@ _FILES: dict[str, Path] = {}
 
 
 def run_file(path: str) -> list[Formula]:
-    """Run a Python file that registers formulas, once.
-
-    Parameters
-    ----------
-    path : str
-        The file. It is a program, and may do whatever a program may.
-
-    Raises
-    ------
-    SceneError
-        If the file cannot be read or run, with its line.
-    """
+    """Run a Python file that registers formulas, once."""
     file = Path(path).resolve()
     module = f"formulas of {file}"
     if module not in _FILES:

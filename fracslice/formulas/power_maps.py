@@ -13,11 +13,9 @@ from typing import Any
 
 from ..providers import provider
 from .escape import enclosing_radius, farthest, stop
-from .fixed import Fixed
-from .orbits import rounds
+from .orbits import Stepped, orbit_step, rounds, steps
 from .powers import products
-from .registry import Node
-from .rounds import Stepped, orbit_step, steps
+from .registry import Fixed, Node
 
 ESCAPED = 1e4
 """|w| one step past the radius where an orbit stops."""
@@ -32,47 +30,21 @@ counts. A smaller value costs fewer evaluations, but makes the level sets steepe
 
 
 def products_step(node: Node) -> Stepped:
-    """Return the step of an orbit with a `power`: a whole one is a constant of its code.
-
-    Returns
-    -------
-    (callable, dict, tuple or None)
-    """
+    """Return the step of an orbit with a `power`: a whole one is a constant of its code."""
     function, values, julia = orbit_step(node)
     power = node["power"]
     return function, {**values, "power": Fixed(power) if products(power)[0] else power}, julia
 
 
 def power_step(node: Node) -> Stepped:
-    """Return the step of a power map, with the stretch for hybrids.
-
-    Parameters
-    ----------
-    node : Node
-        Orbit of a power map.
-
-    Returns
-    -------
-    (callable, dict, tuple or None)
-    """
+    """Return the step of a power map, with the stretch for hybrids."""
     function, values, julia = products_step(node)
     values.pop("bailout", None)
     return function, {**values, "calm": Fixed(())}, julia
 
 
 def power_alone(node: Node) -> dict[str, Any]:
-    """Return the argument of `powers.calm_power` of an orbit that is no hybrid.
-
-    Parameters
-    ----------
-    node : Node
-        Orbit of a power map.
-
-    Returns
-    -------
-    dict
-        Empty for a disconnected solid, where each stretch counts.
-    """
+    """Return the argument of `powers.calm_power` of an orbit that is no hybrid."""
     if not _is_connected(node):
         return {}
     reach, escape = _reach(node), stop(node["power"], _bailout(node), ESCAPED)
@@ -81,18 +53,7 @@ def power_alone(node: Node) -> dict[str, Any]:
 
 
 def power_growth(node: Node) -> dict[str, Any]:
-    """Return the attributes of `kernel.growth.Growth`.
-
-    Parameters
-    ----------
-    node : Node
-        Orbit of a power map.
-
-    Returns
-    -------
-    dict
-        Values by name.
-    """
+    """Return the attributes of `kernel.growth.Growth`."""
     return {
         "powers": (float(node["power"]),),
         "factors": (0.0,),

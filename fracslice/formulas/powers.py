@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from .escape import CORE
-from .fixed import evaluated
+from .registry import evaluated
 from .vocabulary import (
     absolute,
     atan2,
@@ -34,16 +34,7 @@ LARGEST = 32
 def products(n: float) -> tuple[Any, ...]:
     """Return the products of a whole power.
 
-    Parameters
-    ----------
-    n : float
-        Power; NaN if it is no constant of the code.
-
-    Returns
-    -------
-    tuple
-        True if products are possible; the binary digits of n, n // 2 and (n - 1) // 2 after the first; True
-        if n is even; True if it is 2.
+    `n`: power.
     """
     if not (2 <= n <= LARGEST and n % 1 == 0):
         return False, (), (), (), False, False

@@ -17,13 +17,135 @@ from types import MappingProxyType
 from typing import Any, Literal, TypeVar
 
 from ..errors import SceneError
-from . import signatures
-from .catalogue import FORMULAS
-from .fixed import Fixed as Fixed
-from .hooks import Hook, Hooks
+from .box import Box
+from .node import FORMULAS, bind_arguments, docstring, ordered_parameters, python_name, signature
 from .node import Node as Node
-from .parameters import REQUIRED, Parameter
-from .records import validated
+from .parameters import REQUIRED, Parameter, validate_value
+
+Hook = Callable[..., Any]
+
+
+def always_keeps_sign(_: Node) -> bool:
+    """Hook `keeps_sign` of operators that keep it for all parameters."""
+    return True
+
+
+class Hooks:
+    """Decorators that set the hooks of a formula. Each takes the function and returns it.
+
+    Attributes
+    ----------
+    hooks : dict of str to callable
+        Functions of a `Node` by the name of their decorator.
+    """
+
+    hooks: dict[str, Hook]
+
+    def bounds(self, hook: Callable[[Node], Box]) -> Callable[[Node], Box]:
+        """Set the hook that returns a box enclosing the inside. Without it, the solid counts as unbounded."""
+        return self._hook("bounds", hook)
+
+    def slope(self, hook: Callable[[Node], float]) -> Callable[[Node], float]:
+        """Set the hook that returns the Lipschitz bound, where it depends on parameters or children."""
+        return self._hook("slope", hook)
+
+    def proves_slope(self, hook: Callable[[Node], bool]) -> Callable[[Node], bool]:
+        """Set the hook that returns True if the Lipschitz bound of an escape-time fractal is a theorem."""
+        return self._hook("proves_slope", hook)
+
+    def steepening(self, hook: Callable[[Node], float]) -> Callable[[Node], float]:
+        """Set the hook that returns `Bounds.steepening`, where it is not the maximum of the children's."""
+        return self._hook("steepening", hook)
+
+    def potential(self, hook: Callable[[Node], bool]) -> Callable[[Node], bool]:
+        """Set the hook that returns True if the field is that of a potential, where it depends on parameters.
+
+        By default it is one for every escape-time fractal.
+        """
+        return self._hook("potential", hook)
+
+    def arguments(self, hook: Callable[[Node], dict[str, Any]]) -> Callable[[Node], dict[str, Any]]:
+        """Set the hook that returns the arguments after points or values, if they are not the parameters."""
+        return self._hook("arguments", hook)
+
+    def select(self, hook: Callable[[Node], Callable[..., Any]]) -> Callable[[Node], Callable[..., Any]]:
+        """Set the hook that selects another function for a node that needs less or different code."""
+        return self._hook("select", hook)
+
+    def sign(self, hook: Callable[[Node], tuple[Callable[..., Any], dict[str, Any]] | None]) -> Hook:
+        """Set the hook that returns a function with the sign of the field, which intervals enclose more
+        tightly, and its arguments; or None.
+        """
+        return self._hook("sign", hook)
+
+    def proved_bounds(self, hook: Callable[[Node], Box]) -> Callable[[Node], Box]:
+        """Set the hook that returns a box proved to enclose the inside, if that of `bounds` is measured."""
+        return self._hook("proved_bounds", hook)
+
+    def keeps_sign(self, hook: Callable[[Node], bool]) -> Callable[[Node], bool]:
+        """Set the hook that returns True if the sign of an operator's field depends on the signs of its
+        elements' fields alone.
+        """
+        return self._hook("keeps_sign", hook)
+
+    def identity(self, hook: Callable[[Node], bool]) -> Callable[[Node], bool]:
+        """Set the hook that returns True if the node changes nothing and can be left out."""
+        return self._hook("identity", hook)
+
+    def unordered(self, hook: Callable[[Node], bool]) -> Callable[[Node], bool]:
+        """Set the hook that returns True if all elements of a CSG operator but the first may be folded in any
+        order, to the same bits.
+        """
+        return self._hook("unordered", hook)
+
+    def step(self, hook: Callable[[Node], tuple[Any, ...]]) -> Callable[[Node], tuple[Any, ...]]:
+        """Set the hook that returns the step of an escape-time fractal, see `orbits.Stepped`."""
+        return self._hook("step", hook)
+
+    def alone(self, hook: Callable[[Node], dict[str, Any]]) -> Callable[[Node], dict[str, Any]]:
+        """Set the hook that returns the values of a step's parameters that differ outside of hybrids."""
+        return self._hook("alone", hook)
+
+    def growth(self, hook: Callable[[Node], dict[str, Any]]) -> Callable[[Node], dict[str, Any]]:
+        """Set the hook that returns the attributes of `kernel.growth.Growth`, where they are known."""
+        return self._hook("growth", hook)
+
+    def visible(self, hook: Callable[[Node, float], Node]) -> Callable[[Node, float], Node]:
+        """Set the hook that returns the node without detail finer than a voxel size in its own units."""
+        return self._hook("visible", hook)
+
+    def check(self, hook: Callable[[Node], None]) -> Callable[[Node], None]:
+        """Set the hook that raises `SceneError` for values that are valid alone but not together."""
+        return self._hook("check", hook)
+
+    def _hook(self, name: str, hook: Hook) -> Hook:
+        self.hooks[name] = hook
+        return hook
+
+
+EVALUATED: set[Callable[..., Any]] = set()
+"""Functions of numbers that are evaluated where a step is read: their values are constants of the code."""
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """An argument that is compiled into the kernel instead of being passed to it, because the code depends on
+    it.
+
+    Attributes
+    ----------
+    value : object
+        The constant.
+    """
+
+    value: Any
+
+
+def evaluated(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorate a function that is evaluated where a step is read."""
+    EVALUATED.add(function)
+    return function
+
 
 Kind = Literal["shape", "csg", "domain"]
 
@@ -71,12 +193,12 @@ class Formula(Hooks):
             ("__name__", self.name),
             ("__qualname__", self.name),
             ("__module__", self.function.__module__),
-            ("__doc__", signatures.docstring(self)),
+            ("__doc__", docstring(self)),
         ):
             object.__setattr__(self, name, value)
 
     def __repr__(self) -> str:
-        return f"<{self.kind} {self.name}{signatures.signature(self, Node)}>"
+        return f"<{self.kind} {self.name}{signature(self, Node)}>"
 
     def __reduce__(self) -> tuple[Any, ...]:
         return get, (self.name,)
@@ -84,12 +206,12 @@ class Formula(Hooks):
     @cached_property
     def names(self) -> Mapping[str, str]:
         """Parameter names by their names in Python, in the order of positional arguments."""
-        return MappingProxyType({signatures.python_name(name): name for name in signatures.ordered(self)})
+        return MappingProxyType({python_name(name): name for name in ordered_parameters(self)})
 
     @property
     def __signature__(self) -> Signature:
         """Signature of the formula as a Python function."""
-        return signatures.signature(self, Node)
+        return signature(self, Node)
 
     def __call__(self, *arguments: Any, place: str | None = None, **keywords: Any) -> Node:
         """Make a scene node.
@@ -112,7 +234,7 @@ class Formula(Hooks):
         SceneError
             For an invalid value, an unknown name or a wrong number of elements.
         """
-        elements, values = signatures.bound(self, arguments, keywords)
+        elements, values = bind_arguments(self, arguments, keywords)
         checked = {name: self._value(name, values.get(name)) for name in self.parameters}
         node = Node(self, MappingProxyType(checked), self._grouped(elements), place)
         if node.depth > DEEPEST:
@@ -126,7 +248,7 @@ class Formula(Hooks):
             if kind.default is REQUIRED:
                 raise SceneError(f"<{self.name}> needs {name}: expected {kind.expects}")
             return kind.default
-        return validated(name, value, kind, lambda message: SceneError(f"<{self.name}> {message}"))
+        return validate_value(name, value, kind, lambda message: SceneError(f"<{self.name}> {message}"))
 
     def _grouped(self, children: tuple[Node, ...]) -> tuple[Node, ...]:
         least, most = self.children
@@ -229,26 +351,7 @@ def register(
     made: type[Made] = Formula,  # type: ignore[assignment]
     **known: Any,
 ) -> Callable[[Callable[..., Any]], Made]:
-    """Return a decorator that makes a formula of a function and registers it.
-
-    Parameters
-    ----------
-    kind : {"shape", "csg", "domain"}
-        Kind of the formula.
-    children : (int, int or None)
-        Minimum and maximum number of elements; None: any number.
-    parameters : dict of str to Parameter
-        Kinds of the parameters by name.
-    made : type, optional
-        Class of the formula.
-    **known
-        Other attributes of the formula.
-
-    Raises
-    ------
-    SceneError
-        If another formula has this name.
-    """
+    """Return a decorator that makes a formula of a function and registers it."""
 
     def decorate(function: Callable[..., Any]) -> Made:
         name = function.__name__.rstrip("_")

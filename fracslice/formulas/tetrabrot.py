@@ -5,8 +5,8 @@ from __future__ import annotations
 from .box import Box
 from .escape import levels, potential_distance, stop
 from .julia import ESCAPED
+from .orbits import ITERATIONS
 from .registry import Node, shape
-from .rounds import ITERATIONS
 from .vocabulary import any_of, maximum, orbit, sqrt, where
 
 BAILOUT, HALF = 2.0, 0.7071067811865476

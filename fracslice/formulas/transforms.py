@@ -9,9 +9,8 @@ import numpy as np
 
 from .algebra import inverse, length, product, stretches
 from .box import Box
-from .hooks import always_keeps_sign
 from .parameters import REQUIRED, SMALLEST, Axis, Vector
-from .registry import Fixed, Node, domain_operator
+from .registry import Fixed, Node, always_keeps_sign, domain_operator
 from .vocabulary import absolute
 
 
@@ -37,7 +36,7 @@ def transform(child, x, y, z, back, shrink):  # type: ignore[no-untyped-def]
     )
 
 
-def moved(child, x, y, z, offset):  # type: ignore[no-untyped-def]
+def translate_node(child, x, y, z, offset):  # type: ignore[no-untyped-def]
     """The element translated by an offset."""
     tx, ty, tz = offset
     return child(x - tx, y - ty, z - tz)
@@ -55,15 +54,7 @@ def _rotation(rotate: Sequence[float]) -> np.ndarray:
 def affine(node: Node) -> tuple[np.ndarray, np.ndarray]:
     """Affine map of a transform node.
 
-    Parameters
-    ----------
-    node : Node
-        A `transform`.
-
-    Returns
-    -------
-    (ndarray [3, 3], ndarray [3])
-        Linear part and translation, float64.
+    Returns float64.
     """
     linear = np.diag(np.broadcast_to(np.array(node["scale"]), 3))
     if node["rotate"]:
@@ -97,13 +88,13 @@ def transform_identity(node: Node) -> bool:
 
 @transform.select
 def transform_select(node: Node):  # type: ignore[no-untyped-def]
-    return moved if (affine(node)[0] == np.eye(3)).all() else transform.function
+    return translate_node if (affine(node)[0] == np.eye(3)).all() else transform.function
 
 
 @transform.arguments
 def transform_arguments(node: Node) -> dict[str, object]:
     linear, offset = affine(node)
-    if node.function is moved:
+    if node.function is translate_node:
         return {"offset": tuple(offset.tolist())}
     undone = inverse(linear)
     flat = [*undone.ravel().tolist(), *(-product(undone, offset)).tolist()]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..common.digits import decimal
+from ..common.messages import decimal
 from ..formulas import Box, Node
 from ..formulas.algebra import dot
 from ..formulas.box import Triple
@@ -37,24 +37,12 @@ SLABS = 6
 
 @dataclass(frozen=True)
 class Amount:
-    """Volumes of the object and of its mesh or layers, mm3.
+    """Volumes of the object and of its mesh or layers, mm3."""
 
-    Attributes
-    ----------
-    object
-        Volume of the object, estimated from its field at random points.
-    error
-        Standard error of that estimate.
-    made
-        Volume of the mesh or the layers.
-    off
-        Relative difference if it is significant, else 0.
-    """
-
-    object: float
-    error: float
-    made: float
-    off: float
+    object: float  # volume of the object, estimated from its field at random points
+    error: float  # standard error of that estimate
+    made: float  # volume of the mesh or the layers
+    off: float  # relative difference if it is significant, else 0
 
     @property
     def missing(self) -> float:
@@ -68,24 +56,14 @@ class Amount:
 
 
 class Completeness(NamedTuple):
-    """What of an object is not in its mesh or layers.
+    """What of an object is not in its mesh or layers."""
 
-    Attributes
-    ----------
-    amount
-        Both volumes.
-    notes
-        Volume that is missing or too much, as text.
-    problems
-        The same where the object is lost: more than `LOST` of it, or a whole element of the scene.
-    cure
-        Refinement of the samples after which it is probably not lost, of `RAISED`; 1 if there is no need or
-        none suffices.
-    """
-
-    amount: Amount
-    notes: tuple[str, ...] = ()
+    amount: Amount  # both volumes
+    notes: tuple[str, ...] = ()  # volume that is missing or too much, as text
+    # the same where the object is lost: more than `LOST` of it, or a whole element of the scene
     problems: tuple[str, ...] = ()
+    # refinement of the samples after which it is probably not lost, of `RAISED`; 1 if there is no need or
+    # none suffices
     cure: int = 1
 
 
@@ -94,21 +72,7 @@ def lost_size(
 ) -> tuple[Triple, tuple[str, ...]]:
     """Compare the size of a mesh or layers with that of the object.
 
-    Parameters
-    ----------
-    name : str
-        What was made, with its verb.
-    box, made, whole : sequence of float
-        Sizes of the object, of what was made, and of that with the bodies that were removed, mm.
-    spacing : sequence of float
-        Spacing of the samples, mm.
-
-    Returns
-    -------
-    tuple of float
-        Length that is missing along each axis, mm.
-    tuple of str
-        A note on the axis along which most samples are missing, if it is more than one.
+    `box`, `made`, `whole`, `spacing` in mm. Returns a value in mm.
     """
     x, y, z = lost = [max(of - own, 0.0) for of, own in zip(box, made, strict=True)]
     samples = [mm / step for mm, step in zip(lost, spacing, strict=True)]
@@ -124,28 +88,7 @@ def lost_size(
 def mesh_amount(planned: Plan, made: float, scale: float, whole: bool, work: Work) -> Completeness:
     """Compare the volume of a mesh with that of its field.
 
-    Parameters
-    ----------
-    planned : Plan
-        Sampled field.
-    made : float
-        Volume of the mesh, removed bodies included, mm3.
-    scale : float
-        mm per scene unit.
-    whole : bool
-        True if no body was left out on purpose.
-    work : Work
-        Threads and cancellation.
-
-    Returns
-    -------
-    Completeness
-        What is missing.
-
-    Raises
-    ------
-    Cancelled
-        If the work is cancelled.
+    `made` in mm3; `scale`: mm per scene unit.
     """
     lattice = Lattice.around(planned.outer, planned.voxel)
 
@@ -154,29 +97,11 @@ def mesh_amount(planned: Plan, made: float, scale: float, whole: bool, work: Wor
 
     spacing = planned.voxel, planned.voxel, planned.voxel
     grid = lattice.origin, spacing, sampling
-    return _compared(planned.root, [planned.outer], made, scale, grid, whole, work)
+    return _compare_volumes(planned.root, [planned.outer], made, scale, grid, whole, work)
 
 
 def layers_amount(slicer: Slicer, work: Work) -> Completeness:
-    """Compare the volume of some slabs of a stack with that of its field.
-
-    Parameters
-    ----------
-    slicer : Slicer
-        Slicer of the stack; layers that it has painted are not sampled again.
-    work : Work
-        Threads and cancellation.
-
-    Returns
-    -------
-    Completeness
-        What is missing.
-
-    Raises
-    ------
-    SliceError, Cancelled
-        If a layer cannot be sampled, or the work is cancelled.
-    """
+    """Compare the volume of some slabs of a stack with that of its field."""
     from ..slicing import SLAB
 
     stack = slicer.stack
@@ -200,10 +125,10 @@ def layers_amount(slicer: Slicer, work: Work) -> Completeness:
 
     grid = (x0, y0, float(stack.z[0])), (dx, dy, least / stack.scale), sampling
     made = dot(areas, stack.heights[layers])
-    return _compared(stack.root, boxes, made, stack.scale, grid, len(chosen) == len(starts), work)
+    return _compare_volumes(stack.root, boxes, made, stack.scale, grid, len(chosen) == len(starts), work)
 
 
-def _compared(
+def _compare_volumes(
     root: Field, boxes: list[Box], made: float, scale: float, grid: Grid, whole: bool, work: Work
 ) -> Completeness:
     """Compare the volume of the field in boxes, scene units, with `made`, mm3; with `whole`, look for the

@@ -1,26 +1,29 @@
-"""Selection of bodies, placement and cleaning: from a surface in scene units to finished triangles in mm."""
+"""From a surface in scene units to finished triangles in mm: selection of bodies, placement, cleaning and
+checks.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..mesh.gathering import gathered
+from ..mesh.pieces import gather_rows
 from ..meshjob import PIECES
 from ..scene import Print
-from .clock import Clock
-from .placement import Placement
+from ..work import Work, in_background
+from .report import Clock, Placement
 
 if TYPE_CHECKING:
-    from ..mesh.components import Removed
-    from ..mesh.halo import Finished, SelectedPiece
-    from ..mesh.mesh_report import MeshReport
+    from ..mesh import Mesh
+    from ..mesh.checks import MeshReport, Tally
+    from ..mesh.cleaning import Finished, SelectedPiece
     from ..mesh.quantisation import Frame
-    from ..mesh.tally import Tally
+    from ..mesh.topology import Removed
     from ..volume import Plan, SignBricks
     from .surfaces import Surface
 
@@ -36,21 +39,7 @@ CRUMB = 0.5
 def placing(planned: Plan, signs: SignBricks, place: Placement) -> tuple[NDArray[np.float64], Frame]:
     """Return what quantisation needs of a placement.
 
-    Parameters
-    ----------
-    planned : Plan
-        Sampled field.
-    signs : SignBricks
-        Its samples.
-    place : Placement
-        Placement of the mesh.
-
-    Returns
-    -------
-    ndarray of float64, shape (k, 3)
-        Planes of the grid, mm.
-    Frame
-        Scale, translation and height of the bed.
+    Returns float64 (k, 3), mm.
     """
     from ..mesh.contouring import minimum_edge_parameter
     from ..mesh.quantisation import grid_planes
@@ -62,17 +51,7 @@ def placing(planned: Plan, signs: SignBricks, place: Placement) -> tuple[NDArray
 def largest_crumb(volumes: NDArray[np.float64], voxel: float) -> float:
     """Return the volume below which bodies are tips that the samples separate from the body beside them.
 
-    Parameters
-    ----------
-    volumes : ndarray of float64, shape (s,)
-        Volumes of the shells, negative for cavities.
-    voxel : float
-        Volume of a voxel.
-
-    Returns
-    -------
-    float
-        Half a voxel; 0 if bodies as small as this hold much of the material.
+    `volumes`: float64 (s,); `voxel`: volume of a voxel. Returns half a voxel.
     """
     crumbs = volumes[(volumes > 0) & (volumes < CRUMB * voxel)]
     return CRUMB * voxel if crumbs.sum() < PIECES * volumes.sum() else 0.0
@@ -81,23 +60,7 @@ def largest_crumb(volumes: NDArray[np.float64], voxel: float) -> float:
 class Finish:
     """Selection of bodies and placement of a surface, decided once for all pieces.
 
-    Parameters
-    ----------
-    surface : Surface
-        Labelled surface.
-    how : Print
-        Choice of bodies and cavities.
-    dust : callable
-        Maps the volume of the object and that of crumbs to the volume below which a body is removed, mm3.
-    scale : float
-        mm per scene unit.
-    clock : Clock
-        Threads, progress, cancellation and timing.
-
-    Raises
-    ------
-    MeshError
-        If no body would remain.
+    `dust` in mm3; `scale`: mm per scene unit.
     """
 
     def __init__(
@@ -108,8 +71,8 @@ class Finish:
         scale: float,
         clock: Clock,
     ) -> None:
-        from ..mesh.components import choose
-        from ..mesh.quantisation import placed
+        from ..mesh.quantisation import place_and_round
+        from ..mesh.topology import choose
         from ..mesh.touching import NearBodies
 
         planned, pieces, shells = surface.planned, surface.pieces, surface.shells
@@ -133,30 +96,18 @@ class Finish:
         self.near = NearBodies(shells, self.stays, planned.voxel, clock.work.threads)
         """Bodies that nearly touch, complete after the last piece."""
         self._planes, self._frame = placing(planned, surface.signs, self.place)
-        self.tips = placed(surface.tips, self._frame)
+        self.tips = place_and_round(surface.tips, self._frame)
         """The vertices `surface.tips` of the finished mesh, mm."""
 
     def report(self, tally: Tally) -> MeshReport:
-        """Report on the whole mesh.
-
-        Parameters
-        ----------
-        tally : Tally
-            Sums over all pieces.
-        """
+        """Report on the whole mesh."""
         hollow = self.shells.volumes < 0
         bodies, cavities = int((self.stays & ~hollow).sum()), int((self.stays & hollow).sum())
         return tally.report(bodies, cavities, self.misplaced)
 
     def finished(self) -> Iterator[Finished]:
-        """Place and clean the pieces, mm. Pieces held in memory are released.
-
-        Yields
-        ------
-        Finished
-            Triangles that are finished with each piece.
-        """
-        from ..mesh.halo import finished_piece
+        """Place and clean the pieces, mm. Pieces held in memory are released."""
+        from ..mesh.cleaning import finished_piece
 
         work, voxel, count = self.clock.work, self.planned.voxel, len(self.pieces)
         ends, before, own = [-np.inf, *self.pieces.ends], None, self._kept(0)
@@ -176,10 +127,87 @@ class Finish:
 
     def _kept(self, number: int) -> SelectedPiece:
         """The next piece, with the choice of its bodies."""
-        from ..mesh.halo import SelectedPiece
+        from ..mesh.cleaning import SelectedPiece
 
         mesh, labels = self.pieces.mesh(number), self.pieces.labels(number)
         self.near.add(mesh.vertices, labels, self.pieces.ends[number])
         fresh = np.arange(len(mesh.triangles) - self.pieces.fresh[number], len(mesh.triangles))
-        keep = gathered(self.stays[self.shells.of_label], labels, self.clock.work.threads)
+        keep = gather_rows(self.stays[self.shells.of_label], labels, self.clock.work.threads)
         return SelectedPiece(mesh, keep, fresh)
+
+
+MOST_ERRORS = 1 << 20
+"""Approximate maximum of vertices whose distance from the surface is measured, evenly distributed over it."""
+
+VERTICES_A_BRICK = 170
+
+
+def stride(bricks: int) -> int:
+    """Return the stride of the vertices whose distance from the surface is measured."""
+    return -(-VERTICES_A_BRICK * bricks // MOST_ERRORS)
+
+
+def off_surface(
+    planned: Plan, place: Placement, vertices: NDArray[np.float64], work: Work
+) -> NDArray[np.float64]:
+    """Measure the distances of vertices from the surface.
+
+    `vertices`: float64 (n, 3), mm. Returns float64 (n,), scene units.
+    """
+    from ..volume.accuracy import surface_error
+
+    return surface_error(planned.root, vertices, planned.voxel, work, place.scale, place.offset)
+
+
+class Check:
+    """Checks finished triangles as they pass."""
+
+    def __init__(self, finish: Finish, bricks: int) -> None:
+        from ..mesh.checks import Tally
+
+        self._finish, self._tally = finish, Tally(finish.clock.work.threads)
+        self._stride = stride(bricks)
+        self._errors: list[NDArray[np.float64]] = []
+        self.contact = 0.0
+        """Area on the plate, mm2."""
+
+    def passing(self, pieces: Iterable[Finished]) -> Iterator[Mesh]:
+        """Pass pieces on and check them.
+
+        Yields `Mesh` in mm.
+        """
+        for piece in pieces:
+            yield piece.passed  # the consumer may write it meanwhile
+            with self._finish.clock("checking"):
+                finish, work = self._finish, self._finish.clock.work
+                with in_background(
+                    partial(on_the_plate, piece.passed, work.threads), work.threads
+                ) as contact:
+                    self._tally.add(piece)
+                    vertices = piece.points[:: self._stride]
+                    self._errors.append(off_surface(finish.planned, finish.place, vertices, work))
+                    self.contact += contact()
+
+    @property
+    def mesh(self) -> MeshReport:
+        """Report on the whole mesh, after all pieces have passed."""
+        return self._finish.report(self._tally)
+
+    @property
+    def errors(self) -> NDArray[np.float64]:
+        """Distances of vertices from the surface, scene units."""
+        return np.concatenate(self._errors)
+
+
+def on_the_plate(mesh: Mesh, threads: int = 0) -> float:
+    """Return the area of the triangles at z = 0.
+
+    `mesh` in mm. Returns a value in mm2.
+    """
+    from .._native import touching
+
+    low = mesh.vertices[:, 2] == 0
+    near = mesh.triangles[touching(mesh.triangles, low, threads)]
+    x, y = np.moveaxis(mesh.vertices[near[low[near].all(1)], :2], 2, 0)
+    double = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
+    return float(np.abs(double).sum()) / 2

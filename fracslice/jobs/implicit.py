@@ -13,37 +13,20 @@ from ..formulas.box import Box
 from ..meshjob import MeshJob
 from ..scene import Print, Scene
 from ..work import Work
-from .clock import Clock
-from .placement import Placement
-from .planning import planned
+from .planning import plan_mesh
+from .report import Clock, Placement
 
 
 @dataclass(frozen=True)
 class Implicit:
-    """A file that holds a formula.
+    """A file that holds a formula."""
 
-    Attributes
-    ----------
-    path : Path
-        The file.
-    operations : int
-        Operations of the formula.
-    root : Node
-        The field that was written.
-    place : Placement
-        Map from the scene to the file.
-    box : Box
-        Bounds of the object, mm.
-    notes : tuple of str
-        Details that the voxel is too large to resolve.
-    """
-
-    path: Path
-    operations: int
-    root: Node
-    place: Placement
-    box: Box
-    notes: tuple[str, ...]
+    path: Path  # the file
+    operations: int  # operations of the formula
+    root: Node  # the field that was written
+    place: Placement  # map from the scene to the file
+    box: Box  # bounds of the object, mm
+    notes: tuple[str, ...]  # details that the voxel is too large to resolve
 
 
 def make_implicit(
@@ -51,21 +34,7 @@ def make_implicit(
 ) -> Implicit:
     """Write the formula of a scene as 3MF with the volumetric and implicit extensions.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    what : MeshJob, optional
-        Size, and the voxel that automatic depths follow from.
-    path : str or Path
-        The file to write.
-    work : Work, optional
-        Threads and cancellation.
-
-    Raises
-    ------
-    SceneError, KernelError, VolumeError, ExportError, Cancelled
-        For a scene that is no formula or too large a one, or a file that cannot be written.
+    `what`: and the voxel that automatic depths follow from.
     """
     from ..export import check_target
     from ..export.implicit import write_implicit
@@ -77,7 +46,7 @@ def make_implicit(
     _refuse(what.how(scene))
     check_target(path)
     size = sizing(scene, what.size_mm, what.scale, clock.work)
-    made = planned(scene, what, size, clock)
+    made = plan_mesh(scene, what, size, clock)
     plan = made.planned
     assert plan.root.tree is not None
     (x, y, _), scale = plan.box.centre, made.scale

@@ -13,25 +13,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..background import in_background
 from ..common.memory import peak_rss_mb
 from ..errors import SceneError, SharedError, TooLargeError, keeping
 from ..meshjob import MeshJob
 from ..scene import Scene
 from ..version import __version__
-from ..work import Work
+from ..work import Work, in_background
 from . import surfaces
-from .clock import Clock
 from .finishing import Finish
-from .mesh_result import MeshResult
 from .mesh_writing import STL, Writing
-from .planning import Sized, edited, in_mm, planned
-from .report import Report, SurfaceError, SurfaceToMesh
+from .planning import Sized, apply_edits, in_mm, plan_mesh
+from .report import Clock, MeshResult, Report, SurfaceError, SurfaceToMesh
 
 if TYPE_CHECKING:
     from ..volume import Plan, SignBricks
     from ..volume.sizing import Sizing
-    from .mesh_recipe import MeshRecipe
+    from .shared_mesh import MeshRecipe
     from .surfaces import Surface
 
 COLOURED = (".ply", ".glb", ".3mf")
@@ -78,7 +75,7 @@ def make_mesh(
     return result if result is first else result.instead_of(first)
 
 
-LATER = "halo", "missed", "self_intersections", "tally", "tip_triangles", "tips", "topology", "touching"
+LATER = "cleaning", "checks", "spatial", "tips", "topology", "touching"
 """Modules of meshes that follow contouring."""
 
 
@@ -162,12 +159,12 @@ class _Job:
 
         Samples of walls thinner than a voxel do not tell bodies from crumbs: the field then chooses.
         """
-        sized, how = planned(self.scene, self.what, self.size, self.clock), self.what.how(self.scene)
+        sized, how = plan_mesh(self.scene, self.what, self.size, self.clock), self.what.how(self.scene)
         with in_mm(self.size):
             signs = self.signs(sized.planned, False)
         thin = how.sorts and surfaces.has_thin_walls(signs)
         if again := thin and how.whole:
-            sized = edited(sized.planned, self.scene, self.what, self.size, self.clock)
+            sized = apply_edits(sized.planned, self.scene, self.what, self.size, self.clock)
             signs = self.signs(sized.planned, True)
             thin = surfaces.has_thin_walls(signs)
         return replace(sized, left=replace(sized.left, keep="all")) if thin else sized, signs, again
@@ -175,7 +172,7 @@ class _Job:
     def recipe(self, again: bool) -> MeshRecipe:
         """Recipe of the field, for other processes; `again` if the field chose the bodies."""
         from ..scene.writer import to_xml
-        from .mesh_recipe import MeshRecipe
+        from .shared_mesh import MeshRecipe
 
         return MeshRecipe(to_xml(self.scene), self.scene.name, self.what, again)
 
@@ -183,11 +180,11 @@ class _Job:
         """Samples, by the pool of the work if there is one; a GPU samples here."""
         work = self.clock.work
         if work.cluster is None or work.device != "cpu":
-            return surfaces.sampled(planned, self.clock)
-        from .mesh_sampling import by_pool
+            return surfaces.sample_surface(planned, self.clock)
+        from .shared_mesh import by_pool
 
         job, evaluate = by_pool(self.recipe(again), planned, work.cluster, work)
-        signs = surfaces.sampled(planned, self.clock, evaluate)
+        signs = surfaces.sample_surface(planned, self.clock, evaluate)
         work.cluster.finished(job)
         return signs
 
@@ -222,7 +219,7 @@ class _Job:
         what, clock, scale, refined = self.what, self.clock, sized.scale, None
         planned, signs, thin = surface.planned, surface.signs, surface.thin
         if what.chord_mm is not None:
-            surface, done = surfaces.refined(surface, what.chord_mm / scale, clock)
+            surface, done = surfaces.refine_surface(surface, what.chord_mm / scale, clock)
             refined = done.scaled(scale)
         with clock("finishing"):
             finish = Finish(surface, sized.left, what.dust, scale, clock)

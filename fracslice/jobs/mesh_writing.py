@@ -9,16 +9,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..background import ahead
 from ..meshjob import MeshJob
 from ..scene import Scene
-from .checking import Check
-from .clock import Clock
-from .finishing import Finish
+from ..work import ahead
+from .finishing import Check, Finish
+from .report import Clock
 
 if TYPE_CHECKING:
     from ..mesh import Mesh
-    from ..mesh.mesh_report import MeshReport
+    from ..mesh.checks import MeshReport
     from ..mesh.simplify import Simplified
     from .surfaces import Surface
 
@@ -40,45 +39,20 @@ class Made(NamedTuple):
 
 @dataclass(frozen=True)
 class Writing:
-    """Last stages of a mesh job.
+    """Last stages of a mesh job."""
 
-    Attributes
-    ----------
-    scene : Scene
-        Scene of the mesh.
-    what : MeshJob
-        The job.
-    clock : Clock
-        Threads, progress, cancellation and timing.
-    path : Path or None
-        File to write.
-    """
-
-    scene: Scene
-    what: MeshJob
-    clock: Clock
-    path: Path | None
+    scene: Scene  # scene of the mesh
+    what: MeshJob  # the job
+    clock: Clock  # threads, progress, cancellation and timing
+    path: Path | None  # file to write
 
     def made(self, surface: Surface, finish: Finish) -> Made:
-        """Finish, write and check a mesh.
-
-        Parameters
-        ----------
-        surface : Surface
-            The surface.
-        finish : Finish
-            Selection and placement.
-
-        Raises
-        ------
-        MeshError, ExportError, Cancelled
-            As `make_mesh`.
-        """
+        """Finish, write and check a mesh."""
         return self._joined(surface, finish) or self._alone(surface, finish)
 
     def _alone(self, surface: Surface, finish: Finish) -> Made:
         """Write the file while it is checked, by threads of this process."""
-        from ..mesh.missed import surface_to_mesh
+        from ..mesh.checks import surface_to_mesh
 
         planned, work = surface.planned, self.clock.work
         with self.clock("checking"):
@@ -91,8 +65,8 @@ class Writing:
         """Write the file from the pieces of a pool; None for a surface that was made here."""
         if self.clock.work.cluster is None:
             return None
+        from .shared_files import write_shared
         from .shared_mesh import SharedSurface
-        from .shared_writing import write_shared
 
         if not isinstance(surface, SharedSurface):
             return None
@@ -110,8 +84,8 @@ class Writing:
         """
         from ..export import FORMATS, flushing, replacing
         from ..export.stl import write_pieces
-        from ..mesh.halo import Finished
-        from ..mesh.tip_triangles import tips_last
+        from ..mesh.cleaning import Finished
+        from ..mesh.tips import tips_last
 
         finished, simplified, mesh = finish.finished(), None, None
         if self.what.simplify_mm is not None:
@@ -161,13 +135,7 @@ class Writing:
 
 
 def metadata(scene: Scene) -> dict[str, str]:
-    """Metadata of files made from a scene.
-
-    Returns
-    -------
-    dict
-        Application, title and hash.
-    """
+    """Metadata of files made from a scene."""
     from ..export import application
 
     return {"Application": application(), "Title": scene.name, "scene_hash": scene.hash}

@@ -7,11 +7,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ..common.digits import significant
+from ..common.messages import significant
 from ..errors import GridError, VolumeError
 from ..meshjob import MeshJob
 from ..scene import Print, Scene
-from .clock import Clock
+from .report import Clock
 
 if TYPE_CHECKING:
     from ..volume import Plan
@@ -20,98 +20,42 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Sized:
-    """A plan, its scale, and the remaining choice of bodies.
+    """A plan, its scale, and the remaining choice of bodies."""
 
-    Attributes
-    ----------
-    planned : Plan
-        Field and voxel.
-    scale : float
-        mm per scene unit.
-    left : Print
-        Choice of bodies and cavities that is made in the mesh.
-    """
-
-    planned: Plan
-    scale: float
-    left: Print
+    planned: Plan  # field and voxel
+    scale: float  # mm per scene unit
+    left: Print  # choice of bodies and cavities that is made in the mesh
 
 
-def planned(scene: Scene, what: MeshJob, size: Sizing, clock: Clock) -> Sized:
-    """Plan the field to be meshed, with its edits.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene to mesh.
-    what : MeshJob
-        Resolution and changes of the mesh.
-    size : Sizing
-        Size of the object.
-    clock : Clock
-        Threads, progress, cancellation and timing.
-
-    Raises
-    ------
-    SceneError, VolumeError, Cancelled
-        For a scene that cannot be meshed.
-    """
+def plan_mesh(scene: Scene, what: MeshJob, size: Sizing, clock: Clock) -> Sized:
+    """Plan the field to be meshed, with its edits."""
     from ..volume import plan
-    from ..volume.sizing import oriented
+    from ..volume.sizing import orient_field
 
     how = what.how(scene)
     with clock("planning"):
-        root = oriented(scene.root, what.up, size.stretch, clock.work)
+        root = orient_field(scene.root, what.up, size.stretch, clock.work)
         made = plan(root, what.voxels(size.longest), clock.work)
         if how.bodies is not None:
-            from ..printing.framing import framed
+            from ..printing.framing import frame_bodies
 
-            made = framed(made, size, how.bodies, clock.work)
+            made = frame_bodies(made, size, how.bodies, clock.work)
     if not how.whole:
-        return edited(made, scene, what, size, clock)
+        return apply_edits(made, scene, what, size, clock)
     return Sized(made.strict if what.proved else made, size.scale(made.box), how)
 
 
 @contextmanager
 def in_mm(size: Sizing) -> Iterator[None]:
-    """Add the voxel in mm to the error of too large a grid.
-
-    Parameters
-    ----------
-    size : Sizing
-        Size of the object.
-
-    Raises
-    ------
-    VolumeError
-        If the managed block raises `GridError`.
-    """
+    """Add the voxel in mm to the error of too large a grid."""
     try:
         yield
     except GridError as error:
         raise VolumeError(f"{error}, {significant(size.longest / error.most)} mm") from None
 
 
-def edited(made: Plan, scene: Scene, what: MeshJob, size: Sizing, clock: Clock) -> Sized:
-    """Make all edits for printing.
-
-    Parameters
-    ----------
-    made : Plan
-        Plan without edits.
-    scene, what, size, clock
-        As for `planned`.
-
-    Returns
-    -------
-    Sized
-        The plan of the edited field.
-
-    Raises
-    ------
-    SceneError, VolumeError, Cancelled
-        For edits that cannot be made.
-    """
+def apply_edits(made: Plan, scene: Scene, what: MeshJob, size: Sizing, clock: Clock) -> Sized:
+    """Make all edits for printing."""
     from ..printing import printable
 
     how = what.how(scene)

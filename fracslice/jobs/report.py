@@ -1,36 +1,38 @@
-"""Report of a mesh job."""
+"""Report and result of a mesh job: placement in print space, times, figures."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, is_dataclass
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field, fields, is_dataclass, replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.quantiles import quantile
+from ..common.arrays import quantile
+from ..errors import TooLargeError
+from ..work import Work
 
 if TYPE_CHECKING:
-    from ..mesh.components import Removed
-    from ..mesh.mesh_report import MeshReport
+    from ..kernel import Field
+    from ..mesh import Mesh
+    from ..mesh.checks import MeshReport
     from ..mesh.refine import Refined
     from ..mesh.simplify import Simplified
+    from ..mesh.topology import Removed
+    from ..volume import Bricks, Plan
     from .completeness import Amount
 
 
 @dataclass(frozen=True)
 class SurfaceError:
-    """Distances of the mesh's vertices from the true surface.
+    """Distances of the mesh's vertices from the true surface."""
 
-    Attributes
-    ----------
-    mean, p99, max : float
-        Mean, 99th percentile and maximum, mm.
-    """
-
-    mean: float
+    mean: float  # mean, 99th percentile and maximum, mm
     p99: float
     max: float
 
@@ -38,48 +40,24 @@ class SurfaceError:
     def of(cls, mm: NDArray[np.float64]) -> SurfaceError:
         """Summarise distances.
 
-        Parameters
-        ----------
-        mm : ndarray of float64
-            Distances, mm.
-
-        Returns
-        -------
-        SurfaceError
-            Summary.
+        `mm` in mm.
         """
         return cls(float(mm.mean()), quantile(mm, 0.99), float(mm.max()))
 
 
 @dataclass(frozen=True)
 class SurfaceToMesh:
-    """Distances from points on the true surface, located without the mesh, to the mesh.
+    """Distances from points on the true surface, located without the mesh, to the mesh."""
 
-    Attributes
-    ----------
-    mean, max : float
-        Mean and maximum, mm.
-    points : int
-        Number of points.
-    """
-
-    mean: float
+    mean: float  # mean and maximum, mm
     max: float
-    points: int
+    points: int  # number of points
 
     @classmethod
     def of(cls, mm: NDArray[np.float64]) -> SurfaceToMesh:
         """Summarise distances.
 
-        Parameters
-        ----------
-        mm : ndarray of float64
-            Distances, mm.
-
-        Returns
-        -------
-        SurfaceToMesh
-            Summary.
+        `mm` in mm.
         """
         return cls(float(mm.mean()), float(mm.max()), len(mm))
 
@@ -199,3 +177,102 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return dict(value)
     return asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Map from the scene to print space: ``mm = scale * scene units + offset``."""
+
+    scale: float  # mm per scene unit
+    offset: tuple[float, float, float]  # translation, mm
+
+    def mm(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Transform points from the scene to print space.
+
+        `points`: float64 (n, 3), scene units. Returns float64 (n, 3), mm.
+        """
+        placed: NDArray[np.float64] = points * self.scale + np.array(self.offset)
+        return placed
+
+    def units(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Transform points from print space to the scene.
+
+        `points`: float64 (n, 3), mm. Returns float64 (n, 3), scene units.
+        """
+        axes = np.ascontiguousarray(points.T)  # three long rows: NumPy is slow on many short ones
+        scene: NDArray[np.float64] = ((axes - np.array(self.offset)[:, None]) / self.scale).T
+        return scene
+
+
+@dataclass(frozen=True, eq=False)
+class MeshResult:
+    """Result of `make_mesh`."""
+
+    report: Report  # measures, checks and costs
+    place: Placement  # map from the scene to the mesh
+    planned: Plan  # sampled field
+    whole: Mesh | None  # the mesh; None if it is larger than memory and only in the file
+    work: Work = field(default_factory=Work)  # threads, progress and cancellation of the job
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle and copy all but the threads and callbacks of the job."""
+        return MeshResult, (self.report, self.place, self.planned, self.whole)
+
+    def instead_of(self, coarse: MeshResult) -> MeshResult:
+        """The result with a note that it was made in place of a coarser one, and why."""
+        report, asked = self.report, coarse.report
+        text = f"voxel {report.voxel_mm:.3g} mm instead of {asked.voxel_mm:.3g} mm: {', '.join(asked.lost)}"
+        return replace(self, report=replace(report, notes=(text, *report.notes)))
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh in mm, standing on z = 0, quantised to float32."""
+        if self.whole is None:
+            raise TooLargeError("the mesh does not fit in memory; it is in the file that was written")
+        return self.whole
+
+    @property
+    def root(self) -> Field:
+        """Field that was meshed."""
+        return self.planned.root
+
+    @cached_property
+    def bricks(self) -> Bricks:
+        """Samples of the field around the surface, scene units; computed on first access."""
+        from ..volume import sample_scene
+
+        return sample_scene(self.planned, self.work)
+
+    @property
+    def bricks_mm(self) -> Bricks:
+        """Samples in print space: positions and values in mm."""
+        scale, (x, y, z) = self.place.scale, self.bricks.origin
+        dx, dy, dz = self.place.offset
+        return replace(
+            self.bricks,
+            origin=(scale * x + dx, scale * y + dy, scale * z + dz),
+            voxel=scale * self.bricks.voxel,
+            values=self.bricks.values * np.float32(scale),
+        )
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Stage timer of a job: reports progress, checks for cancellation between stages and measures time."""
+
+    work: Work  # execution settings
+    # wall-clock time per stage, and "total", in seconds. Stages may overlap
+    seconds: dict[str, float] = field(default_factory=lambda: {"total": 0.0})
+    begun: float = field(default_factory=time.perf_counter)  # time of the start, s
+
+    @contextmanager
+    def __call__(self, stage: str) -> Iterator[None]:
+        """Time a stage; a repeated stage adds up."""
+        self.work.check()
+        self.work.progress(stage, 0.0)
+        started = time.perf_counter()
+        yield
+        ended = time.perf_counter()
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + ended - started
+        self.seconds["total"] = ended - self.begun
+        self.work.progress(stage, 1.0)

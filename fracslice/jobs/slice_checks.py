@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from ..cluster import Contents, Files, Pool, Shard, packed, unpacked
+from ..cluster import Contents, Files, Pool, Shard, pack_arrays, unpack_arrays
 from ..errors import SharedError
-from ..export.jobs import SliceRun
-from ..export.ranges import RangeTask
-from ..printing.limits import Limits
+from ..export.layer_tasks import RangeTask
+from ..export.slice_run import SliceRun
+from ..printing.problems import Limits
 from ..slicing.layer_checks import LayerFindings, PrintReport, check_layers, findings_of
 from ..slicing.runs import LayerComponents, Nodes, Runs
 from ..work import Work
@@ -31,22 +31,11 @@ class CheckTask(RangeTask):
         arrays: Files = {}
         for index, of in enumerate(findings_of(run.slicer_with(work), range(self.first, self.end))):
             arrays |= {f"{index}-{name}": array for name, array in _arrays(of)}
-        return packed(**arrays)
+        return pack_arrays(**arrays)
 
 
 def check_run(run: SliceRun, limits: Limits | None = None) -> PrintReport:
-    """Check the layers of a run, by the pool of its work if there is one.
-
-    Returns
-    -------
-    PrintReport
-        The report, the same for any number of workers.
-
-    Raises
-    ------
-    SharedError
-        For a shard that does not write the report, when its ranges are made.
-    """
+    """Check the layers of a run, by the pool of its work if there is one."""
     pool, printer = run.work.cluster, run.screen.printer
     if pool is None:
         return check_layers(run.stack, limits, printer, run.work)
@@ -62,9 +51,9 @@ def check_run(run: SliceRun, limits: Limits | None = None) -> PrintReport:
 def _findings(pool: Pool, tasks: list[CheckTask], run: SliceRun) -> Iterator[LayerFindings]:
     """Results of all layers, in order."""
     for task, data in zip(tasks, pool.results(tasks, run.work, "checking layers"), strict=True):
-        files = unpacked(data)
+        files = unpack_arrays(data)
         for index in range(task.end - task.first):
-            yield _read(files, f"{index}-", run.stack.shape[1])
+            yield _read_layer_findings(files, f"{index}-", run.stack.shape[1])
 
 
 def _arrays(of: LayerFindings) -> Iterator[tuple[str, np.ndarray]]:
@@ -79,7 +68,7 @@ def _arrays(of: LayerFindings) -> Iterator[tuple[str, np.ndarray]]:
             yield name, measured
 
 
-def _read(files: Files, layer: str, width: int) -> LayerFindings:
+def _read_layer_findings(files: Files, layer: str, width: int) -> LayerFindings:
     """Results of a layer from their arrays."""
 
     def components(kind: str) -> LayerComponents:

@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..background import ahead
 from ..common.memory import available_bytes
 from ..errors import TooLargeError
 from ..volume.lattice import BRICK
 from ..volume.states import distinct
-from .clock import Clock
+from ..work import ahead
+from .report import Clock
 
 if TYPE_CHECKING:
-    from ..mesh.components import Shells
     from ..mesh.pieces import Pieces
     from ..mesh.refine import Refined
-    from ..mesh.whole_shells import WholeShells
+    from ..mesh.shells import WholeShells
+    from ..mesh.topology import Shells
     from ..volume import Plan, SignBricks
     from ..volume.exploration import Evaluate
 
@@ -41,41 +41,16 @@ the longest side.
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Exact surface of a field, scene units.
+    """Exact surface of a field, scene units."""
 
-    Attributes
-    ----------
-    planned : Plan
-        Sampled field.
-    signs : SignBricks
-        Its samples.
-    pieces : Pieces
-        Labelled pieces of the mesh.
-    shells : WholeShells
-        Shells of the mesh.
-    tips : ndarray of float64, shape (k, 3)
-        Vertices that were added at tips, and at sharp edges that samples cut off.
-    """
-
-    planned: Plan
-    signs: SignBricks
-    pieces: Pieces
-    shells: WholeShells
-    tips: NDArray[np.float64]
+    planned: Plan  # sampled field
+    signs: SignBricks  # its samples
+    pieces: Pieces  # labelled pieces of the mesh
+    shells: WholeShells  # shells of the mesh
+    tips: NDArray[np.float64]  # vertices that were added at tips, and at sharp edges that samples cut off
 
     def nested(self, bodies: bool, threads: int) -> tuple[Shells, int]:
-        """Nesting of the shells.
-
-        Parameters
-        ----------
-        bodies, threads
-            As for `WholeShells.nested`.
-
-        Returns
-        -------
-        Shells, int
-            As `WholeShells.nested`.
-        """
+        """Nesting of the shells."""
         return self.shells.nested(self.pieces, bodies, threads)
 
     @property
@@ -84,17 +59,10 @@ class Surface:
         return self.shells.thin_walls(self.planned.voxel)
 
 
-def sampled(planned: Plan, clock: Clock, evaluate: Evaluate | None = None) -> SignBricks:
+def sample_surface(planned: Plan, clock: Clock, evaluate: Evaluate | None = None) -> SignBricks:
     """Sample the signs of a planned scene around its surface.
 
-    Parameters
-    ----------
-    planned : Plan
-        Field and voxel.
-    clock : Clock
-        Threads, progress, cancellation and timing.
-    evaluate : callable, optional
-        As for `sample_signs`.
+    `planned`: field and voxel.
     """
     from ..volume import sample_scene_signs
 
@@ -103,20 +71,11 @@ def sampled(planned: Plan, clock: Clock, evaluate: Evaluate | None = None) -> Si
 
 
 def has_thin_walls(signs: SignBricks) -> bool:
-    """True if walls thinner than a voxel hold too much of the material for the samples to distinguish bodies.
-
-    Parameters
-    ----------
-    signs : SignBricks
-        Samples of the surface.
-
-    Returns
-    -------
-    bool
-        True from the share on that `WholeShells.thin_walls` notes.
+    """True if walls thinner than a voxel hold too much of the material for the samples to distinguish
+    bodies.
     """
     from ..meshjob import PIECES
-    from ..printing.solid_components import thin_share
+    from ..printing.components import thin_share
 
     return thin_share(signs) >= PIECES
 
@@ -127,17 +86,7 @@ def refuse_what_does_not_fit(signs: SignBricks, voxel: float) -> None:
     The number of bricks grows with a power of the resolution: the box-counting dimension of the surface,
     estimated from boxes of one and of two bricks.
 
-    Parameters
-    ----------
-    signs : SignBricks
-        Samples of the surface.
-    voxel : float
-        Voxel, mm.
-
-    Raises
-    ------
-    TooLargeError
-        With a voxel that fits.
+    `voxel` in mm.
     """
     needed, free = len(signs) * crossings_a_brick(signs) * BYTES_A_CROSSING, available_bytes()
     if len(signs) <= BRICKS or needed <= free:
@@ -152,18 +101,7 @@ def refuse_what_does_not_fit(signs: SignBricks, voxel: float) -> None:
 
 
 def crossings_a_brick(signs: SignBricks) -> float:
-    """Count the grid edges that the surface crosses, in bricks that are spread evenly.
-
-    Parameters
-    ----------
-    signs : SignBricks
-        Samples of the surface.
-
-    Returns
-    -------
-    float
-        Mean per brick. Edges between bricks count as often as those within.
-    """
+    """Count the grid edges that the surface crosses, in bricks that are spread evenly."""
     some = signs.signs[:: max(len(signs) // COUNTED, 1)]
     changes = some[:, 1:] ^ some[:, :-1], some[:, :, 1:] ^ some[:, :, :-1], (some ^ (some >> 1)) & 0x7F
     within = sum(int(np.bitwise_count(change).sum()) for change in changes)
@@ -171,33 +109,13 @@ def crossings_a_brick(signs: SignBricks) -> float:
 
 
 def surface_of(planned: Plan, signs: SignBricks, most: int, folder: Path | None, clock: Clock) -> Surface:
-    """Mesh the surface of samples, in pieces of about `most` bricks.
-
-    Parameters
-    ----------
-    planned : Plan
-        Sampled field.
-    signs : SignBricks
-        Its samples.
-    most : int
-        Approximate bricks per piece.
-    folder : Path or None
-        Folder for the pieces, if there are several.
-    clock : Clock
-        Threads, progress, cancellation and timing.
-
-    Returns
-    -------
-    Surface
-        The surface with tips and sharp edges, labelled.
-    """
+    """Mesh the surface of samples, in pieces of about `most` bricks."""
     from ..mesh.contouring import BLUNT
     from ..mesh.extract import contour_pieces, contour_whole
     from ..mesh.pieces import Pieces
-    from ..mesh.pointed_vertices import Pointed
     from ..mesh.ridges import with_ridges
-    from ..mesh.survey import survey
-    from ..mesh.tips import with_tips
+    from ..mesh.shells import survey
+    from ..mesh.tips import Pointed, with_tips
 
     work, pieces = clock.work, Pieces(folder)
     pointed, blunt = Pointed(planned.voxel, work.threads), np.empty((0, 3))
@@ -216,29 +134,15 @@ def surface_of(planned: Plan, signs: SignBricks, most: int, folder: Path | None,
         return Surface(planned, signs, pieces, survey(pieces, planned.voxel, work.threads), tips)
 
 
-def refined(surface: Surface, chord: float, clock: Clock) -> tuple[Surface, Refined]:
+def refine_surface(surface: Surface, chord: float, clock: Clock) -> tuple[Surface, Refined]:
     """Refine a surface in one piece.
 
-    Parameters
-    ----------
-    surface : Surface
-        The surface.
-    chord : float
-        Maximum distance of triangles from the exact surface, scene units.
-    clock : Clock
-        Threads, progress, cancellation and timing.
-
-    Returns
-    -------
-    Surface
-        Refined surface.
-    Refined
-        Result, with lengths in scene units.
+    `chord` in scene units. Returns with lengths in scene units.
     """
     from ..mesh.contouring import Piece
     from ..mesh.pieces import Pieces
     from ..mesh.refine import refine
-    from ..mesh.survey import survey
+    from ..mesh.shells import survey
 
     planned, pieces = surface.planned, Pieces()
     with clock("refining"):

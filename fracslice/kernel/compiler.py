@@ -13,12 +13,11 @@ from llvmlite import ir
 
 from . import lanes_math
 from .emitter import Emitter
+from .language import parse
 from .linker import CALLED, Linked
 from .loop_linker import link_loops
 from .loops import Loop
-from .parsing import parse
-from .scalars import DOUBLE, FLOAT, WHOLE
-from .values import Lanes
+from .values import DOUBLE, FLOAT, WHOLE, Lanes
 
 PART = ["x", "y", "z", "P", "P0"]
 """Arguments of a part's function."""
@@ -26,44 +25,17 @@ PART = ["x", "y", "z", "P", "P0"]
 
 @dataclass(frozen=True)
 class Target:
-    """Compilation target.
+    """Compilation target."""
 
-    Attributes
-    ----------
-    bits
-        Width of a float: 32 or 64.
-    width
-        Lanes.
-    registers
-        Vector registers per value.
-    cpu, features
-        CPU name and features, as LLVM spells them.
-    """
-
-    bits: int
-    width: int
-    registers: int
-    cpu: str
+    bits: int  # width of a float: 32 or 64
+    width: int  # lanes
+    registers: int  # vector registers per value
+    cpu: str  # CPU name and features, as LLVM spells them
     features: str
 
 
 def compile_object(linked: Linked, target: Target, loops: Sequence[Loop]) -> bytes:
-    """Compile loops over a scene's field to an object file with one C function per loop.
-
-    Parameters
-    ----------
-    linked
-        Linked scene.
-    target
-        Compilation target.
-    loops
-        Loops to compile.
-
-    Raises
-    ------
-    KernelError
-        If a loop or formula is not in the language.
-    """
+    """Compile loops over a scene's field to an object file with one C function per loop."""
     lanes_math.HOST_FEATURES = frozenset(f[1:] for f in target.features.split(",") if f.startswith("+"))
     module = llvm.parse_assembly(_text(linked, target, loops))
     _optimise(module, _target_machine(target))

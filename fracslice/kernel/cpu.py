@@ -1,4 +1,4 @@
-"""CPU back end: a scene's field as machine code.
+"""CPU back end: a scene's field as machine code, compiled or read from the cache of object files.
 
 Loading it takes milliseconds. Its functions (`machine`) release the GIL, so plain threads scale.
 """
@@ -11,13 +11,31 @@ from functools import lru_cache
 
 import numpy as np
 
+from ..common.cache import Kept, cache_folder, key
 from ..formulas.field import Kernel, Loops, Precision
 from ..formulas.registry import Node
-from .host import lane_count
+from .host import REGISTERS, host, lane_count, toolchain
 from .linker import Linked, link
+from .loop_linker import loop_source
 from .loops import Loop, bricks, points
-from .machine import Function, constant, loaded
-from .objects import object_code
+from .machine import Function, constant, load_object
+
+
+def object_code(linked: Linked, bits: int, width: int, loops: Sequence[Loop]) -> bytes:
+    """Return the object file of loops over a linked scene: cached, or compiled and cached.
+
+    A file that other users could have written is not used.
+    """
+    texts_of_all = linked.source, loop_source(loops), [loop.arguments for loop in loops]
+    name = f"{key(*texts_of_all, bits, width, toolchain())}.o"
+
+    def compiled() -> bytes:
+        from .compiler import Target, compile_object
+
+        return compile_object(linked, Target(bits, width, REGISTERS, *host()), loops)
+
+    return Kept(cache_folder()).cached(name, compiled)  # incomplete code would crash the process
+
 
 BATCH = 1 << 10
 """Points per call of a loop: few enough to stay in the fastest cache."""
@@ -101,18 +119,10 @@ def compile_scene(root: Node, precision: Precision = "float32") -> CpuKernel:
 
 @dataclass(frozen=True, eq=False)
 class CompiledLoop:
-    """Machine-code implementation of `formulas.field.FieldLoop`.
+    """Machine-code implementation of `formulas.field.FieldLoop`."""
 
-    Attributes
-    ----------
-    function
-        Compiled loop.
-    parameters
-        Parameters P of the scene.
-    """
-
-    function: Function
-    parameters: np.ndarray
+    function: Function  # compiled loop
+    parameters: np.ndarray  # parameters P of the scene
 
     def __call__(self, frame: np.ndarray, rows: np.ndarray, out: np.ndarray) -> None:
         self.function(self.parameters, frame, *rows, *out, rows.shape[1])
@@ -126,24 +136,7 @@ class CompiledLoop:
 def compile_loops(linked: Linked, loops: tuple[Loop, ...], precision: Precision) -> Loops:
     """Compile loops over a linked scene.
 
-    Parameters
-    ----------
-    linked
-        Linked scene.
-    loops
-        Loops to compile.
-    precision
-        "float32" or "float64".
-
-    Returns
-    -------
-    Loops
-        Compiled loops by name.
-
-    Raises
-    ------
-    KernelError
-        If the scene or a loop cannot be compiled.
+    `precision`: "float32" or "float64".
     """
     parameters = constant(linked.parameters, precision)
     bits = parameters.dtype.itemsize * 8
@@ -153,27 +146,5 @@ def compile_loops(linked: Linked, loops: tuple[Loop, ...], precision: Precision)
 
 
 def load_functions(linked: Linked, bits: int, width: int, loops: Sequence[Loop]) -> dict[str, Function]:
-    """Load or compile the functions of loops over a linked scene.
-
-    Parameters
-    ----------
-    linked
-        Linked scene.
-    bits
-        Width of a float: 32 or 64.
-    width
-        Lanes.
-    loops
-        Loops to load.
-
-    Returns
-    -------
-    dict
-        Functions by name.
-
-    Raises
-    ------
-    KernelError
-        If the scene or a loop cannot be compiled.
-    """
-    return loaded(object_code(linked, bits, width, loops), loops, np.dtype(f"float{bits}"))
+    """Load or compile the functions of loops over a linked scene."""
+    return load_object(object_code(linked, bits, width, loops), loops, np.dtype(f"float{bits}"))

@@ -17,7 +17,7 @@ from ..formulas.registry import Node
 from .cuda_driver import available as available
 from .cuda_driver import missing as missing
 from .cuda_driver import require as require
-from .cuda_launching import launched, load_loops, parameters
+from .cuda_launching import launch, load_loops, parameters
 from .cuda_loops import bricks, points
 from .linker import Linked, link
 
@@ -28,24 +28,7 @@ LOOPS = points, bricks
 class CudaKernel(Kernel):
     """Compiled field of one scene on the GPU.
 
-    Parameters
-    ----------
-    linked
-        Linked scene.
-    precision
-        "float32" or "float64".
-
-    Attributes
-    ----------
-    dtype
-        Floating-point type.
-    batch
-        Samples per call that amortise its overhead.
-
-    Raises
-    ------
-    KernelError
-        If no GPU can be used.
+    `precision`: "float32" or "float64".
     """
 
     batch = 1 << 22
@@ -83,31 +66,19 @@ class CudaKernel(Kernel):
     def points_on_device(self, x: Any, y: Any, z: Any, out: Any) -> None:
         """Evaluate the field at points in GPU memory. Copies nothing and does not wait for the GPU.
 
-        Parameters
-        ----------
-        x, y, z
-            Coordinates, scene units: 1-D arrays on the GPU (Numba, CuPy, PyTorch, ...) of the kernel's dtype.
-        out
-            Receives the values; an array of the same kind.
+        `x`, `y`, `z`: scene units: 1-D arrays on the GPU (Numba, CuPy, PyTorch, ...) of the kernel's dtype.
         """
-        launched(self._loops.points, math.prod(out.shape), self._parameters, x, y, z, out)
+        launch(self._loops.points, math.prod(out.shape), self._parameters, x, y, z, out)
 
     def bricks_on_device(
         self, corners: Any, origin: tuple[float, float, float], voxel: float, out: Any
     ) -> None:
         """Evaluate the field on bricks in GPU memory. Copies nothing and does not wait for the GPU.
 
-        Parameters
-        ----------
-        corners
-            Grid index of the first sample of each brick, int32 [n, 3], on the GPU.
-        origin, voxel
-            Position of grid point (0, 0, 0) and grid spacing, scene units.
-        out
-            Receives the values, [n, 512] of the kernel's dtype, on the GPU.
+        `corners`: int32 [n, 3]; `origin`, `voxel` in scene units; `out`: [n, 512] of the kernel's dtype.
         """
         frame = [self.dtype.type(v) for v in (*origin, voxel)]
-        launched(self._loops.bricks, math.prod(out.shape), self._parameters, *frame, corners, out)
+        launch(self._loops.bricks, math.prod(out.shape), self._parameters, *frame, corners, out)
 
 
 _kernel = lru_cache(maxsize=32)(CudaKernel)

@@ -8,28 +8,22 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from ..common.extras import lacking
-from ..common.keys import key, texts
+from ..common.cache import key, texts
+from ..common.messages import lacking
 from ..errors import KernelError
 from . import cuda_memory
-from .cuda_api import present
-from .kept_texts import kept_text
+from .cuda_memory import present
+from .host import kept_text
 
 NO_GPU = "CUDA: no NVIDIA GPU, or no driver for it, was found on this machine"
 """Message for a missing GPU or driver."""
 
 
 def missing() -> str | None:
-    """Return the reason why this process cannot use CUDA.
-
-    Returns
-    -------
-    str
-        One line; None if CUDA can be used.
-    """
+    """Return the reason why this process cannot use CUDA."""
     if reason := lacking("numba_cuda", "CUDA needs", "numba-cuda[cu13]"):
         return reason
-    if not simulated() and not present():
+    if not is_simulated() and not present():
         return NO_GPU
     try:
         _compiler()
@@ -38,7 +32,7 @@ def missing() -> str | None:
     return None
 
 
-def simulated() -> bool:
+def is_simulated() -> bool:
     """Return True if Numba's simulator takes the place of a GPU."""
     return os.environ.get("NUMBA_ENABLE_CUDASIM") == "1"
 
@@ -65,22 +59,11 @@ def available() -> bool:
 
 
 def require() -> Any:
-    """Return the functions that allocate arrays.
-
-    Returns
-    -------
-    module
-        Module `cuda_memory`; for Numba's simulator, `numba.cuda`.
-
-    Raises
-    ------
-    KernelError
-        If no GPU can be used.
-    """
+    """Return the functions that allocate arrays."""
     reason = missing()
     if reason:
         raise KernelError(reason)
-    if not simulated():
+    if not is_simulated():
         return cuda_memory
     from . import cuda_intrinsics
 

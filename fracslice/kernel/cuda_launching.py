@@ -1,21 +1,86 @@
-"""Loops over linked scenes on an NVIDIA GPU."""
+"""Loops over linked scenes on an NVIDIA GPU: their machine code, kept in the cache, and their launches."""
 
 from __future__ import annotations
 
+import ctypes
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import cache, lru_cache, partial
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 
+from ..common.cache import Kept, cache_folder, key
 from ..formulas.field import Loops, Precision
 from . import cuda_source
-from .cuda_code import loaded
-from .cuda_driver import require
+from .cuda_driver import cuda_toolchain, is_simulated, require
+from .cuda_memory import Kind, argument, call, capability
 from .linker import Linked
 from .loops import Loop
+
+
+@cache
+def load_module(text: str, names: tuple[str, ...]) -> Any:
+    """Load the loops of a module."""
+    if is_simulated():
+        return execute_module(text)
+    return SimpleNamespace(**{name: CudaFunction(text, name) for name in names})
+
+
+@lru_cache(maxsize=8)
+def execute_module(text: str) -> ModuleType:
+    """Return the module of a text, whose loops Numba compiles or simulates."""
+    module = ModuleType(f"cuda_{key(text)}")
+    exec(compile(text, module.__name__, "exec"), module.__dict__)
+    return module
+
+
+class CudaFunction:
+    """Loop on the GPU, compiled for each combination of types of its arguments at first use."""
+
+    def __init__(self, text: str, name: str) -> None:
+        self._text, self._name = text, name
+        self._functions: dict[tuple[Kind, ...], ctypes.c_void_p] = {}
+
+    def __getitem__(self, grid: tuple[int, int]) -> Callable[..., None]:
+        """Return a function that launches it, for a number of blocks and the threads of each."""
+        return partial(self._launch, *grid)
+
+    def _launch(self, blocks: int, threads: int, *values: Any) -> None:
+        kinds, packed = zip(*map(argument, values), strict=True)
+        if kinds not in self._functions:
+            self._functions[kinds] = self._function(kinds)
+        data = b"".join(packed)
+        buffer = ctypes.create_string_buffer(data, len(data))
+        first = ctypes.addressof(buffer)
+        places = (ctypes.c_void_p * (len(data) // 8))(*range(first, first + len(data), 8))
+        call("cuLaunchKernel", self._functions[kinds], blocks, 1, 1, threads, 1, 1, 0, None, places, None)
+
+    def _function(self, kinds: tuple[Kind, ...]) -> ctypes.c_void_p:
+        """Machine code for types of arguments: cached, or compiled and cached."""
+        name = f"{key(self._text, self._name, kinds, capability(), cuda_toolchain())}.cubin"
+        kept = Kept(cache_folder()).cached(name, lambda: compiled(self._text, self._name, kinds))
+        entry, code = kept.split(b"\n", 1)
+        module, function = ctypes.c_void_p(), ctypes.c_void_p()
+        call("cuModuleLoadData", ctypes.byref(module), code)
+        call("cuModuleGetFunction", ctypes.byref(function), module, entry)
+        return function
+
+
+def compiled(text: str, name: str, kinds: Sequence[Kind]) -> bytes:
+    """Compile a loop for the GPU."""
+    from .cuda_intrinsics import types
+
+    def numba_type(dtype: str, dimensions: int, order: str) -> Any:
+        element = getattr(types, dtype)
+        return types.Array(element, dimensions, order) if dimensions else element
+
+    kernel = getattr(execute_module(text), name).compile(tuple(numba_type(*kind) for kind in kinds))
+    cubin = kernel.library.get_cubin()
+    return bytes(f"{kernel.entry_name}\n".encode() + getattr(cubin, "code", cubin))
+
 
 BLOCK = 128
 """Threads per block."""
@@ -29,18 +94,10 @@ LANES = 1 << 18
 
 @dataclass(frozen=True, eq=False)
 class CudaLoop:
-    """`formulas.field.CompiledLoop` on the GPU, with a thread per lane. Rows are copied there and back.
+    """`formulas.field.CompiledLoop` on the GPU, with a thread per lane. Rows are copied there and back."""
 
-    Attributes
-    ----------
-    loop
-        Kernel.
-    parameters
-        Parameters of the scene, on the GPU.
-    """
-
-    loop: Any
-    parameters: Any
+    loop: Any  # kernel
+    parameters: Any  # parameters of the scene, on the GPU
 
     def __call__(self, frame: np.ndarray, rows: np.ndarray, out: np.ndarray) -> None:
         cuda = require()
@@ -49,18 +106,8 @@ class CudaLoop:
         result.copy_to_host(out)
 
     def launch(self, count: int, frame: Any, *arguments: Any) -> None:
-        """Launch the loop on rows in GPU memory, without waiting for it.
-
-        Parameters
-        ----------
-        count
-            Lanes.
-        frame
-            Frame of the loop.
-        *arguments
-            Input rows and output rows.
-        """
-        launched(self.loop, count, self.parameters, frame, *arguments, count)
+        """Launch the loop on rows in GPU memory, without waiting for it."""
+        launch(self.loop, count, self.parameters, frame, *arguments, count)
 
     def native(self, frame: np.ndarray) -> Callable[..., None]:
         """Return a function for native code; see `FieldLoop.native`."""
@@ -75,18 +122,8 @@ def compile_loops(linked: Linked, loops: tuple[Loop, ...], precision: Precision)
     return Loops(1, LANES, runs, on_gpu=True)
 
 
-def launched(loop: Any, threads: int, *arguments: Any) -> None:
-    """Launch a loop without waiting for it.
-
-    Parameters
-    ----------
-    loop
-        Compiled loop.
-    threads
-        Least number of threads, > 0.
-    *arguments
-        Arguments of the loop.
-    """
+def launch(loop: Any, threads: int, *arguments: Any) -> None:
+    """Launch a loop without waiting for it."""
     with _LAUNCH:
         loop[-(-threads // BLOCK), BLOCK](*arguments)
 
@@ -96,22 +133,7 @@ def parameters(linked: Linked, precision: Precision) -> Any:
 
     Passing them as launch constants is no faster, and makes launching slower.
 
-    Parameters
-    ----------
-    linked
-        Linked scene.
-    precision
-        "float32" or "float64".
-
-    Returns
-    -------
-    DeviceNDArray
-        Parameters on the GPU.
-
-    Raises
-    ------
-    KernelError
-        If no GPU can be used.
+    `precision`: "float32" or "float64".
     """
     return require().to_device(linked.parameters.astype(precision))
 
@@ -119,25 +141,8 @@ def parameters(linked: Linked, precision: Precision) -> Any:
 def load_loops(linked: Linked, precision: Precision, loops: Sequence[Loop]) -> Any:
     """Load loops over a linked scene. Each is compiled at its first call, for the types of its arguments.
 
-    Parameters
-    ----------
-    linked
-        Linked scene.
-    precision
-        "float32" or "float64".
-    loops
-        Loops to load.
-
-    Returns
-    -------
-    object
-        Has the loops as attributes.
-
-    Raises
-    ------
-    KernelError
-        If no GPU can be used.
+    `precision`: "float32" or "float64".
     """
     require()
     text = cuda_source.module(linked, 32 if precision == "float32" else 64, loops)
-    return loaded(text, tuple(loop.name for loop in loops))
+    return load_module(text, tuple(loop.name for loop in loops))

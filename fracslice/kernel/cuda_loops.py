@@ -3,22 +3,14 @@
 from __future__ import annotations
 
 from ..formulas.vocabulary import where
-from .cuda_stubs import kernel, real, thread, whole
-from .intrinsics import field
+from .loops import field, kernel, real, thread, whole
 
 
 @kernel
 def points(P, X, Y, Z, F):
     """Evaluate the field at points; NaN at a point with a NaN.
 
-    Parameters
-    ----------
-    P
-        Parameters of the scene.
-    X, Y, Z
-        Coordinates, [n] each, scene units.
-    F
-        Receives the values, [n].
+    `P`: parameters of the scene; `X`, `Y`, `Z`: [n] each, scene units; `F`: [n].
     """
     i = thread()
     if i < F.size:

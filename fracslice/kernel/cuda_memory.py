@@ -1,22 +1,100 @@
-"""Arrays in GPU memory. Numba's simulator has the same functions for those that it simulates."""
+"""Arrays in GPU memory, by NVIDIA's driver, which is called without Numba."""
 
 from __future__ import annotations
 
 import ctypes
 import math
+import os
 import struct
 import weakref
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from ..errors import KernelError
-from .cuda_api import call
+
+_PLACE, _SIZE, _NUMBER, _INT = ctypes.c_void_p, ctypes.c_size_t, ctypes.c_uint, ctypes.c_int
+_CALLS: dict[str, tuple[Any, ...]] = {
+    "cuInit": (_NUMBER,),
+    "cuGetErrorString": (_INT, _PLACE),
+    "cuDeviceGetCount": (_PLACE,),
+    "cuDeviceGet": (_PLACE, _INT),
+    "cuDeviceGetAttribute": (_PLACE, _INT, _INT),
+    "cuDevicePrimaryCtxRetain": (_PLACE, _INT),
+    "cuCtxGetDevice": (_PLACE,),
+    "cuCtxSetCurrent": (_PLACE,),
+    "cuStreamSynchronize": (_PLACE,),
+    "cuMemAlloc_v2": (_PLACE, _SIZE),
+    "cuMemFree_v2": (_PLACE,),
+    "cuMemAllocHost_v2": (_PLACE, _SIZE),
+    "cuMemFreeHost": (_PLACE,),
+    "cuMemcpyHtoD_v2": (_PLACE, _PLACE, _SIZE),
+    "cuMemcpyDtoH_v2": (_PLACE, _PLACE, _SIZE),
+    "cuModuleLoadData": (_PLACE, _PLACE),
+    "cuModuleGetFunction": (_PLACE, _PLACE, ctypes.c_char_p),
+    "cuLaunchKernel": (_PLACE, *[_NUMBER] * 7, _PLACE, _PLACE, _PLACE),
+}
+_MAJOR, _MINOR = 75, 76  # attributes of a device
+
+
+def present() -> bool:
+    """Return True if the driver is installed and finds a GPU."""
+    return _driver() is not None
+
+
+@lru_cache(maxsize=1)
+def _driver() -> ctypes.CDLL | None:
+    """Initialised driver; None if there is no GPU."""
+    try:
+        driver = ctypes.CDLL("nvcuda.dll" if os.name == "nt" else "libcuda.so.1")
+    except OSError:
+        return None
+    for name, arguments in _CALLS.items():
+        getattr(driver, name).argtypes = arguments
+    count = ctypes.c_int()
+    failed = driver.cuInit(0) or driver.cuDeviceGetCount(ctypes.byref(count))
+    return driver if not failed and count.value else None
+
+
+def call(name: str, *arguments: Any) -> None:
+    """Call a function of the driver, in the context that Numba, CuPy and PyTorch use too."""
+    _checked("cuCtxSetCurrent", _context()[1])  # each thread has its own
+    _checked(name, *arguments)
+
+
+def _checked(name: str, *arguments: Any) -> None:
+    driver = _driver()
+    assert driver is not None
+    if status := getattr(driver, name)(*arguments):
+        text = ctypes.c_char_p()
+        driver.cuGetErrorString(status, ctypes.byref(text))
+        raise KernelError(f"CUDA: {name.removesuffix('_v2')}: {(text.value or b'unknown error').decode()}")
+
+
+@lru_cache(maxsize=1)
+def _context() -> tuple[int, int | None]:
+    """A device and its primary context: that in use by this thread, else the first."""
+    device, context, driver = ctypes.c_int(), ctypes.c_void_p(), _driver()
+    assert driver is not None
+    if driver.cuCtxGetDevice(ctypes.byref(device)):
+        _checked("cuDeviceGet", ctypes.byref(device), 0)
+    _checked("cuDevicePrimaryCtxRetain", ctypes.byref(context), device)
+    return device.value, context.value
+
+
+@lru_cache(maxsize=1)
+def capability() -> tuple[int, int]:
+    """Return the compute capability of the GPU."""
+    numbers = ctypes.c_int(), ctypes.c_int()
+    for number, attribute in zip(numbers, (_MAJOR, _MINOR), strict=True):
+        call("cuDeviceGetAttribute", ctypes.byref(number), attribute, _context()[0])
+    return numbers[0].value, numbers[1].value
+
 
 Shape = tuple[int, ...]
 Kind = tuple[str, int, str]
@@ -24,48 +102,32 @@ Kind = tuple[str, int, str]
 
 
 class Memory:
-    """Memory that is freed with the last reference to it.
-
-    Attributes
-    ----------
-    address
-        First byte.
-    """
+    """Memory that is freed with the last reference to it."""
 
     def __init__(self, allocate: str, free: str, size: int) -> None:
         place = ctypes.c_void_p()
         call(allocate, ctypes.byref(place), max(size, 1))
         assert place.value is not None
         self.address = place.value
-        weakref.finalize(self, _freed, free, self.address).atexit = False  # the driver ends before Python
+        weakref.finalize(
+            self, _free_array, free, self.address
+        ).atexit = False  # the driver ends before Python
 
 
-def _freed(free: str, address: int) -> None:
+def _free_array(free: str, address: int) -> None:
     with suppress(KernelError):  # after a fault in a kernel every call fails, and says so
         call(free, address)
 
 
 @dataclass(frozen=True, eq=False)
 class DeviceArray:
-    """C-contiguous array in GPU memory, or one of another library.
+    """C-contiguous array in GPU memory, or one of another library."""
 
-    Attributes
-    ----------
-    shape, dtype
-        As of an array of NumPy.
-    strides
-        Bytes from element to element.
-    address
-        First element.
-    owner
-        Keeps the memory.
-    """
-
-    shape: Shape
+    shape: Shape  # as of an array of NumPy
     dtype: np.dtype
-    strides: Shape
-    address: int
-    owner: object
+    strides: Shape  # bytes from element to element
+    address: int  # first element
+    owner: object  # keeps the memory
 
     @property
     def size(self) -> int:
@@ -144,13 +206,7 @@ def pinned_array(shape: int | Shape, dtype: np.typing.DTypeLike) -> np.ndarray:
 
 
 def argument(value: Any) -> tuple[Kind, bytes]:
-    """Return an argument of a kernel: its type, and eight bytes for each of its parameters.
-
-    Parameters
-    ----------
-    value
-        A number, or an array on the GPU of any library.
-    """
+    """Return an argument of a kernel: its type, and eight bytes for each of its parameters."""
     if isinstance(value, DeviceArray):
         return value.argument
     if hasattr(value, "__cuda_array_interface__"):

@@ -14,38 +14,17 @@ from typing import Any
 
 from ..errors import KernelError
 from ..formulas.vocabulary import NAMES
+from .language import parse
 from .linker import CALLED, Linked
 from .loop_linker import link_loops
 from .loops import Loop
-from .parsing import parse
 
 INTRINSICS = "fracslice.kernel.cuda_intrinsics"
 """Module that the text imports its intrinsics from."""
 
 
 def module(linked: Linked, bits: int, loops: Sequence[Loop]) -> str:
-    """Write the text of a Python module that Numba compiles for CUDA and its simulator runs.
-
-    Parameters
-    ----------
-    linked
-        Linked scene.
-    bits
-        Width of a float: 32 or 64.
-    loops
-        Loops over lanes, or loops marked ``@kernel``. In these and in functions marked ``@device`` numbers
-        are typed by hand.
-
-    Returns
-    -------
-    str
-        Source text.
-
-    Raises
-    ------
-    KernelError
-        If a loop or formula is not in the language.
-    """
+    """Write the text of a Python module that Numba compiles for CUDA and its simulator runs."""
     names = [
         *sorted(NAMES),
         CALLED,
@@ -61,7 +40,7 @@ def module(linked: Linked, bits: int, loops: Sequence[Loop]) -> str:
     header = f"from {INTRINSICS} import {', '.join(names)}\n"
     over_lanes = {loop.name for loop in loops if loop.arguments}
     trees = [
-        _threaded(tree) if name in over_lanes else tree
+        _thread_kernel(tree) if name in over_lanes else tree
         for name, tree in ((name, function.tree) for name, function in link_loops(tuple(loops)).items())
     ]
     units = [ast.unparse(tree) for tree in trees if not tree.decorator_list or tree.name in over_lanes]
@@ -69,7 +48,7 @@ def module(linked: Linked, bits: int, loops: Sequence[Loop]) -> str:
     return "\n\n".join([header, typed("\n\n".join([linked.source, *units])), *by_hand]) + "\n"
 
 
-def _threaded(tree: ast.FunctionDef) -> ast.FunctionDef:
+def _thread_kernel(tree: ast.FunctionDef) -> ast.FunctionDef:
     """Kernel of a loop over lanes: its body once, for the lane of the thread."""
     tree = copy.deepcopy(tree)  # the linker keeps it
     match tree.body:
@@ -103,18 +82,7 @@ class _Lane(ast.NodeTransformer):
 
 
 def typed(source: str) -> str:
-    """Rewrite formulas as device functions whose numbers are all ``real`` or ``whole``.
-
-    Parameters
-    ----------
-    source
-        Source text.
-
-    Returns
-    -------
-    str
-        Rewritten text.
-    """
+    """Rewrite formulas as device functions whose numbers are all ``real`` or ``whole``."""
     tree = parse(source)
     return ast.unparse(ast.fix_missing_locations(_Typed(tree).visit(tree))) + "\n"
 
@@ -256,13 +224,7 @@ def _listed(visited: Any) -> list[ast.stmt]:
 
 
 def after_parameters(arguments: list[ast.expr]) -> list[ast.expr]:
-    """Return the arguments of a call after P: integer offsets into P.
-
-    Returns
-    -------
-    list
-        The arguments after P; empty if P is none of them or the last.
-    """
+    """Return the arguments of a call after P: integer offsets into P."""
     names = [a.id if isinstance(a, ast.Name) else "" for a in arguments]
     return arguments[names.index("P") + 1 :] if "P" in names[:-1] else []
 

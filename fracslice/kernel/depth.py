@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from ..common.quantiles import quantile
+from ..common.arrays import quantile
 from ..errors import EmptyError
 from ..formulas.algebra import stretches
 from ..formulas.parameters import AUTO, Count
 from ..formulas.registry import Node
 from ..formulas.transforms import affine
-from .cells import possible_cells
+from .boxes import possible_cells
 from .cpu import compile_scene
-from .kept_texts import keep_text, kept_text
+from .host import keep_text, kept_text
 
 DEEPEST = 60
 """Largest automatic depth."""
@@ -44,18 +44,10 @@ BISECTIONS = 24
 
 @dataclass(frozen=True)
 class Known:
-    """Scene tree that compares equal to every tree with the same key.
+    """Scene tree that compares equal to every tree with the same key."""
 
-    Attributes
-    ----------
-    node
-        Scene tree.
-    key
-        Its key.
-    """
-
-    node: Node = field(compare=False)
-    key: str = field(init=False)
+    node: Node = field(compare=False)  # scene tree
+    key: str = field(init=False)  # its key
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "key", self.node.key)
@@ -92,20 +84,7 @@ def resolve_depths(root: Node, detail: float) -> Node:
 
 
 def depth_notes(root: Node, known: Node) -> tuple[str, ...]:
-    """Describe the automatic depths of a scene, such as "mandelbulb 5".
-
-    Parameters
-    ----------
-    root
-        Scene with automatic depths.
-    known
-        The same scene with resolved depths.
-
-    Returns
-    -------
-    tuple of str
-        One note per automatic depth.
-    """
+    """Describe the automatic depths of a scene, such as "mandelbulb 5"."""
     pairs = zip(root.walk(), known.walk(), strict=True)
     return tuple(f"{a.formula.name} {b[n]}" for a, b in pairs for n in a.values if a[n] != b[n])
 
@@ -115,19 +94,7 @@ def visible(root: Node, voxel: float) -> tuple[Node, tuple[str, ...]]:
 
     Each formula decides for itself (`Node.visible`); seams, walls and bends around it are not considered.
 
-    Parameters
-    ----------
-    root
-        Scene.
-    voxel
-        Voxel size, scene units.
-
-    Returns
-    -------
-    shown : Node
-        Scene without these parts.
-    notes : tuple of str
-        Descriptions of the dropped parts.
+    `voxel` in scene units.
     """
     coarser = root.visible(voxel)
     changed = [
@@ -144,18 +111,7 @@ def visible(root: Node, voxel: float) -> tuple[Node, tuple[str, ...]]:
 def shallower(root: Node, voxel: float) -> tuple[str, ...]:
     """Find the depths at which the smallest parts of a scene are many voxels wide.
 
-    Parameters
-    ----------
-    root
-        Scene.
-    voxel
-        Voxel size, scene units.
-
-    Returns
-    -------
-    tuple of str
-        Changed depths, such as "flake.level=3"; those that may be automatic move most of the surface by less
-        than half that many voxels with one more iteration.
+    `voxel` in scene units.
     """
     coarse = resolve_depths(_automatic(visible(root, WIDE * voxel)[0]), WIDE * voxel)
     pairs = zip(root.walk(), coarse.walk(), strict=True)
@@ -164,20 +120,10 @@ def shallower(root: Node, voxel: float) -> tuple[str, ...]:
 
 
 @contextmanager
-def advised(root: Node | None, voxel: float) -> Iterator[None]:
+def with_depth_advice(root: Node | None, voxel: float) -> Iterator[None]:
     """Add the depths that voxels show to the error of an empty scene.
 
-    Parameters
-    ----------
-    root
-        Scene, or None.
-    voxel
-        Voxel size, scene units.
-
-    Raises
-    ------
-    EmptyError
-        If the managed block does.
+    `voxel` in scene units.
     """
     try:
         yield

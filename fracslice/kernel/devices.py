@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from ..errors import DeviceError
 from ..formulas.field import Device
-from ..formulas.parameters import Choice
-from ..formulas.records import validated
+from ..formulas.parameters import Choice, validate_value
 
 DEVICES = Choice("auto", "what computes", ("cpu", "cuda", "auto"))
 """Parameter of the device to compute on."""
@@ -13,25 +12,9 @@ FEWEST = 1 << 22
 """Samples of a picture below which "auto" selects the CPU: one core renders them while CUDA starts."""
 
 
-def chosen(device: str) -> Device:
-    """Select a compute device.
-
-    Parameters
-    ----------
-    device
-        "cpu", "cuda" or "auto"; "auto" selects the GPU if there is one.
-
-    Returns
-    -------
-    str
-        "cpu" or "cuda".
-
-    Raises
-    ------
-    DeviceError
-        If "cuda" is not available, or for any other text.
-    """
-    validated("device", device, DEVICES, DeviceError)
+def choose_device(device: str) -> Device:
+    """Select a compute device."""
+    validate_value("device", device, DEVICES, DeviceError)
     if device == "cpu":
         return "cpu"
     from .cuda_driver import missing
@@ -45,18 +28,6 @@ def chosen(device: str) -> Device:
 def for_picture(device: str, size: tuple[int, int], samples: int) -> str:
     """Select the CPU for a small picture, unless a device was named.
 
-    Parameters
-    ----------
-    device
-        "cpu", "cuda" or "auto".
-    size
-        Width and height, pixels.
-    samples
-        Samples per pixel.
-
-    Returns
-    -------
-    str
-        "cpu" in place of "auto" for less than `FEWEST` samples, else the device.
+    `size` in pixels; `samples`: samples per pixel.
     """
     return "cpu" if device == "auto" and size[0] * size[1] * samples < FEWEST else device

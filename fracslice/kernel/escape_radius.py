@@ -13,11 +13,9 @@ from typing import Any
 import numpy as np
 
 from . import functions
-from .enclosing_box import Corners, undecided
-from .interval_arrays import on_intervals
-from .interval_numbers import ARRAYS
-from .intervals import Interval
-from .orbits import R2, Round, written
+from .boxes import Corners, undecided_cells
+from .intervals import ARRAYS, Interval, on_intervals
+from .orbits import R2, Round, function_of_text
 
 MOST, LEVELS, MARGIN = 1 << 15, 12, 1e-9
 """Cells of a level, beyond which the radius is enlarged; levels of cells; least relative growth, more than
@@ -48,21 +46,7 @@ def escape_radius(
 ) -> float:
     """Enlarge a radius until no orbit comes back from beyond it.
 
-    Parameters
-    ----------
-    least
-        `least_size` of the steps from there to the end of the round.
-    radius
-        Radius.
-    outer
-        Radius where orbits stop.
-    end
-        Radius that is left at the end of the round; None: that of the point.
-
-    Returns
-    -------
-    float
-        Radius; the given one if that is proved.
+    `outer`: radius where orbits stop.
     """
 
     given = radius
@@ -80,7 +64,7 @@ def escape_radius(
         grown: np.ndarray = least(lo, hi, far) > (far if end is None else end) * (1 + MARGIN)
         return grown
 
-    left = float(_farthest(*undecided(wanted, proved, outer, MOST, LEVELS)).max(initial=0.0))
+    left = float(_farthest(*undecided_cells(wanted, proved, outer, MOST, LEVELS)).max(initial=0.0))
     return given if max(radius, left) == given else 1.02 * max(radius, left)
 
 
@@ -89,21 +73,7 @@ def least_size(
 ) -> Callable[[Corners, Corners, np.ndarray], np.ndarray]:
     """Return a function of cells, and the size of their farthest points, that bounds the last |w| from below.
 
-    Parameters
-    ----------
-    steps
-        Steps of a round.
-    first
-        Place of the first step taken.
-    values
-        Values of the arguments of the steps, and squares of the radii where orbits stop.
-    size
-        Size of the constants; None: that of the farthest point.
-
-    Returns
-    -------
-    callable
-        The function; where all orbits stop its value is huge.
+    `values`: and squares of the radii where orbits stop.
     """
     function = on_intervals(_last_size(steps, first))
     given = [values[name] for name in functions.parameters(function)[9:]]
@@ -124,23 +94,7 @@ def least_size(
 
 
 def constant_stretch(steps: Round, first: int, values: Mapping[str, Any]) -> float | None:
-    """Return a bound of the stretch of steps whose stretch is the same at all points.
-
-    Parameters
-    ----------
-    steps
-        Steps of a round.
-    first
-        Place of the first step taken.
-    values
-        Values of the arguments of the steps.
-
-    Returns
-    -------
-    float or None
-        Product of the stretches; None if one differs from point to point, or a step tears space or depends on
-        where the orbit started.
-    """
+    """Return a bound of the stretch of steps whose stretch is the same at all points."""
     product = 1.0
     for place, code in list(enumerate(steps))[first:]:
         step, names = code.traced(place), code.arguments(place)
@@ -149,7 +103,7 @@ def constant_stretch(steps: Round, first: int, values: Mapping[str, Any]) -> flo
         before = code.before(place, ("0.0",) * 3)
         body = [*before, *step.needed(step.stretch[0]), f"return {step.stretch[0]}"]
         spread = values[f"spread{place}"] if code.moved else 1.0
-        product *= spread * float(written(steps, names, body)(*(values[name] for name in names)))
+        product *= spread * float(function_of_text(steps, names, body)(*(values[name] for name in names)))
     return product * (1 + MARGIN)
 
 
@@ -181,7 +135,7 @@ def _last_size(steps: Round, first: int) -> Callable[..., Any]:
         body += [R2] if step.length is None else []
     ball, reach = "sqrt(mx * mx + my * my + mz * mz) - reach", " - size" if added else ""
     body.append(f"return where(alive, maximum(sqrt(r2), {ball}){reach}, 1e200)")
-    return written(steps, [*BOX, *BALL, "size", "unit", *given], body)
+    return function_of_text(steps, [*BOX, *BALL, "size", "unit", *given], body)
 
 
 def _farthest(lo: Corners, hi: Corners) -> np.ndarray:

@@ -16,12 +16,8 @@ def parameters(function: Callable[..., Any]) -> list[str]:
 
 
 def scope(function: Callable[..., Any]) -> dict[str, Any]:
-    """Return the names visible to a function from outside: builtins, its module's globals and its closure.
-
-    Parameters
-    ----------
-    function
-        Python function.
+    """Return the names visible to a function from outside: builtins, its module's globals and its
+    closure.
     """
     assert isinstance(function, FunctionType)
     cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
@@ -39,11 +35,6 @@ def fingerprint(function: Callable[..., Any]) -> Hashable:
     """Return a fingerprint, equal while a function's code and all values it uses from outside are the same.
 
     In a notebook, the values that a function's text depends on may change.
-
-    Parameters
-    ----------
-    function
-        Python function.
     """
     assert isinstance(function, FunctionType)
     code, names = function.__code__, outer_names(function.__code__)

@@ -32,21 +32,11 @@ INPUTS = ("x", "y", "z")
 
 @dataclass(frozen=True)
 class Operation:
-    """Node of a graph.
+    """Node of a graph."""
 
-    Attributes
-    ----------
-    name : str
-        A key of `FUNCTIONS`, one of `INPUTS`, or "constant".
-    operands : tuple of int
-        Indices of earlier nodes.
-    value : float
-        Value of a constant.
-    """
-
-    name: str
-    operands: tuple[int, ...] = ()
-    value: float = 0.0
+    name: str  # A key of `FUNCTIONS`, one of `INPUTS`, or "constant"
+    operands: tuple[int, ...] = ()  # indices of earlier nodes
+    value: float = 0.0  # value of a constant
 
 
 def graph(
@@ -54,24 +44,7 @@ def graph(
 ) -> list[Operation]:
     """Return the expression graph of a field.
 
-    Parameters
-    ----------
-    root
-        Scene with resolved depths.
-    scale
-        Length of a scene unit. The value is the field's, divided by its Lipschitz bound, times this.
-    offset
-        Position of the scene's origin.
-
-    Returns
-    -------
-    list of Operation
-        Operations in the order of their evaluation; the last one is the value.
-
-    Raises
-    ------
-    KernelError
-        If the scene cannot be linked, or has more than `MOST` operations.
+    `scale`: length of a scene unit.
     """
     linked, made = link(root), _Graph()
     scope: dict[str, Any] = {name: made.function(name) for name in FUNCTIONS}

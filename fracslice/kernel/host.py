@@ -1,15 +1,15 @@
-"""Host CPU that kernels are compiled for, and the compiler."""
+"""Host CPU that kernels are compiled for, the compiler, and texts kept in the cache of kernels."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 
 import llvmlite
 
-from ..common.cache_files import Kept, cache_folder
-from ..common.keys import key, texts
+from ..common.cache import Kept, cache_folder, key, texts
 from ..formulas import vocabulary
 
 REGISTERS = 2
@@ -23,45 +23,27 @@ DESCRIBED = {"vendor_id", "cpu family", "model", "model name", "stepping", "flag
 
 
 def lane_count(bits: int) -> int:
-    """Return the number of points evaluated at once.
-
-    Parameters
-    ----------
-    bits
-        Width of a float: 32 or 64.
-    """
+    """Return the number of points evaluated at once."""
     register = 512 if "+avx512f" in host()[1].split(",") else 256
     return REGISTERS * register // bits
 
 
 def host() -> tuple[str, str]:
-    """Return the host CPU as LLVM spells it.
-
-    Returns
-    -------
-    tuple of str
-        Name and features.
-    """
+    """Return the host CPU as LLVM spells it."""
     name, features, _ = description()
     return name, features
 
 
 @lru_cache(maxsize=1)
 def description() -> tuple[str, str, str]:
-    """Return the host CPU and the version of LLVM: cached for this processor, or asked of LLVM.
-
-    Returns
-    -------
-    tuple of str
-        Name, features and version.
-    """
+    """Return the host CPU and the version of LLVM: cached for this processor, or asked of LLVM."""
     processor = _processor()
     if not processor:
-        return _asked()
+        return _ask_llvm()
     library = os.stat(llvmlite.__file__)
     about = key(processor, llvmlite.__version__, llvmlite.__file__, library.st_mtime_ns)
     kept = Kept(cache_folder() / "hosts")
-    text = kept.cached(f"{about}.txt", lambda: "\n".join(_asked()).encode()).decode()
+    text = kept.cached(f"{about}.txt", lambda: "\n".join(_ask_llvm()).encode()).decode()
     name, features, version = text.split("\n")
     return name, features, version
 
@@ -73,7 +55,7 @@ def toolchain() -> str:
     return key(own, description(), llvmlite.__version__)
 
 
-def _asked() -> tuple[str, str, str]:
+def _ask_llvm() -> tuple[str, str, str]:
     """Ask LLVM; loading its library takes a tenth of a small job."""
     import llvmlite.binding as llvm
 
@@ -90,3 +72,22 @@ def _processor() -> str:
         return ""
     lines = [line for line in first.splitlines() if line.split("\t")[0].rstrip() in DESCRIBED]
     return "\n".join(lines) if len(lines) == len(DESCRIBED) else ""
+
+
+def kept_text(kind: str, made_of: tuple[object, ...], make: Callable[[], str]) -> str:
+    """Return a text: cached, or made and cached.
+
+    A file that other users could have written is not used.
+    """
+    kept, name = _place(kind, made_of)
+    return kept.cached(name, lambda: make().encode()).decode()
+
+
+def keep_text(kind: str, made_of: tuple[object, ...], text: str) -> None:
+    """Replace a cached text; see `kept_text`."""
+    kept, name = _place(kind, made_of)
+    kept.put_checked(name, text.encode())
+
+
+def _place(kind: str, made_of: tuple[object, ...]) -> tuple[Kept, str]:
+    return Kept(cache_folder() / kind), f"{key(kind, *made_of, toolchain())}.txt"

@@ -1,4 +1,4 @@
-"""Interval arithmetic on lanes and on NumPy arrays: enclosures of a formula's values over a cell.
+"""Interval arithmetic on lanes and on NumPy arrays: enclosures of values over a cell.
 
 Every bound is moved outwards by a unit in the last place or more, so that an interval encloses the exact
 result and the rounded one of the same precision, fused or not (Moore 1966, "Interval Analysis"). Magnitudes
@@ -12,9 +12,35 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from types import FunctionType
 from typing import Any
 
-from .interval_numbers import Bound, Numbers
+import numpy as np
+
+from ..formulas import vocabulary
+
+Bound = Any
+"""Lanes or NumPy array."""
+
+
+TINY = {32: 1e-36, 64: 1e-290}
+"""Smallest magnitude that has a sign, by the width of floats."""
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """Kind of the bounds."""
+
+    functions: Any  # module with the functions of the vocabulary
+    unit: float  # distance from 1 to the next number
+    huge: float  # largest magnitude, and the smallest that has a sign
+    tiny: float
+    # function of a bound and a number that returns the number in the form of the bound
+    constant: Callable[[Bound, float], Bound]
+
+
+ARRAYS = Numbers(vocabulary, 2.0**-52, 1e300, TINY[64], np.full_like)
+
 
 ROUNDED = 16
 """Errors of the elementary functions, units in the last place; the tests hold them to less."""
@@ -25,15 +51,9 @@ LONGEST = 4096.0
 
 @dataclass(frozen=True, eq=False)
 class Possible:
-    """Condition on the points of a cell.
+    """Condition on the points of a cell."""
 
-    Attributes
-    ----------
-    must, may
-        Masks: it holds at all points; it can hold at one.
-    """
-
-    must: Any
+    must: Any  # masks: it holds at all points; it can hold at one
     may: Any
 
     __array_ufunc__ = None  # makes NumPy defer to these operators
@@ -57,22 +77,14 @@ class Possible:
 
 @dataclass(frozen=True, eq=False)
 class Interval:
-    """Closed intervals, one for each lane or element, with Python's operators and the vocabulary as methods.
-
-    Attributes
-    ----------
-    lo, hi
-        Bounds.
-    of
-        Kind of the bounds.
-    known
-        The number that all of them are, if it is known.
+    """Closed intervals, one for each lane or element, with Python's operators and the vocabulary as
+    methods.
     """
 
-    lo: Bound
+    lo: Bound  # bounds
     hi: Bound
-    of: Numbers
-    known: float | None = None
+    of: Numbers  # kind of the bounds
+    known: float | None = None  # the number that all of them are, if it is known
 
     __array_ufunc__ = None  # makes NumPy defer to these operators
 
@@ -293,3 +305,33 @@ class Interval:
         high = m.where(all_of | (some & top), one, m.minimum(image.hi, one))
         low = m.where(all_of | (some & ~top), -one, m.maximum(image.lo, -one))
         return Interval(low, high, self.of)
+
+
+def on_cells(name: str) -> Callable[..., Any]:
+    """Return a function of the vocabulary for NumPy that takes intervals, too."""
+    plain = getattr(vocabulary, name)
+
+    def function(first: Any, *others: Any) -> Any:
+        if name == "any_of" and isinstance(first, Possible):
+            return bool(first.may.any())
+        given = (first, *others)
+        if not any(isinstance(v, (Interval, Possible)) for v in given):
+            return plain(*given)
+        if name == "where":
+            yes, no = map(_on_arrays, others)
+            return (first if isinstance(first, Possible) else Possible(first, first)).where(yes, no)
+        return getattr(_on_arrays(first), name)(*others)
+
+    return function
+
+
+def _on_arrays(value: Any) -> Interval:
+    """Interval of numbers; an interval unchanged."""
+    return value if isinstance(value, Interval) else Interval.at(np.asarray(value, np.float64), ARRAYS)
+
+
+def on_intervals(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function in the language of formulas that takes intervals."""
+    assert isinstance(function, FunctionType)
+    names = vocabulary.NAMES | vocabulary.OF_CELLS
+    return FunctionType(function.__code__, {name: on_cells(name) for name in names})

@@ -1,4 +1,4 @@
-"""Linking of loops and the functions that they call to syntax trees that keep their files' line numbers.
+"""Linking of loops and the functions that they call, and the keys of the code made from them.
 
 Numbers from outside a function (of its module, of an enumeration, of a fixed record) become constants, and
 branches on constants are resolved. A function called with fixed arguments is copied for them. Intrinsics keep
@@ -13,19 +13,77 @@ import copy
 import linecache
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, is_dataclass
+from enum import Enum
 from functools import lru_cache
-from types import FunctionType
+from types import CodeType, FunctionType, ModuleType
 from typing import Any, NoReturn
 
 from ..errors import KernelError
 from . import functions, language
-from .identity import identity
-from .intrinsics import is_intrinsic
-from .kept_texts import kept_text
-from .loops import Loop
-from .parsing import parse
-from .syntax import Folding
+from .host import kept_text
+from .language import Folding, parse
+from .loops import Loop, is_intrinsic
+
+
+def identity(*values: Any) -> str:
+    """Describe functions, the functions that they call, and all values that these use from outside."""
+    described = _Described()
+    for value in sorted(values, key=lambda value: not isinstance(value, FunctionType)):
+        described.add(value, tuple(sorted(described.names)))
+    return "\n".join(described.lines)
+
+
+class _Described:
+    """Lines on values and on everything that they refer to, each once."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.seen: dict[tuple[int, tuple[str, ...]], Any] = {}
+        self.names = set[str]()
+        """Names that the functions so far use: their arguments are used by these."""
+
+    def add(self, value: Any, names: tuple[str, ...]) -> None:
+        """Add a value; of a module, class or record the attributes with some names."""
+        if value is None or isinstance(value, (bool, int, float, str, Enum)):
+            self.lines.append(repr(value))
+            return
+        self.lines.append(_label(value))
+        if isinstance(value, FunctionType):
+            names = functions.outer_names(value.__code__)
+        if (id(value), names) in self.seen:
+            return
+        self.seen[id(value), names] = value
+        if isinstance(value, FunctionType):
+            self.names.update(names)
+            self.lines += _bytecode(value.__code__)
+            outside = functions.scope(value)
+            self.named({name: outside[name] for name in names if name in outside}, names)
+        elif type(value) is tuple:
+            for item in value:
+                self.add(item, names)
+        elif isinstance(value, (ModuleType, type, tuple)) or is_dataclass(value):
+            self.named({name: getattr(value, name) for name in names if hasattr(value, name)}, names)
+
+    def named(self, values: dict[str, Any], names: tuple[str, ...]) -> None:
+        """Add values with their names."""
+        for name, value in values.items():
+            self.lines.append(name)
+            self.add(value, names)
+
+
+def _label(value: Any) -> str:
+    """Kind and name of a value, without its address."""
+    name = getattr(value, "__qualname__", getattr(value, "__name__", ""))
+    return f"{type(value).__qualname__} {getattr(value, '__module__', '')}.{name}"
+
+
+def _bytecode(code: CodeType) -> list[str]:
+    """Instructions and constants of a function, and of those inside it."""
+    own = [repr(c) for c in code.co_consts if not isinstance(c, CodeType)]
+    inner = [line for c in code.co_consts if isinstance(c, CodeType) for line in _bytecode(c)]
+    return [code.co_code.hex(), repr(code.co_varnames), repr(code.co_names), *own, *inner]
+
 
 OF_LOOPS = "l_"
 """Prefix of the names of functions that loops call, distinct from those of formulas and units."""
@@ -35,34 +93,15 @@ Fixed = tuple[tuple[str, Any], ...]
 
 @dataclass(frozen=True)
 class LinkedFunction:
-    """Function that calls only linked functions and intrinsics.
+    """Function that calls only linked functions and intrinsics."""
 
-    Attributes
-    ----------
-    tree
-        Syntax tree.
-    file
-        File of its lines.
-    """
-
-    tree: ast.FunctionDef
-    file: str
+    tree: ast.FunctionDef  # syntax tree
+    file: str  # file of its lines
 
 
 @lru_cache(maxsize=32)
 def link_loops(loops: tuple[Loop, ...]) -> dict[str, LinkedFunction]:
-    """Link loops and the functions that they call.
-
-    Returns
-    -------
-    dict
-        Linked functions by name.
-
-    Raises
-    ------
-    KernelError
-        If a loop is not in the language.
-    """
+    """Link loops and the functions that they call."""
     linker = _LoopLinker()
     for loop in loops:
         linker.linked(loop.function, loop.fixed, loop.name)
@@ -70,13 +109,7 @@ def link_loops(loops: tuple[Loop, ...]) -> dict[str, LinkedFunction]:
 
 
 def loop_source(loops: Sequence[Loop]) -> str:
-    """Return the text of loops and of the functions that they call: cached, or linked and cached.
-
-    Raises
-    ------
-    KernelError
-        If a loop is not in the language.
-    """
+    """Return the text of loops and of the functions that they call: cached, or linked and cached."""
 
     def linked() -> str:
         return "\n\n\n".join(ast.unparse(linked.tree) for linked in link_loops(tuple(loops)).values())
@@ -114,7 +147,7 @@ class _Resolver(Folding):
 
     def tree(self, name: str) -> ast.FunctionDef:
         """Function under another name, without its fixed arguments."""
-        tree = _parsed(self.function)
+        tree = _parse_function(self.function)
         arguments = [a.arg for a in tree.args.args if a.arg not in self.fixed]
         tree.name, tree.returns = name, None
         tree.args = ast.arguments([], [ast.arg(a) for a in arguments], None, [], [], None, [])
@@ -206,7 +239,7 @@ class _Resolver(Folding):
         return expression
 
 
-def _parsed(function: Callable[..., Any]) -> ast.FunctionDef:
+def _parse_function(function: Callable[..., Any]) -> ast.FunctionDef:
     """Syntax tree of a function with the line numbers of its file."""
     code = function.__code__
     lines, first = linecache.getlines(code.co_filename), code.co_firstlineno

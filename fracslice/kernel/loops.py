@@ -1,39 +1,112 @@
-"""Loops around a field, the entry points of a compiled kernel.
+"""Loops around a field, the entry points of a compiled kernel, and the intrinsics that they use.
 
 A loop is a Python function that uses the intrinsics of formulas and of `intrinsics`, ``while``, array
 elements, and the numbers and functions of its module. It becomes a C function.
+
+Here they are implemented on NumPy arrays, so that a loop also runs as plain Python: lanes are a slice, and P
+is the field itself, a function of ``x, y, z``. The compiler implements the same names in machine code.
+
+`cuda_intrinsics` implements them on a GPU, and can be imported only where Numba's CUDA target is available.
+
+One thread does the work of one lane. The numbers of a loop are typed by hand: ``real(0.5)``, ``whole(3)``.
 """
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
+
+import numpy as np
 
 from ..formulas.vocabulary import where
-from .intrinsics import WIDTH, around, field, load, lower, store, upper
+from .intervals import ARRAYS, Interval
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+WIDTH = sys.maxsize
+"""Number of lanes; in Python all elements of an array."""
+
+_INTRINSICS: set[Callable[..., Any]] = set()
+
+
+def intrinsic(function: Function) -> Function:
+    """Decorate a function that the compiler or the linked scene provides under the same name."""
+    _INTRINSICS.add(function)
+    return function
+
+
+def is_intrinsic(value: Any) -> bool:
+    """Return True if a value is an intrinsic, which loops may call."""
+    return callable(value) and value in _INTRINSICS
+
+
+@intrinsic
+def load(array: np.ndarray, i: int) -> Any:
+    """Load lanes.
+
+    `array`: [n]; `i`: first element.
+    """
+    return array[i : i + WIDTH].copy()
+
+
+@intrinsic
+def store(array: np.ndarray, i: int, lanes: Any) -> None:
+    """Store lanes.
+
+    `array`: [n]; `i`: first element.
+    """
+    array[i : i + WIDTH] = lanes
+
+
+@intrinsic
+def around(centre: Any, half: float) -> Interval:
+    """Interval around a centre."""
+    return Interval(centre - half, centre + half, ARRAYS).outward()
+
+
+@intrinsic
+def lower(interval: Interval) -> Any:
+    """Lower bound of an interval."""
+    return interval.lo
+
+
+@intrinsic
+def upper(interval: Interval) -> Any:
+    """Upper bound of an interval."""
+    return interval.hi
+
+
+@intrinsic
+def gather(i: Any, P: np.ndarray) -> Any:
+    """Load an element of P for each lane.
+
+    `i`: whole, possible indices, as reals; `P`: parameters of the scene.
+    """
+    return P[np.asarray(i).astype(np.intp)]
+
+
+@intrinsic
+def field(x: Any, y: Any, z: Any, P: Any) -> Any:
+    """Evaluate the scene's signed field.
+
+    `x`, `y`, `z` in scene units; `P`: parameters of the scene.
+    """
+    return P(x, y, z)
 
 
 @dataclass(frozen=True)
 class Loop:
-    """C function over a field.
+    """C function over a field."""
 
-    Attributes
-    ----------
-    function
-        Python function of the loop.
-    arguments
-        One letter per argument: "r" a pointer to the kernel's float type, "i" to int32, "n" an integer. The
-        first argument is P by convention.
-    fixed
-        Further arguments by name, constant at compile time: functions, and records of numbers.
-    points
-        Kind of the coordinates that it passes to the field: "lanes", or "interval" for cells.
-    """
-
-    function: Callable[..., None]
+    function: Callable[..., None]  # python function of the loop
+    # one letter per argument: "r" a pointer to the kernel's float type, "i" to int32, "n" an integer. The
+    # first argument is P by convention
     arguments: str = ""
+    # further arguments by name, constant at compile time: functions, and records of numbers
     fixed: tuple[tuple[str, Any], ...] = ()
+    # kind of the coordinates that it passes to the field: "lanes", or "interval" for cells
     points: str = "lanes"
 
     @property
@@ -47,15 +120,7 @@ class Loop:
 
 
 def loop(arguments: str, points: str = "lanes") -> Callable[[Callable[..., None]], Loop]:
-    """Return a decorator that makes a function a `Loop`.
-
-    Parameters
-    ----------
-    arguments
-        Arguments of the loop, one letter each.
-    points
-        Kind of the coordinates that it passes to the field.
-    """
+    """Return a decorator that makes a function a `Loop`."""
     return lambda function: Loop(function, arguments, points=points)
 
 
@@ -63,16 +128,8 @@ def loop(arguments: str, points: str = "lanes") -> Callable[[Callable[..., None]
 def points(P, X, Y, Z, F, n):
     """Evaluate the field at points; NaN at a point with a NaN.
 
-    Parameters
-    ----------
-    P
-        Parameters of the scene.
-    X, Y, Z
-        Coordinates, [n] each, scene units.
-    F
-        Receives the values, [n].
-    n
-        Number of points, a multiple of WIDTH.
+    `P`: parameters of the scene; `X`, `Y`, `Z`: [n] each, scene units; `F`: [n]; `n`: number of points, a
+    multiple of WIDTH.
     """
     for i in range(0, n, WIDTH):
         x = load(X, i)
@@ -118,18 +175,8 @@ def bricks(P, FRAME, IX, IY, IZ, corners, F, n):
 def enclosures(P, FRAME, X, Y, Z, LOW, HIGH, n):
     """Enclose the values of the field on cells.
 
-    Parameters
-    ----------
-    P
-        Parameters of the scene.
-    FRAME
-        Half the size of the cells, [1], scene units.
-    X, Y, Z
-        Centres of the cells, [n] each, scene units.
-    LOW, HIGH
-        Receive the bounds, [n].
-    n
-        Number of cells, a multiple of WIDTH.
+    `P`: parameters of the scene; `FRAME`: [1], scene units; `X`, `Y`, `Z`: [n] each, scene units; `LOW`,
+    `HIGH`: [n]; `n`: number of cells, a multiple of WIDTH.
     """
     half = FRAME[0]
     for i in range(0, n, WIDTH):
@@ -139,3 +186,43 @@ def enclosures(P, FRAME, X, Y, Z, LOW, HIGH, n):
         f = field(x, y, z, P)
         store(LOW, i, lower(f))
         store(HIGH, i, upper(f))
+
+
+def kernel(function: Callable[..., None]) -> Loop:
+    """Decorate a loop that threads are launched on."""
+    return Loop(function)
+
+
+def device(function: Function) -> Function:
+    """Decorate a function that loops call and whose numbers are typed by hand."""
+    return function
+
+
+@intrinsic
+def real(value: Any) -> Any:
+    """Return a number of the kernel's float type."""
+    return float(value)
+
+
+@intrinsic
+def whole(value: Any) -> Any:
+    """Return a 32-bit integer."""
+    return int(value)
+
+
+@intrinsic
+def thread() -> int:
+    """Return the global index of this thread."""
+    raise NotImplementedError
+
+
+@intrinsic
+def together() -> None:
+    """Synchronise the threads of the warp."""
+    raise NotImplementedError
+
+
+@intrinsic
+def divide(a: Any, b: Any) -> Any:
+    """Return a / b by the GPU's own division."""
+    raise NotImplementedError

@@ -1,20 +1,159 @@
-"""Machine code as functions of NumPy arrays.
+"""Machine code as functions of NumPy arrays: object files of x86-64 in memory, without LLVM.
 
 This is the only place where an array becomes an address, beside calls of CUDA's driver (`cuda_memory`), which
 copy before they return. Code and arrays are kept alive by the call, or by the native object that holds both
 (`fracslice/native/machine.h`), so neither can be freed while in use.
+
+"System V Application Binary Interface", AMD64 supplement: the sections and relocations of LLVM's large and
+small code models, without unwinding tables and without data that is written. `machine` leaves all other files
+to LLVM.
 """
 
 from __future__ import annotations
 
 import ctypes
+import mmap
+import struct
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from .elf import Image, UnsupportedError
 from .loops import Loop
+
+MAGIC, KIND = b"\x7fELF\x02\x01\x01", struct.pack("<HH", 1, 62)
+"""Begin of a file of 64 bits, and its kind: relocatable, of x86-64."""
+SYMBOLS, RELOCATIONS, ZEROS = 2, 4, 8
+"""Types of sections."""
+WRITTEN, IN_MEMORY = 1, 2
+"""Flags of sections."""
+WORD = struct.Struct("<Q")
+"""Entry of the global offset table."""
+GOT = b"_GLOBAL_OFFSET_TABLE_"
+
+
+class UnsupportedError(Exception):
+    """The file has something that this loader does not know."""
+
+
+class Section(NamedTuple):
+    """Header of a section."""
+
+    name: int
+    kind: int
+    flags: int
+    address: int
+    offset: int
+    size: int
+    link: int
+    info: int
+    alignment: int
+    entry: int
+
+    def data(self, code: bytes) -> bytes:
+        """Contents of the section in a file."""
+        return code[self.offset : self.offset + self.size]
+
+
+class Symbol(NamedTuple):
+    """Entry of the symbol table."""
+
+    name: int
+    info: int
+    other: int
+    section: int
+    value: int
+    size: int
+
+
+class Image:
+    """Executable copy of an object file, valid while this object exists."""
+
+    def __init__(self, code: bytes) -> None:
+        if not code.startswith(MAGIC) or code[16:20] != KIND:
+            raise UnsupportedError
+        sections = _sections(code)
+        starts, end = _layout(sections)
+        (table,) = (section for section in sections if section.kind == SYMBOLS)
+        symbols = [Symbol(*entry) for entry in struct.iter_unpack("<IBBHQQ", table.data(code))]
+        texts = sections[table.link].data(code)
+        self._names = {texts[s.name : texts.index(0, s.name)]: k for k, s in enumerate(symbols)}
+        private = mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS
+        self._memory = mmap.mmap(-1, end + WORD.size * len(symbols), private)
+        self._base = ctypes.addressof(ctypes.c_char.from_buffer(self._memory))
+        self._got = self._base + end
+        names = {k: name for name, k in self._names.items()}
+        self._addresses = [self._address(s, names.get(k, b""), starts) for k, s in enumerate(symbols)]
+        self._fill(code, sections, starts)
+        for k, address in enumerate(self._addresses):
+            WORD.pack_into(self._memory, end + WORD.size * k, address)
+        self._protect()
+
+    def get_function_address(self, name: str) -> int:
+        """Return the address of a function."""
+        return self._addresses[self._names[name.encode()]]
+
+    def _address(self, symbol: Symbol, name: bytes, starts: dict[int, int]) -> int:
+        if symbol.section in starts:
+            return self._base + starts[symbol.section] + symbol.value
+        if name == GOT:
+            return self._got
+        if symbol.section == 0 and name:  # of the C library
+            function = getattr(ctypes.pythonapi, name.decode(), None)
+            if function is None:
+                raise UnsupportedError
+            return ctypes.cast(function, ctypes.c_void_p).value or 0
+        return 0
+
+    def _fill(self, code: bytes, sections: list[Section], starts: dict[int, int]) -> None:
+        for k, start in starts.items():
+            if sections[k].kind != ZEROS:
+                self._memory[start : start + sections[k].size] = sections[k].data(code)
+        for section in sections:
+            if section.kind == RELOCATIONS and section.info in starts:
+                for offset, info, addend in struct.iter_unpack("<QQq", section.data(code)):
+                    self._relocate(starts[section.info] + offset, info & 0xFFFFFFFF, info >> 32, addend)
+
+    def _relocate(self, place: int, kind: int, symbol: int, addend: int) -> None:
+        target, here = self._addresses[symbol] + addend, self._base + place
+        entry = WORD.size * symbol + addend
+        try:
+            form, value = {
+                1: ("<Q", target),  # R_X86_64_64
+                2: ("<i", target - here),  # R_X86_64_PC32
+                4: ("<i", target - here),  # R_X86_64_PLT32
+                24: ("<q", target - here),  # R_X86_64_PC64
+                25: ("<q", target - self._got),  # R_X86_64_GOTOFF64
+                27: ("<q", entry),  # R_X86_64_GOT64
+                29: ("<q", self._got + addend - here),  # R_X86_64_GOTPC64
+            }[kind]
+            struct.pack_into(form, self._memory, place, value)
+        except (KeyError, struct.error):
+            raise UnsupportedError from None
+
+    def _protect(self) -> None:
+        """Make the memory executable, and no longer writable."""
+        size, rights = ctypes.c_size_t(len(self._memory)), mmap.PROT_READ | mmap.PROT_EXEC
+        if ctypes.pythonapi.mprotect(ctypes.c_void_p(self._base), size, rights):
+            raise UnsupportedError
+
+
+def _sections(code: bytes) -> list[Section]:
+    (table,), (count,) = struct.unpack_from("<Q", code, 40), struct.unpack_from("<H", code, 60)
+    headers = struct.iter_unpack("<IIQQQQIIQQ", code[table : table + 64 * count])
+    return [Section(*header) for header in headers]
+
+
+def _layout(sections: list[Section]) -> tuple[dict[int, int], int]:
+    """Starts of the sections in memory by their numbers, and the end of all."""
+    starts, end = {}, 0
+    for k, section in enumerate(sections):
+        if section.flags & IN_MEMORY:
+            if section.flags & WRITTEN:
+                raise UnsupportedError
+            start = -(-end // max(section.alignment, 1)) * max(section.alignment, 1)
+            starts[k], end = start, start + section.size
+    return starts, -(-end // WORD.size) * WORD.size
 
 
 class Function:
@@ -22,13 +161,6 @@ class Function:
 
     Arrays must be C-contiguous, of the kernel's dtype where the loop has "r" and int32 where it has "i";
     otherwise a call raises `ctypes.ArgumentError`.
-
-    Attributes
-    ----------
-    arguments
-        Arguments of the loop, one letter each.
-    address
-        Address of the code, valid while this object exists.
     """
 
     def __init__(self, engine: Any, loop: Loop, dtype: np.dtype) -> None:
@@ -60,23 +192,8 @@ class _Pointer:
         return ctypes.c_void_p(array.ctypes.data)
 
 
-def loaded(code: bytes, loops: Sequence[Loop], dtype: np.dtype) -> dict[str, Function]:
-    """Load the functions of an object file.
-
-    Parameters
-    ----------
-    code
-        Object file.
-    loops
-        Loops that it contains.
-    dtype
-        Floating-point type of the kernel.
-
-    Returns
-    -------
-    dict
-        Functions by name.
-    """
+def load_object(code: bytes, loops: Sequence[Loop], dtype: np.dtype) -> dict[str, Function]:
+    """Load the functions of an object file."""
     try:
         engine: Any = Image(code)
     except UnsupportedError:
@@ -98,20 +215,7 @@ def _by_llvm(code: bytes) -> Any:
 
 
 def constant(values: np.ndarray, dtype: np.dtype | str) -> np.ndarray:
-    """Return a read-only, C-contiguous copy, which threads may share.
-
-    Parameters
-    ----------
-    values
-        Array to copy.
-    dtype
-        Type of the copy.
-
-    Returns
-    -------
-    ndarray
-        Read-only array.
-    """
+    """Return a read-only, C-contiguous copy, which threads may share."""
     kept = np.array(values, dtype, order="C")
     kept.setflags(write=False)
     return kept

@@ -1,9 +1,13 @@
-"""Fields of orbits, written from their steps.
+"""Fields of orbits, written from their steps, with majorants of their distance.
 
 A round of an orbit takes its steps one after the other. The solid of N rounds is ``{p : |w_N(p)| <= R}`` for
 the radius R beyond which no orbit comes back. The field is ``(|w| - R) / |w'|`` where the orbit stops if
 rounds grow linearly, and that of the potential (`formulas.escape`) if they grow by a power. The derivative is
 bounded by the stretch of each step: ``dr -> s dr + t``, where t is the stretch by the constant.
+
+The derivative bounds how far a point of the orbit moves only near the start point; the bend, a majorant of
+the other terms, bounds it everywhere. So no point nearer than the sure distance moves into the solid, or
+across a tear of a step.
 """
 
 from __future__ import annotations
@@ -17,41 +21,74 @@ from typing import Any
 
 from ..formulas import vocabulary
 from ..formulas.escape import potential_distance, sure_distance
-from ..formulas.verbs import MAJORANTS, RIGID
-from . import functions, majorants
-from .kept_texts import kept_text
-from .parsing import parse_expression
-from .steps import traced
-from .straight_line import Step
+from ..formulas.orbits import MAJORANTS, RIGID
+from . import functions
+from .host import kept_text
+from .language import parse_expression
+from .steps import Step, trace
+
+
+def has_majorants(steps: Sequence[Step]) -> bool:
+    """Return True if all steps have a known majorant."""
+    return all(step.majorant is not None for step in steps)
+
+
+def is_torn(steps: Sequence[Step]) -> bool:
+    """Return True if a step is known to tear space."""
+    return any(step.majorant is not None and step.majorant[1] is not None for step in steps)
+
+
+def majorants_before(sure: bool, torn: bool) -> list[str]:
+    """Return the lines before the first step."""
+    return [
+        *(["bend = 0.0 * x", "steep = dr"] if sure or torn else []),
+        *(["sure = sqrt(minimum(r2, 1e30)) - reach"] if sure else []),
+        *(["tear = 0.0 * x + 1e30"] if torn else []),
+    ]
+
+
+def majorants_of_step(step: Step, torn: bool, shrink: str | None) -> list[str]:
+    """Return the lines before the derivative of a step is taken; shrink: that of its own coordinates."""
+    assert step.majorant is not None
+    bend, tear = step.majorant
+    if shrink:
+        bend, tear = f"{bend} / {shrink}", tear and f"{shrink} * {tear}"
+    beside = f"2.0 * sure_distance({tear}, steep, bend)"
+    crossed = [f"tear = where(alive, minimum(tear, {beside}), tear)"] if tear and torn else []
+    return [*step.bending, *crossed, f"bend = where(alive, bend + steep * {bend}, bend)"]
+
+
+def majorants_after(sure: bool, torn: bool, surface: str) -> list[str]:
+    """Return the lines after a step: an orbit in its middle must leave the whole solid, later the surface."""
+    margin = f"where(level < 0.75 * last_level, radius - reach, radius - {surface})"
+    left = "where(alive, maximum(sure, sure_distance(margin, steep, bend)), sure)"
+    return [
+        *(["steep = where(alive, maximum(dr, steep), steep)"] if sure or torn else []),
+        *(["radius = sqrt(r2)", f"margin = {margin}", f"sure = {left}"] if sure else []),
+    ]
+
+
+def majorants_last(sure: bool, torn: bool) -> list[str]:
+    """Return the lines that bound the field."""
+    return [
+        *(["f = minimum(2.0 * sure, f)"] if sure else []),
+        *(["f = minimum(tear, maximum(-tear, f))"] if torn else []),
+    ]
 
 
 @dataclass(frozen=True)
 class Code:
-    """A step with the parameters that its code depends on.
+    """A step with the parameters that its code depends on."""
 
-    Attributes
-    ----------
-    step
-        Function ``f(w, c, ...)``.
-    sizes
-        Numbers of components of its other parameters.
-    fixed
-        Values of the parameters that the code depends on.
-    julia
-        True if its constant is the same at all points.
-    moved
-        True if it is taken in coordinates of its own.
-    """
-
-    step: Callable[..., Any]
-    sizes: tuple[tuple[str, int], ...]
-    fixed: tuple[tuple[str, Any], ...] = ()
-    julia: bool = False
-    moved: bool = False
+    step: Callable[..., Any]  # function ``f(w, c, ...)``
+    sizes: tuple[tuple[str, int], ...]  # numbers of components of its other parameters
+    fixed: tuple[tuple[str, Any], ...] = ()  # values of the parameters that the code depends on
+    julia: bool = False  # true if its constant is the same at all points
+    moved: bool = False  # true if it is taken in coordinates of its own
 
     def traced(self, place: int) -> Step:
         """Straight-line code of the step at a place in the round."""
-        return _traced(self, place, functions.fingerprint(self.step))
+        return _trace_step(self, place, functions.fingerprint(self.step))
 
     def is_fixed(self, place: int) -> bool:
         """True if the step is the same map for all start points, as in a Julia set."""
@@ -138,15 +175,15 @@ def mapped(matrix: str, point: Sequence[str]) -> list[str]:
 
 
 @lru_cache(maxsize=256)
-def _traced(code: Code, place: int, _: object) -> Step:
+def _trace_step(code: Code, place: int, _: object) -> Step:
     """Straight-line code of a step, cached: following its text takes a twentieth of a small picture."""
-    from .identity import identity
+    from .loop_linker import identity
 
     rigid = sorted(RIGID, key=lambda verb: verb.__name__)
     verbs = identity(code.step, *(value for _, value in code.fixed), *MAJORANTS, *MAJORANTS.values(), *rigid)
 
     def text() -> str:
-        return repr(astuple(traced(code.step, dict(code.sizes), dict(code.fixed), place)))
+        return repr(astuple(trace(code.step, dict(code.sizes), dict(code.fixed), place)))
 
     made_of = verbs, code.sizes, code.fixed, place
     return Step(*ast.literal_eval(parse_expression(kept_text("traced", made_of, text))))
@@ -154,30 +191,16 @@ def _traced(code: Code, place: int, _: object) -> Step:
 
 @dataclass(frozen=True)
 class Form:
-    """What the code of a field depends on besides the steps.
+    """What the code of a field depends on besides the steps."""
 
-    Attributes
-    ----------
-    by_power
-        True if rounds grow by a power.
-    scaled
-        True if the potential is that of ``scale |w|`` after each step.
-    critical
-        True if critical points may be outside, for constants that are the same at all points.
-    sure
-        True if the field stays below twice the sure distance (`formulas.escape.sure_distance`).
-    torn
-        True if it stays below twice the sure distance to the tears of the steps.
-    blind
-        True if it is at most 0.
-    """
-
-    by_power: bool
-    scaled: bool = False
+    by_power: bool  # true if rounds grow by a power
+    scaled: bool = False  # true if the potential is that of ``scale |w|`` after each step
+    # true if critical points may be outside, for constants that are the same at all points
     critical: bool = True
+    # true if the field stays below twice the sure distance (`formulas.escape.sure_distance`)
     sure: bool = False
-    torn: bool = False
-    blind: bool = False
+    torn: bool = False  # true if it stays below twice the sure distance to the tears of the steps
+    blind: bool = False  # true if it is at most 0
 
     def least(self, code: Code) -> bool:
         """True if the derivative of a step has a minimum: preimages of critical points, see `escape.CORE`."""
@@ -185,18 +208,7 @@ class Form:
 
 
 def field(steps: Round, form: Form) -> Callable[..., Any]:
-    """Write the function of an orbit's field.
-
-    Returns
-    -------
-    Callable
-        Function in the language of formulas.
-
-    Raises
-    ------
-    KernelError
-        If a step is not in the language.
-    """
+    """Write the function of an orbit's field."""
     return _field(steps, form, tuple(functions.fingerprint(code.step) for code in steps))
 
 
@@ -210,7 +222,7 @@ def _field(steps: Round, form: Form, _: object) -> Callable[..., Any]:
         given += [f"least{place}"] if form.least(code) else []
         given += [f"surface{place}"] if form.sure else []
         setup += code.before(place, ("x", "y", "z"))
-        loop += _taken(code, place, form)
+        loop += _step_lines(code, place, form)
     last = len(steps) - 1
     body = [
         *setup,
@@ -221,21 +233,21 @@ def _field(steps: Round, form: Form, _: object) -> Callable[..., Any]:
         *([f"end_r2 = scale{last} * scale{last} * r2", f"slope = scale{last} * dr"] if scaled else []),
         *([] if scaled else ["end_r2 = r2", "slope = dr"]),
         f"alive = r2 < stop{last}",
-        *majorants.before(form.sure, form.torn),
+        *majorants_before(form.sure, form.torn),
         "for _ in range(iterations):",
-        *indented(["if not any_of(alive):", "    break", *loop]),
+        *indent_lines(["if not any_of(alive):", "    break", *loop]),
         "f = potential_distance(end_r2, slope * slope, level, first_level, last_level, least_r2)"
         if by_power
         else "f = (sqrt(minimum(end_r2, 1e30)) - bailout) / minimum(slope, 1e30)",
-        *majorants.last(form.sure, form.torn),
+        *majorants_last(form.sure, form.torn),
         *(["f = minimum(f, 0.0)"] if form.blind else []),
         "return f",
     ]
     own = ["levels" if by_power else "bailout", *(["reach"] if form.sure else [])]
-    return written(steps, ["x", "y", "z", "iterations", *own, *given], body)
+    return function_of_text(steps, ["x", "y", "z", "iterations", *own, *given], body)
 
 
-def _taken(code: Code, place: int, form: Form) -> list[str]:
+def _step_lines(code: Code, place: int, form: Form) -> list[str]:
     """Lines of the loop that take a step."""
     scale, step = f"scale{place}" if form.scaled else "", code.traced(place)
     by_w, by_c = step.stretch
@@ -243,7 +255,7 @@ def _taken(code: Code, place: int, form: Form) -> list[str]:
         by_w = f"maximum({by_w}, least{place})"
     grown = f"{by_w} * dr" if code.julia or by_c == "0.0" else f"{by_w} * dr + {by_c}"
     shrink = f"shrink{place}" if code.moved else None
-    bent = majorants.of_step(step, form.torn, shrink) if form.sure or form.torn else []
+    bent = majorants_of_step(step, form.torn, shrink) if form.sure or form.torn else []
     lines, assigned = code.around(place, step.lines)
     reached = [f"reached = reached * rate{place}", "level = where(alive, reached, level)"]
     return [
@@ -256,33 +268,18 @@ def _taken(code: Code, place: int, form: Form) -> list[str]:
         f"end_r2 = where(alive, {f'{scale} * {scale} * r2' if scale else 'r2'}, end_r2)",
         f"slope = where(alive, maximum({f'{scale} * dr' if scale else 'dr'}, slope), slope)",
         *(reached if form.by_power else []),
-        *majorants.after(form.sure, form.torn, f"surface{place}"),
+        *majorants_after(form.sure, form.torn, f"surface{place}"),
         f"alive = alive & (r2 < stop{place})",
     ]
 
 
-def indented(lines: Sequence[str]) -> list[str]:
+def indent_lines(lines: Sequence[str]) -> list[str]:
     """Return lines of a block."""
     return [f"    {line}" for line in lines]
 
 
-def written(steps: Round, arguments: Sequence[str], body: Sequence[str]) -> Callable[..., Any]:
-    """Make a function of written text, which tracebacks and the linker can read.
-
-    Parameters
-    ----------
-    steps
-        Steps that the text is written from.
-    arguments
-        Names of the function's arguments.
-    body
-        Lines of the function.
-
-    Returns
-    -------
-    Callable
-        Function in the language of formulas.
-    """
+def function_of_text(steps: Round, arguments: Sequence[str], body: Sequence[str]) -> Callable[..., Any]:
+    """Make a function of written text, which tracebacks and the linker can read."""
     name = "_".join(code.step.__name__.strip("_") for code in steps)[:60]
     text = "\n    ".join([f"def {name}({', '.join(arguments)}):", *body]) + "\n"
     file = f"<orbit {name} {abs(hash((steps, text))):x}>"

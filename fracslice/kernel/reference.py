@@ -9,8 +9,7 @@ import numpy as np
 
 from ..formulas import vocabulary
 from ..formulas.registry import Node
-from .interval_arrays import on_cells
-from .intervals import Interval
+from .intervals import Interval, on_cells
 from .linker import CALLED, FIELD, link
 
 _NAMES = vocabulary.NAMES | vocabulary.OF_CELLS
@@ -45,20 +44,7 @@ def reference(root: Node) -> Callable[[np.ndarray, np.ndarray, np.ndarray], np.n
 def enclosure(root: Node) -> Callable[[Interval, Interval, Interval], Interval]:
     """Return the field of a scene tree on cells.
 
-    Parameters
-    ----------
-    root
-        Scene with resolved depths.
-
-    Returns
-    -------
-    Callable
-        Function of the intervals of x, y and z, scene units; returns an interval of the values there.
-
-    Raises
-    ------
-    KernelError
-        If the scene cannot be linked.
+    Returns a value in scene units.
     """
     return _field(root, {name: on_cells(name) for name in _NAMES})
 

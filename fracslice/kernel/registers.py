@@ -29,19 +29,11 @@ class Vec:
 
     Each vector is one register. An operator acts on one register after the other, so that several are in
     flight.
-
-    Attributes
-    ----------
-    builder
-        LLVM IR builder.
-    parts
-        One LLVM value per register.
-    factors
-        Factors of a product, or None. Adding to it or subtracting is one instruction with one rounding.
     """
 
-    builder: Any
-    parts: tuple[Any, ...]
+    builder: Any  # LLVM IR builder
+    parts: tuple[Any, ...]  # one LLVM value per register
+    # factors of a product, or None. Adding to it or subtracting is one instruction with one rounding
     factors: tuple[Vec, Vec] | None = None
 
     @property

@@ -3,36 +3,65 @@
 from __future__ import annotations
 
 import ast
+import linecache
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from types import FunctionType
+from types import FunctionType, ModuleType
 from typing import Any
 
+from ..errors import KernelError
+from ..formulas.registry import Fixed, Node
 from . import functions, language
-from .kept_copies import Texts, kept
-from .parsing import parse
-from .syntax import Folding, stored_names
+from .host import kept_text
+from .language import Folding, parse, stored_names
+
+Texts = tuple[str, str, list[str]]
+"""Name and text of a copy, and the names of the functions that it calls."""
+
+
+def cached_copy(
+    function: Callable[..., Any], made_of: tuple[object, ...], make: Callable[[], Texts]
+) -> Texts:
+    """Return the texts of a copy: cached, or made and cached.
+
+    A file that other users could have written is not used. A function without a source is not cached.
+    """
+    code = function.__code__
+    linecache.checkcache(code.co_filename)
+    lines = "".join(linecache.getlines(code.co_filename, function.__globals__))
+    if not lines:
+        return make()
+    outside = _stable(functions.fingerprint(function))
+    place = lines, code.co_firstlineno, function.__qualname__, outside
+
+    def written() -> str:
+        copy, text, calls = make()
+        return f"{copy}\n{' '.join(calls)}\n{text}"
+
+    name, calls, text = kept_text("copies", (*place, *made_of), written).split("\n", 2)
+    return name, text, calls.split()
+
+
+def _stable(mark: Hashable) -> str:
+    """Fingerprint that is the same in every process. The code itself is in the source."""
+    if isinstance(mark, tuple):
+        return f"({', '.join(map(_stable, mark))})"
+    if isinstance(mark, (FunctionType, type)):
+        return f"{mark.__module__}.{mark.__qualname__}"
+    if isinstance(mark, ModuleType):
+        return mark.__name__
+    return mark if isinstance(mark, str) else ""
 
 
 @dataclass(frozen=True)
 class Copy:
-    """Text of a function.
+    """Text of a function."""
 
-    Attributes
-    ----------
-    name
-        Name of the function in the text.
-    text
-        Source text.
-    calls
-        Functions that it calls, by the names used in the text.
-    """
-
-    name: str
-    text: str
-    calls: Mapping[str, Callable[..., Any]]
+    name: str  # name of the function in the text
+    text: str  # source text
+    calls: Mapping[str, Callable[..., Any]]  # functions that it calls, by the names used in the text
 
     def renamed(self, names: Mapping[str, str]) -> str:
         """Return the text with other names for the function and for those it calls."""
@@ -42,22 +71,10 @@ class Copy:
         return re.sub(rf"\b({'|'.join(map(re.escape, changed))})\b", lambda m: changed[m[0]], self.text)
 
 
-def specialised(function: Callable[..., Any], fixed: Mapping[str, Any]) -> ast.FunctionDef:
+def specialise(function: Callable[..., Any], fixed: Mapping[str, Any]) -> ast.FunctionDef:
     """Return a function's tree with its fixed arguments substituted.
 
     Decorators, docstring and annotations are removed.
-
-    Parameters
-    ----------
-    function
-        Formula.
-    fixed
-        Values of the fixed arguments.
-
-    Raises
-    ------
-    KernelError
-        If the function is not in the language.
     """
     tree = parse(language.text(function)).body[0]
     assert isinstance(tree, ast.FunctionDef)
@@ -66,23 +83,10 @@ def specialised(function: Callable[..., Any], fixed: Mapping[str, Any]) -> ast.F
     return pruned
 
 
-def copied(tree: ast.FunctionDef, function: Callable[..., Any], given: frozenset[str] = frozenset()) -> Copy:
-    """Return a specialised tree as text, with numbers from outside the function substituted.
-
-    Parameters
-    ----------
-    tree
-        Specialised tree.
-    function
-        Formula that the tree comes from.
-    given
-        Names that the text gets from elsewhere.
-
-    Returns
-    -------
-    Copy
-        Text and called functions.
-    """
+def copy_text(
+    tree: ast.FunctionDef, function: Callable[..., Any], given: frozenset[str] = frozenset()
+) -> Copy:
+    """Return a specialised tree as text, with numbers from outside the function substituted."""
     tree = _Forget().visit(tree)
     scope = functions.scope(function)
     names = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name)}
@@ -94,35 +98,18 @@ def copied(tree: ast.FunctionDef, function: Callable[..., Any], given: frozenset
     return Copy(tree.name, ast.unparse(tree), calls)
 
 
-def shared(function: Callable[..., Any], fixed: tuple[tuple[str, Any], ...], given: frozenset[str]) -> Copy:
+def shared_copy(
+    function: Callable[..., Any], fixed: tuple[tuple[str, Any], ...], given: frozenset[str]
+) -> Copy:
     """Return the cached copy of a function.
 
     Scenes are linked anew for every camera; copying is nine tenths of the time.
-
-    Parameters
-    ----------
-    function
-        Formula.
-    fixed
-        Names and values of the fixed arguments.
-    given
-        Names that the text gets from elsewhere.
-
-    Returns
-    -------
-    Copy
-        Text and called functions.
-
-    Raises
-    ------
-    KernelError
-        If the function is not in the language.
     """
-    return _shared(function, fixed, given, (functions.fingerprint(function), repr(fixed)))
+    return _cached_shared_copy(function, fixed, given, (functions.fingerprint(function), repr(fixed)))
 
 
 @lru_cache(maxsize=1024)
-def _shared(
+def _cached_shared_copy(
     function: Callable[..., Any], fixed: tuple[tuple[str, Any], ...], given: frozenset[str], _: object
 ) -> Copy:
     """Cached copy. The last argument distinguishes values that are equal but not the same: 1 and 1.0, a
@@ -130,10 +117,10 @@ def _shared(
     """
 
     def make() -> Texts:
-        copy = copied(specialised(function, dict(fixed)), function, given)
+        copy = copy_text(specialise(function, dict(fixed)), function, given)
         return copy.name, copy.text, list(copy.calls)
 
-    name, text, calls = kept(function, (repr(fixed), sorted(given)), make)
+    name, text, calls = cached_copy(function, (repr(fixed), sorted(given)), make)
     scope = functions.scope(function)
     return Copy(name, text, {called: scope[called] for called in calls})
 
@@ -198,3 +185,41 @@ def is_mark(node: ast.AST) -> bool:
     """Return True for the statement ``orbit(...)``."""
     call = node.value if isinstance(node, ast.Expr) else None
     return isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "orbit"
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """Function of a node and its arguments."""
+
+    function: Callable[..., Any]  # function of the formula
+    fixed: tuple[tuple[str, Any], ...]  # arguments substituted in a copy of the function
+    passed: tuple[str, ...]  # expressions that read the other arguments from P, in the function's order
+    numbers: tuple[float, ...]  # numbers in P
+
+
+def arguments(node: Node, leading: int) -> Arguments:
+    """Return the function of a node and its arguments."""
+    function, values = node.function, node.arguments
+    names = functions.parameters(function)[leading:]
+    if set(names) != set(values):
+        place = f"{function.__code__.co_filename}:{function.__code__.co_firstlineno}"
+        wanted, given = (", ".join(s) or "nothing" for s in (values, names))
+        raise KernelError(
+            f"{place}: formula {node.formula.name}: expected {function.__name__} to take {wanted} "
+            f"after its points, found {given}"
+        )
+    fixed = tuple((name, values[name].value) for name in names if isinstance(values[name], Fixed))
+    numbers: list[float] = []
+    passed = [
+        append_numbers(values[name], numbers, "P0") for name in names if not isinstance(values[name], Fixed)
+    ]
+    return Arguments(function, fixed, tuple(passed), tuple(numbers))
+
+
+def append_numbers(value: Any, numbers: list[float], origin: str = "") -> str:
+    """Append a number or a tuple of numbers to a list."""
+    if isinstance(value, tuple):
+        return f"({', '.join(append_numbers(v, numbers, origin) for v in value)},)"
+    place = f"{origin} + {len(numbers)}" if origin else str(len(numbers))
+    numbers.append(float(value))
+    return f"int(P[{place}])" if isinstance(value, int) else f"P[{place}]"

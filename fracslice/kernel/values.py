@@ -1,13 +1,18 @@
-"""Values of a formula's names during compilation: lanes, masks, scalars, memory addresses and tuples.
+"""Values of a formula's names during compilation: lanes, masks, scalars, addresses and tuples, and the
+arithmetic of scalars.
 
 Lanes and masks are `Vec`, a few registers; on cells, pairs of these (`intervals`). A scalar is one LLVM
 value, the same for all lanes: see `scalars`.
 There is no fast-math: results do not depend on the code around an operation (`registers` describes how
 products are fused), and NaN and infinity are handled.
+
+Scalars mix as NumPy's do: an operation with a float literal is computed in 64 bits, and rounded once where it
+meets lanes.
 """
 
 from __future__ import annotations
 
+import ast
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,10 +20,106 @@ import numpy as np
 from llvmlite import ir
 
 from . import lanes_math
-from .interval_numbers import TINY, Numbers
-from .intervals import Interval, Possible
+from .intervals import TINY, Interval, Numbers, Possible
 from .registers import Vec, splat
-from .scalars import BOOL, DOUBLE, FLOAT, MismatchError, number, truth
+
+BOOL, WHOLE, FLOAT, DOUBLE = ir.IntType(1), ir.IntType(64), ir.FloatType(), ir.DoubleType()
+
+
+class MismatchError(Exception):
+    """Incompatible values; the message names them."""
+
+
+def number(builder: ir.IRBuilder, value: Any, kind: ir.Type) -> Any:
+    """Convert a scalar to another type."""
+    if not isinstance(getattr(value, "type", None), (ir.IntType, ir.FloatType, ir.DoubleType)):
+        raise MismatchError("a number is expected")
+    given = value.type
+    if given == kind:
+        return value
+    if isinstance(given, ir.IntType):
+        if isinstance(kind, ir.IntType):
+            return builder.trunc(value, kind) if kind.width < given.width else widen(builder, value, kind)
+        return builder.uitofp(value, kind) if given == BOOL else builder.sitofp(value, kind)
+    if isinstance(kind, ir.IntType):
+        return builder.fptosi(value, kind)
+    return builder.fpext(value, kind) if kind == DOUBLE else builder.fptrunc(value, kind)
+
+
+def widen(builder: ir.IRBuilder, value: Any, kind: ir.IntType) -> Any:
+    """Extend an integer to a wider type; booleans become 0 or 1."""
+    return builder.zext(value, kind) if value.type == BOOL else builder.sext(value, kind)
+
+
+def common(a: ir.Type, b: ir.Type) -> ir.Type:
+    """Return the type in which two scalar types are computed.
+
+    `a`, `b`: LLVM types.
+    """
+    if a == b and a != BOOL:
+        return a
+    return WHOLE if isinstance(a, ir.IntType) and isinstance(b, ir.IntType) else DOUBLE
+
+
+def truth(builder: ir.IRBuilder, value: Any) -> Any:
+    """Convert a scalar to a condition: True if it is not zero."""
+    if isinstance(value, (Vec, tuple)):
+        raise MismatchError("it may differ from point to point; expected where(...), or if any_of(...)")
+    if value.type == BOOL:
+        return value
+    zero = ir.Constant(value.type, 0)
+    if isinstance(value.type, ir.IntType):
+        return builder.icmp_signed("!=", value, zero)
+    return builder.fcmp_unordered("!=", value, zero)
+
+
+_COMPARISONS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
+_WHOLE = {
+    ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.BitAnd: "and_", ast.BitOr: "or_", ast.BitXor: "xor",
+    ast.LShift: "shl", ast.RShift: "ashr",
+}  # fmt: skip
+_REAL = {ast.Add: "fadd", ast.Sub: "fsub", ast.Mult: "fmul", ast.Div: "fdiv"}
+
+
+def operate(builder: ir.IRBuilder, op: ast.operator, a: Any, b: Any) -> Any:
+    """Emit arithmetic on two scalars."""
+    if isinstance(op, (ast.BitAnd, ast.BitOr, ast.BitXor)) and a.type == b.type == BOOL:
+        return getattr(builder, _WHOLE[type(op)])(a, b)
+    kind = common(a.type, b.type)
+    if isinstance(op, ast.Div) and kind == WHOLE:
+        kind = DOUBLE
+    a, b = number(builder, a, kind), number(builder, b, kind)
+    if kind == WHOLE and isinstance(op, (ast.FloorDiv, ast.Mod)):
+        return _floor_division(builder, op, a, b)
+    name = (_WHOLE if kind == WHOLE else _REAL).get(type(op))
+    if name is None:
+        raise MismatchError("this is for whole numbers only")
+    return getattr(builder, name)(a, b)
+
+
+def _floor_division(builder: ir.IRBuilder, op: ast.operator, a: Any, b: Any) -> Any:
+    """Python's floored quotient, or remainder with the sign of b."""
+    rest = builder.srem(a, b)
+    zero = ir.Constant(WHOLE, 0)
+    other = builder.icmp_signed("<", builder.xor(rest, b), zero)
+    over = builder.and_(builder.icmp_signed("!=", rest, zero), other)
+    if isinstance(op, ast.Mod):
+        return builder.select(over, builder.add(rest, b), rest)
+    return builder.sub(builder.sdiv(a, b), builder.zext(over, WHOLE))
+
+
+def compare(builder: ir.IRBuilder, op: ast.cmpop, a: Any, b: Any) -> Any:
+    """Emit a comparison of two scalars.
+
+    `op`: operator; `a`, `b`: scalars.
+    """
+    kind = common(a.type, b.type)
+    a, b = number(builder, a, kind), number(builder, b, kind)
+    how = _COMPARISONS[type(op)]
+    if kind == WHOLE:
+        return builder.icmp_signed(how, a, b)
+    return (builder.fcmp_unordered if how == "!=" else builder.fcmp_ordered)(how, a, b)
+
 
 Value = Any
 """`Vec`, `Interval`, `Possible`, LLVM value, or tuple of these."""
@@ -33,21 +134,11 @@ LANES = {
 
 @dataclass(frozen=True)
 class Lanes:
-    """Layout of lanes.
+    """Layout of lanes."""
 
-    Attributes
-    ----------
-    bits
-        Width of a float: 32 or 64.
-    width
-        Number of lanes.
-    registers
-        Number of registers that hold them.
-    """
-
-    bits: int
-    width: int
-    registers: int
+    bits: int  # width of a float: 32 or 64
+    width: int  # number of lanes
+    registers: int  # number of registers that hold them
 
     @property
     def scalar(self) -> ir.Type:
@@ -65,13 +156,7 @@ class Lanes:
         return ir.VectorType(BOOL, self.width // self.registers)
 
     def vec(self, builder: ir.IRBuilder, value: Value) -> Vec:
-        """Return lanes unchanged; broadcast a scalar.
-
-        Raises
-        ------
-        MismatchError
-            For a mask or a tuple.
-        """
+        """Return lanes unchanged; broadcast a scalar."""
         if isinstance(value, Vec):
             if is_mask(value):
                 raise MismatchError(
@@ -87,18 +172,6 @@ class Lanes:
         """Return an interval unchanged; make one of lanes or of a scalar.
 
         Scalars that are rounded to lanes are enclosed.
-
-        Parameters
-        ----------
-        builder
-            LLVM IR builder.
-        value
-            Interval, lanes or scalar.
-
-        Raises
-        ------
-        MismatchError
-            For a condition or a tuple.
         """
         if isinstance(value, Interval):
             return value
@@ -114,20 +187,7 @@ class Lanes:
         return Interval.at(lanes, of, number) if exact else Interval.at(lanes, of).outward()
 
     def condition(self, builder: ir.IRBuilder, value: Value) -> Vec:
-        """Return a mask unchanged; broadcast a boolean.
-
-        Parameters
-        ----------
-        builder
-            LLVM IR builder.
-        value
-            Mask or scalar.
-
-        Raises
-        ------
-        MismatchError
-            For lanes of numbers or a tuple.
-        """
+        """Return a mask unchanged; broadcast a boolean."""
         if isinstance(value, Vec):
             if not is_mask(value):
                 raise MismatchError("a number where a condition is expected")
@@ -135,20 +195,7 @@ class Lanes:
         return Vec(builder, (splat(builder, truth(builder, value), self.mask),) * self.registers)
 
     def possible(self, builder: ir.IRBuilder, value: Value) -> Possible:
-        """Return a condition on cells unchanged; that of a mask or of a boolean is certain.
-
-        Parameters
-        ----------
-        builder
-            LLVM IR builder.
-        value
-            Condition on cells, mask or scalar.
-
-        Raises
-        ------
-        MismatchError
-            For numbers or a tuple.
-        """
+        """Return a condition on cells unchanged; that of a mask or of a boolean is certain."""
         if isinstance(value, Possible):
             return value
         if isinstance(value, Interval):

@@ -1,25 +1,188 @@
-"""Contouring of signs, piece by piece: roots on grid edges, feature vertices and triangles."""
+"""Contouring of signs, piece by piece: roots on grid edges, normals, feature vertices and triangles.
+
+A vertex moves only along its own grid edge, strictly between the edge's ends. Refinement therefore cannot
+fold a mesh or make it self-intersect if its triangles stay in their cells.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import _native
+from .._native import Cells, RootLoops
 from ..errors import MeshError
 from ..kernel import Field
 from ..volume.bricks import Bricks, SignBricks
 from ..volume.lattice import BRICK
-from ..work import Work
-from .crossings import Refiner
+from ..work import Work, ahead, chunks
 from .model import Mesh
-from .projection import project
+from .roots import SURE, Roots
 
-if TYPE_CHECKING:
-    from .._native import Cells
+Point = tuple[float, float, float]
+Memory = tuple[np.ndarray, np.ndarray]
+"""Positions along the edges, float64 [n], and normals, float32 [3, n]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Crossings:
+    """Intersections of the surface with consecutive grid edges."""
+
+    first: int  # number of the first intersection
+    t: np.ndarray  # position along each grid edge, float64 [n]
+    normals: np.ndarray  # outward unit normals, float32 [3, n]
+
+
+class Search(Protocol):
+    """Search for intersections on numbered grid edges."""
+
+    def memory(self, size: int) -> Memory:
+        """Return memory for at least `size` intersections, which may be that of an earlier call."""
+
+    def find(self, begin: int, end: int, t: np.ndarray, normals: np.ndarray) -> None:
+        """Find intersections `begin` to `end` - 1."""
+
+
+class LaneSearch:
+    """Search by native code.
+
+    `fast`, `exact`: its loops in float32 and float64; `origin`, `voxel` in scene units.
+    """
+
+    def __init__(
+        self, root: Field, fast: Roots, exact: Roots, cells: Cells, origin: Point, voxel: float
+    ) -> None:
+        loops = fast.native("find"), exact.native("find"), exact.native("polish")
+        entry = root.kernel("cpu", "float64").entry
+        self._loops = RootLoops(fast.width, fast.batch, *loops, entry, SURE)
+        self._cells, self._placement = cells, (origin, voxel)
+        self._memory: Memory = np.empty(0), np.empty((3, 0), np.float32)
+
+    def memory(self, size: int) -> Memory:
+        """See `Search.memory`."""
+        if size > len(self._memory[0]):
+            self._memory = np.empty(size), np.empty((3, size), np.float32)
+        return self._memory
+
+    def find(self, begin: int, end: int, t: np.ndarray, normals: np.ndarray) -> None:
+        """See `Search.find`."""
+        self._cells.find_crossings(begin, end, *self._placement, self._loops, t, normals)
+
+
+class Refiner:
+    """Root finder on grid edges whose ends have opposite signs, for the float64 field.
+
+    The float32 kernel brackets each root and the float64 kernel refines it; the float64 kernel starts from
+    its own signs where the float32 kernel was wrong. If the float64 field has no sign change (at one end it
+    is smaller than float32 resolves) t is that end.
+
+    `origin`, `voxel` in scene units.
+    """
+
+    def __init__(
+        self,
+        root: Field,
+        cells: Cells,
+        origin: Point,
+        voxel: float,
+        work: Work | None = None,
+    ) -> None:
+        self._cells, self._work = cells, work or Work()
+        fast, exact = (Roots(root, p, voxel, self._work.device) for p in ("float32", "float64"))
+        if fast.on_gpu:
+            from .cuda_crossings import CudaSearch
+
+            self._search: Search = CudaSearch(fast, exact, cells, origin, voxel)
+            self._in_order: Callable[[Iterator[Crossings]], Iterator[Crossings]] = ahead
+        else:
+            self._search, self._in_order = LaneSearch(root, fast, exact, cells, origin, voxel), iter
+        self._memory = self._search.memory(0)
+        self._first, self._end = 0, 0  # computed intersections: first in memory, one past the last
+
+    def each(self, ranges: Iterable[tuple[int, int]]) -> Iterator[Crossings]:
+        """Yield the intersections of ranges, as `between` returns them.
+
+        A GPU finds those of the next range while the caller uses the ones before.
+        """
+        return self._in_order(self.between(begin, end) for begin, end in ranges)
+
+    def between(self, begin: int, end: int) -> Crossings:
+        """Return the intersections from number `begin` to at least `end` - 1.
+
+        Both numbers lie between bricks. Intersections beyond `end` are included if already computed.
+        """
+        self._work.check()
+        known, end = max(self._end - begin, 0), max(self._end, end)
+        t, normals = self._space(begin, end - begin, known)
+        if end > self._end:
+            self._search.find(begin + known, end, t[known:], normals[:, known:])
+            self._end = end
+        return Crossings(begin, t, normals)
+
+    def _space(self, begin: int, size: int, known: int) -> Memory:
+        """Memory for `size` intersections, the first `known` of which are computed. They are moved only if no
+        space is left behind them.
+        """
+        memory, here = self._memory, begin - self._first
+        if here + size > len(memory[0]):
+            self._memory = self._search.memory(2 * size)
+            for old, new in zip(memory, self._memory, strict=True):
+                new[..., :known] = old[..., here : here + known]
+            self._first, here = begin, 0
+        t, normals = self._memory
+        return t[here : here + size], normals[:, here : here + size]
+
+
+TrustRegions = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""Function of point numbers, [n], and of a mask of the interior ones, [n]; float64 [4, 3, n], scene units.
+
+The rows are the lower and upper corners of boxes that the points must not leave, which may be flat; points in
+the boxes or on their boundaries where the field has the opposite sign, or NaN; and points in the boxes in the
+middle of the known part of the surface there, or NaN.
+"""
+
+AT_ONCE = 1 << 16
+"""Points per thread between two checks for cancellation."""
+
+
+def project(
+    root: Field,
+    points: np.ndarray,
+    trust_regions: TrustRegions,
+    voxel: float,
+    work: Work | None = None,
+) -> None:
+    """Project points, in place, to the zero set within their trust regions.
+
+    A point moves along the gradient if the field changes its sign there within four Newton steps and the box,
+    else straight towards the point of opposite sign of its trust region. Where the field is smooth nearby, it
+    moves straight towards the middle if the surface lies between. A point that would come no nearer stays, as
+    does a point already on the surface, such as an exact corner.
+
+    `points`: float64 [n, 3], scene units; `voxel` in scene units.
+    """
+    work = work or Work()  # on the CPU: copies to a GPU and back take longer
+    guess, exact = (Roots(root, precision, voxel) for precision in ("float32", "float64"))
+    lead, find, entry = guess.native("lead"), guess.native("find"), root.kernel("cpu", "float64").entry
+    exactly = exact.native("find"), exact.native("aim")
+    loops = _native.ProjectionLoops(guess.width, lead, find, *exactly, entry)
+    for part in chunks(len(points), AT_ONCE * work.threads):
+        work.check()
+        _native.project(points, part.start, part.stop, loops, trust_regions, voxel, work.threads)
+
+
+def anywhere(which: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    """Return unbounded trust regions.
+
+    `which`, `inside`: [n]. Returns [4, 3, n].
+    """
+    sides = np.array([-np.inf, np.inf, np.nan, np.nan])
+    return np.tile(sides[:, None, None], (1, 3, len(which)))
+
 
 BLUNT = 1 << 14
 """Blunt cells above which a surface is rough: it has any number of sharp edges."""
@@ -27,82 +190,36 @@ BLUNT = 1 << 14
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """Part of a surface in some layers of bricks.
+    """Part of a surface in some layers of bricks."""
 
-    Attributes
-    ----------
-    mesh : Mesh
-        Triangles, scene units; open at the seams. Adjacent pieces have bitwise equal points at their seam.
-    end : float
-        x at which the piece ends; infinite for the last one.
-    blunt : ndarray of float64, shape (n, 3)
-        Middles of its blunt cells: a sharp edge or corner of the surface should pass, but does not. Some of
-        them if there are more than `BLUNT`.
-    """
-
+    # triangles, scene units; open at the seams. Adjacent pieces have bitwise equal points at their seam
     mesh: Mesh
-    end: float
+    end: float  # x at which the piece ends; infinite for the last one
+    # middles of its blunt cells: a sharp edge or corner of the surface should pass, but does not. Some of
+    # them if there are more than `BLUNT`
     blunt: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
 
 
 class SurfaceContours:
     """Pieces of the exact surface of a scene, in any order.
 
-    Parameters
-    ----------
-    root : Field
-        Field that `signs` were sampled from.
-    signs : SignBricks
-        Samples, scene units.
-    threads : int
-        Threads; 0 for all cores.
-
-    Raises
-    ------
-    MeshError
-        If the surface leaves the samples.
+    `signs` in scene units.
     """
 
     def __init__(self, root: Field, signs: SignBricks, threads: int) -> None:
         from .._native import Cells
 
         self.root, self.signs = root, signs
-        self._cells = called(Cells, signs.ijk, signs.signs, signs.index, threads)
+        self._cells = call_native(Cells, signs.ijk, signs.signs, signs.index, threads)
         self._placement = placement(signs)
 
     def refiner(self, work: Work) -> Refiner:
-        """Return a root finder for pieces by ascending x.
-
-        Returns
-        -------
-        Refiner
-            Root finder without roots.
-        """
+        """Return a root finder for pieces by ascending x."""
         origin, voxel, _ = self._placement
         return Refiner(self.root, self._cells, origin, voxel, work)
 
     def piece(self, first: int, last: int, refiner: Refiner, work: Work) -> Piece:
-        """Contour some layers of bricks.
-
-        Parameters
-        ----------
-        first, last : int
-            Layers, last excluded; see `layers`.
-        refiner : Refiner
-            Root finder; one that made the piece before has the roots at the seam.
-        work : Work
-            Threads and cancellation.
-
-        Returns
-        -------
-        Piece
-            Bitwise the same for any refiner.
-
-        Raises
-        ------
-        MeshError, Cancelled
-            As `contour`.
-        """
+        """Contour some layers of bricks."""
         from .._native import Contouring, trust_regions
 
         cells, signs = self._cells, self.signs
@@ -111,7 +228,7 @@ class SurfaceContours:
         before = cells.crossings_before
         needed = [(before(min(begin, last - 1)), before(end + 1)) for begin, end in batches]
         for (_, end), known in zip(batches, refiner.each(needed), strict=True):
-            called(surface.advance, end, known.first, known.t, known.normals)
+            call_native(surface.advance, end, known.first, known.t, known.normals)
         vertices, triangles, count, cases, to_means, blunt = surface.finish()
         features = vertices[count:]
 
@@ -138,21 +255,7 @@ def _batches(cells: Cells, first: int, last: int, least: int) -> Iterator[tuple[
 
 
 def layers(bricks: SignBricks, most: int) -> list[tuple[int, int]]:
-    """Split layers of bricks into pieces.
-
-    Parameters
-    ----------
-    bricks : SignBricks
-        Samples.
-    most : int
-        Approximate bricks per piece.
-
-    Returns
-    -------
-    list of tuple of int
-        First and last layer, last excluded. The pieces at both ends include the layer beside the samples,
-        which may have cells of the surface.
-    """
+    """Split layers of bricks into pieces."""
     counts = np.bincount(bricks.ijk[:, 0] // BRICK, minlength=bricks.index.shape[0])
     cuts, size = [-1], 0
     for layer, count in enumerate(counts):
@@ -166,15 +269,7 @@ def layers(bricks: SignBricks, most: int) -> list[tuple[int, int]]:
 def placement(bricks: Bricks | SignBricks) -> tuple[tuple[float, float, float], float, float]:
     """Placement of samples, for native code.
 
-    Returns
-    -------
-    tuple
-        Origin, voxel and minimum edge parameter, as plain numbers.
-
-    Raises
-    ------
-    MeshError
-        If the voxel is too fine for float32 coordinates.
+    Returns voxel and minimum edge parameter.
     """
     x, y, z = bricks.origin
     return (float(x), float(y), float(z)), float(bricks.voxel), minimum_edge_parameter(bricks)
@@ -185,16 +280,6 @@ def minimum_edge_parameter(bricks: Bricks | SignBricks) -> float:
 
     Vertices of one cell differ by at least this distance along some axis; four float32 steps survive any
     rounding.
-
-    Parameters
-    ----------
-    bricks : Bricks or SignBricks
-        Samples.
-
-    Raises
-    ------
-    MeshError
-        If the voxel is too fine for float32 coordinates.
     """
     low = np.asarray(bricks.origin, dtype=np.float64)
     high = low + bricks.voxel * 8 * np.asarray(bricks.index.shape)
@@ -207,19 +292,8 @@ def minimum_edge_parameter(bricks: Bricks | SignBricks) -> float:
     return share
 
 
-def called(function: Callable[..., Any], *arguments: Any) -> Any:
-    """Call a native function.
-
-    Returns
-    -------
-    object
-        Its result.
-
-    Raises
-    ------
-    MeshError
-        Instead of a `ValueError`.
-    """
+def call_native(function: Callable[..., Any], *arguments: Any) -> Any:
+    """Call a native function."""
     try:
         return function(*arguments)
     except ValueError as error:

@@ -9,9 +9,9 @@ import numpy as np
 
 from .._native import Cells
 from ..kernel.cuda_driver import require
-from ..kernel.cuda_launching import CudaLoop, launched, load_loops
+from ..kernel.cuda_launching import CudaLoop, launch, load_loops
 from ..kernel.linker import Linked
-from .cuda_segment_loops import LOOPS
+from .root_loops import LOOPS
 from .roots import SURE, Roots
 
 MOST_EDGES = 1 << 21
@@ -21,12 +21,7 @@ MOST_EDGES = 1 << 21
 class Table:
     """Rows in GPU memory for the edges of one round. Slicing takes longer than launching: it happens once.
 
-    Attributes
-    ----------
-    whole
-        All rows, [count, MOST_EDGES].
-    rows
-        Each row.
+    `whole`: [count, MOST_EDGES].
     """
 
     def __init__(self, count: int, dtype: np.typing.DTypeLike) -> None:
@@ -36,33 +31,18 @@ class Table:
 
 @dataclass(frozen=True, eq=False)
 class Find:
-    """Loop `find` of one precision.
+    """Loop `find` of one precision."""
 
-    Attributes
-    ----------
-    launch, frame
-        Function that launches it, and its FRAME.
-    segments, roots
-        What it reads and writes.
-    """
-
-    launch: Any
+    launch: Any  # function that launches it, and its FRAME
     frame: Any
-    segments: Table
+    segments: Table  # what it reads and writes
     roots: Any
 
 
 class CudaSearch:
     """Search of `crossings.Refiner` on a GPU, with a thread per edge.
 
-    Parameters
-    ----------
-    fast, exact
-        Loops of a field on the GPU, in float32 and float64.
-    cells
-        Grid cells with sign changes.
-    origin, voxel
-        First grid point and spacing, scene units.
+    `fast`, `exact`: in float32 and float64; `origin`, `voxel` in scene units.
     """
 
     def __init__(
@@ -116,14 +96,14 @@ class CudaSearch:
         n, (polish, frame) = len(edges), self._polish
         segments, polished = self._exact.segments, self._polished
         self._edges[:n].copy_to_device(edges)
-        launched(
+        launch(
             self._loops.lay, n, self._edges, *self._placement, segments.whole, self._fast.segments.whole, n
         )
         find.launch(n, find.frame, *find.segments.rows, find.roots)
-        launched(self._loops.start, n, find.roots, self._roots, n)
+        launch(self._loops.start, n, find.roots, self._roots, n)
         polish(n, frame, *segments.rows, self._roots, *polished.rows)
         results = self._roots, polished.whole, SURE, self._normals.whole, self._unsure
-        launched(self._loops.collect, n, find.roots, *results, n)
+        launch(self._loops.collect, n, find.roots, *results, n)
         for row, to in zip((self._roots, *self._normals.rows), (t, *normals), strict=True):
             row[:n].copy_to_host(to)
         flags: np.ndarray = self._unsure[:n].copy_to_host()

@@ -10,7 +10,7 @@ from ..kernel import Field
 from ..store import Arrays, stored
 from ..volume.bricks import Bricks, SignBricks
 from ..work import Work
-from .contouring import Piece, SurfaceContours, called, layers, placement
+from .contouring import Piece, SurfaceContours, call_native, layers, placement
 from .model import Mesh
 
 
@@ -21,26 +21,11 @@ def extract(bricks: Bricks, threads: int = 0) -> Mesh:
     coordinates are rounded to float32. Marching cubes (Lorensen and Cline, 1987) with a table without holes
     or self-intersections; `marching_cubes.h` has the proof.
 
-    Parameters
-    ----------
-    bricks : Bricks
-        Samples, scene units.
-    threads : int, optional
-        Threads; 0 for all cores. The mesh does not depend on it.
-
-    Returns
-    -------
-    Mesh
-        Surface, scene units.
-
-    Raises
-    ------
-    MeshError
-        If the surface leaves the samples, or has more than 2^31 vertices or triangles.
+    `bricks` in scene units. Returns `Mesh` in scene units.
     """
     from .._native import marching_cubes
 
-    vertices, triangles = called(
+    vertices, triangles = call_native(
         marching_cubes, bricks.ijk, bricks.values, bricks.index, *placement(bricks), threads
     )
     return Mesh(vertices, triangles)
@@ -54,26 +39,7 @@ def contour(root: Field, bricks: Bricks | SignBricks, work: Work | None = None) 
     The mesh is a closed, oriented 2-manifold without self-intersections, like that of `extract`; `contour.h`
     has the proof. After Ho, Wu, Chen, Chuang and Ouhyoung 2005, "Cubical Marching Squares".
 
-    Parameters
-    ----------
-    root : Field
-        Field that `bricks` were sampled from.
-    bricks : Bricks or SignBricks
-        Samples, scene units.
-    work : Work, optional
-        Threads, progress, cancellation and cache.
-
-    Returns
-    -------
-    Mesh
-        Surface, scene units.
-
-    Raises
-    ------
-    MeshError
-        If the surface leaves the samples, or has more than 2^31 vertices or triangles.
-    Cancelled
-        If the work is cancelled.
+    `bricks` in scene units. Returns `Mesh` in scene units.
     """
     return contour_whole(root, bricks, work).mesh
 
@@ -96,26 +62,7 @@ def contour_pieces(
 ) -> Iterator[Piece]:
     """Exact surface of a scene in pieces along x, with memory for one piece at a time.
 
-    Parameters
-    ----------
-    root : Field
-        Field that `bricks` were sampled from.
-    bricks : Bricks or SignBricks
-        Samples, scene units.
-    work : Work, optional
-        Threads and cancellation.
-    most : int, optional
-        Approximate bricks per piece.
-
-    Yields
-    ------
-    Piece
-        Pieces of the surface of `contour`, by ascending x.
-
-    Raises
-    ------
-    MeshError, Cancelled
-        As `contour`.
+    `bricks` in scene units.
     """
     work = work or Work()
     made = SurfaceContours(root, bricks.signs if isinstance(bricks, Bricks) else bricks, work.threads)

@@ -7,14 +7,14 @@ from functools import cached_property
 
 import numpy as np
 
+from ..common.cache import key
 from ..common.compiled import compiled
-from ..common.keys import key
 from ..formulas.box import Box
 from ..formulas.field import Bounds, Device, Precision
 from ..kernel import Kernel
-from ..kernel.arrays import ArrayField
+from ..kernel.tree import ArrayField
 from .model import Mesh
-from .nearest import Nearest
+from .spatial import Nearest
 
 CELLS = 1024
 """Maximum number of cells along each side of the grid in which rays find their triangles."""
@@ -22,15 +22,9 @@ CELLS = 1024
 
 @dataclass(frozen=True, eq=False)
 class MeshField(ArrayField):
-    """Distance to a mesh, negative where the mesh winds around a point: bodies that overlap are united.
+    """Distance to a mesh, negative where the mesh winds around a point: bodies that overlap are united."""
 
-    Attributes
-    ----------
-    mesh : Mesh
-        A closed mesh; its unit is the scene unit.
-    """
-
-    mesh: Mesh
+    mesh: Mesh  # A closed mesh; its unit is the scene unit
 
     @cached_property
     def bounds(self) -> Bounds:

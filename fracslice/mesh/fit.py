@@ -38,16 +38,7 @@ UPRIGHT, OFF = 3, 7
 class Fit:
     """Distances and normals of a scene's field.
 
-    Parameters
-    ----------
-    root : Field
-        Field; evaluated in float64.
-    reach : float
-        Tolerance: distances below it are proved, scene units.
-    voxel : float
-        Voxel, scene units.
-    work : Work
-        Threads and cancellation.
+    `reach`, `voxel` in scene units.
     """
 
     def __init__(self, root: Field, reach: float, voxel: float, work: Work) -> None:
@@ -57,15 +48,7 @@ class Fit:
     def planes(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Tangent planes of the field.
 
-        Parameters
-        ----------
-        points : ndarray of float64, shape (n, 3)
-            Points, scene units.
-
-        Returns
-        -------
-        ndarray of float64, shape (n, 4)
-            Unit gradient, and signed distance to the surface to first order.
+        `points`: float64 (n, 3), scene units. Returns float64 (n, 4).
         """
 
         def look(p: NDArray[np.float64], out: NDArray[np.float64]) -> None:
@@ -87,17 +70,7 @@ class Fit:
         within `reach`; so do those of shorter reaches. Elsewhere the distance is a first-order estimate, and
         greater than `reach`.
 
-        Parameters
-        ----------
-        points : ndarray of float64, shape (n, 3)
-            Points, scene units.
-        normals : ndarray of float64, shape (n, 3)
-            Unit normals of the surface.
-
-        Returns
-        -------
-        ndarray of float64, shape (n,)
-            Distances, scene units.
+        `points`: float64 (n, 3), scene units; `normals`: float64 (n, 3). Returns float64 (n,), scene units.
         """
 
         def look(rows: NDArray[np.float64], out: NDArray[np.float64]) -> None:
@@ -133,16 +106,7 @@ class Fit:
     def triangles(self, corners: NDArray[np.float64]) -> NDArray[np.float64]:
         """Measure the fit of triangles.
 
-        Parameters
-        ----------
-        corners : ndarray of float64, shape (m, 3, 3)
-            Corners, scene units.
-
-        Returns
-        -------
-        ndarray of float64, shape (m, 8)
-            Unit normal of the field at the centroid (3 columns), its cosine with the triangle's normal,
-            greatest distance of the samples on each side (3 columns), and of all samples.
+        `corners`: float64 (m, 3, 3), scene units. Returns float64 (m, 8).
         """
         normals = self.planes(corners.mean(axis=1))[:, :3]
         points = (LATTICE @ corners).reshape(-1, 3)
@@ -168,21 +132,11 @@ class Fit:
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A mesh with the measures of `Fit.triangles`.
+    """A mesh with the measures of `Fit.triangles`."""
 
-    Attributes
-    ----------
-    mesh : Mesh
-        The mesh.
-    fit : Fit
-        The measuring fit.
-    measured : ndarray of float64, shape (m, 8)
-        Measures of each triangle.
-    """
-
-    mesh: Mesh
-    fit: Fit
-    measured: NDArray[np.float64]
+    mesh: Mesh  # the mesh
+    fit: Fit  # the measuring fit
+    measured: NDArray[np.float64]  # measures of each triangle
 
     @classmethod
     def of(cls, mesh: Mesh, fit: Fit) -> Fitted:
@@ -192,14 +146,7 @@ class Fitted:
     def become(self, mesh: Mesh, parents: NDArray[np.int64], fresh: NDArray[np.bool_]) -> Fitted:
         """Measures of an edited mesh; only changed triangles are measured.
 
-        Parameters
-        ----------
-        mesh : Mesh
-            Edited mesh.
-        parents : ndarray of int64, shape (k,)
-            Triangle of this mesh that each triangle of the edited one came from.
-        fresh : ndarray of bool, shape (k,)
-            True for each changed triangle.
+        `parents`: int64 (k,); `fresh`: bool (k,).
         """
         measured = self.measured[parents]
         measured[fresh] = self.fit.triangles(mesh.corners[fresh])

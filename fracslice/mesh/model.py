@@ -1,19 +1,126 @@
-"""Triangle mesh."""
+"""Triangle mesh, and its export."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.digits import counted
+from ..common.messages import format_count, lacking
 from ..errors import MeshError
-from .exchange import Exchange
+from ..providers import provider
 from .topology import Sizes, component_sizes, edge_topology
+
+if TYPE_CHECKING:
+    import trimesh
+
+CLAY = "#efe3d0"
+
+
+class Exchange:
+    """Export methods of `Mesh`."""
+
+    def _repr_png_(self) -> bytes | None:
+        """Picture in a notebook; None for an empty mesh."""
+        from .thumbnail import thumbnail
+
+        mesh = cast("Mesh", self)
+        return thumbnail(mesh) if len(mesh.triangles) else None
+
+    def export(self, path: str | Path, metadata: Mapping[str, str] | None = None) -> Path:
+        """Write the mesh to a file atomically.
+
+        Parameters
+        ----------
+        path : str or Path
+            File; the extension selects the format: .stl, .3mf, .ply, .obj or .glb.
+        metadata : mapping, optional
+            Names and values, as far as the format supports them, for example Title.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        ExportError
+            For an empty mesh, an unknown extension, or a file that cannot be written.
+        """
+        written: Path = provider("files").write(self, path, metadata)
+        return written
+
+    def to_trimesh(self) -> trimesh.Trimesh:
+        """Copy of the mesh as a `trimesh.Trimesh`, unprocessed.
+
+        Returns
+        -------
+        trimesh.Trimesh
+            The same vertices and triangles; colours and, as vertex attributes, scalars.
+        """
+        import trimesh
+
+        mesh = cast("Mesh", self)
+        return trimesh.Trimesh(
+            mesh.vertices.copy(),
+            mesh.triangles.copy(),
+            process=False,
+            vertex_colors=None if mesh.colours is None else mesh.colours.copy(),
+            vertex_attributes={name: values.copy() for name, values in mesh.scalars.items()},
+        )
+
+    def to_pyvista(self) -> Any:
+        """Copy of the mesh as a `pyvista.PolyData`.
+
+        Returns
+        -------
+        pyvista.PolyData
+            The same vertices and triangles; scalars and, as "RGB", colours are point data.
+
+        Raises
+        ------
+        MeshError
+            If pyvista is not installed.
+        """
+        if reason := lacking("pyvista", "windows need"):
+            raise MeshError(reason)
+        import pyvista
+
+        mesh = cast("Mesh", self)
+        surface: Any = pyvista.PolyData
+        made = surface.from_regular_faces(mesh.vertices.copy(), mesh.triangles)
+        for name, values in mesh.scalars.items():
+            made.point_data[name] = values
+        if mesh.colours is not None:
+            made.point_data["RGB"] = mesh.colours
+        return made
+
+    def plot(self, **options: Any) -> Any:
+        """Show the mesh in a window, or in the output of a notebook cell.
+
+        Parameters
+        ----------
+        **options
+            Options of `pyvista.plot`, for example ``color`` or ``off_screen``.
+
+        Returns
+        -------
+        object
+            Result of `pyvista.plot`.
+
+        Raises
+        ------
+        MeshError
+            If pyvista is not installed.
+        """
+        mesh = cast("Mesh", self)
+        usual = {"color": CLAY} if mesh.colours is None else {"scalars": "RGB", "rgb": True}
+        return self.to_pyvista().plot(**{**usual, "split_sharp_edges": True, **options})
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -68,7 +175,7 @@ class Mesh(Exchange):
     def __repr__(self) -> str:
         x, y, z = self.size
         triangles, vertices = len(self.triangles), len(self.vertices)
-        counts = f"{counted(triangles, 'triangle')}, {counted(vertices, 'vertex', 'vertices')}"
+        counts = f"{format_count(triangles, 'triangle')}, {format_count(vertices, 'vertex', 'vertices')}"
         return f"<{type(self).__name__} of {counts}, {x:.6g} x {y:.6g} x {z:.6g}>"
 
     @property
@@ -239,14 +346,8 @@ def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64
     return out
 
 
-def joined(meshes: list[Mesh]) -> Mesh:
-    """Concatenate meshes without welding.
-
-    Returns
-    -------
-    Mesh
-        All their triangles, in order.
-    """
+def concatenate(meshes: list[Mesh]) -> Mesh:
+    """Concatenate meshes without welding."""
     offsets = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
     triangles = [mesh.triangles + np.int32(offset) for mesh, offset in zip(meshes, offsets, strict=True)]
     return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(triangles))

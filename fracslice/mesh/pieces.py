@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from .._native import near
 from ..store import Arrays
+from ..work import Work, chunks
 from .contouring import Piece
 from .model import Mesh
 
@@ -17,22 +19,7 @@ NOTHING = Mesh(np.empty((0, 3)), np.empty((0, 3), np.int32))
 
 
 class Pieces:
-    """Pieces of a surface, in order, with labels of their vertices; scene units.
-
-    Parameters
-    ----------
-    folder : Path, optional
-        Folder for the pieces; they are held in memory by default.
-
-    Attributes
-    ----------
-    ends : list of float
-        x at which each piece ends; infinite for the last one.
-    starts : list of int
-        Index of the first triangle of each piece.
-    fresh : list of int
-        Trailing triangles of each piece that were not made by contouring.
-    """
+    """Pieces of a surface, in order, with labels of their vertices; scene units."""
 
     def __init__(self, folder: Path | None = None) -> None:
         self.folder, self.ends, self.starts = folder, list[float](), list[int]()
@@ -53,30 +40,12 @@ class Pieces:
         return Pieces(self.folder)
 
     def add(self, piece: Piece, fresh: int = 0) -> None:
-        """Append a piece.
-
-        Parameters
-        ----------
-        piece : Piece
-            The piece.
-        fresh : int, optional
-            Its trailing triangles that were not made by contouring.
-        """
+        """Append a piece."""
         self._put(f"mesh{len(self)}", vertices=piece.mesh.vertices, triangles=piece.mesh.triangles)
         self.count(piece.end, len(piece.mesh.triangles), fresh)
 
     def count(self, end: float, triangles: int, fresh: int = 0) -> None:
-        """Append a piece that is stored already.
-
-        Parameters
-        ----------
-        end : float
-            x at which it ends.
-        triangles : int
-            Number of its triangles.
-        fresh : int, optional
-            Its trailing triangles that were not made by contouring.
-        """
+        """Append a piece that is stored already."""
         self.ends.append(end)
         self.starts.append(self._count)
         self.fresh.append(fresh)
@@ -85,27 +54,14 @@ class Pieces:
     def label(self, number: int, labels: NDArray[np.int32]) -> None:
         """Store the labels of a piece.
 
-        Parameters
-        ----------
-        number : int
-            Index of the piece.
-        labels : ndarray of int32, shape (n,)
-            Label of each vertex.
+        `labels`: int32 (n,).
         """
         self._put(f"labels{number}", labels=labels)
 
     def mesh(self, number: int) -> Mesh:
         """Load a piece.
 
-        Parameters
-        ----------
-        number : int
-            Index of the piece.
-
-        Returns
-        -------
-        Mesh
-            Its triangles, scene units.
+        Returns `Mesh` in scene units.
         """
         arrays = self._get(f"mesh{number}")
         return Mesh(arrays["vertices"], arrays["triangles"])
@@ -113,77 +69,40 @@ class Pieces:
     def labels(self, number: int) -> NDArray[np.int32]:
         """Load the labels of a piece.
 
-        Parameters
-        ----------
-        number : int
-            Index of the piece.
-
-        Returns
-        -------
-        ndarray of int32, shape (n,)
-            Label of each vertex.
+        Returns int32 (n,).
         """
         return self._get(f"labels{number}")["labels"]
 
     def meshes(self) -> Iterator[Mesh]:
-        """Iterate over the pieces.
-
-        Returns
-        -------
-        iterator of Mesh
-            Pieces, by ascending x.
-        """
+        """Iterate over the pieces."""
         return (self.mesh(number) for number in range(len(self)))
 
     def drop(self, number: int) -> None:
-        """Release a piece that is held in memory.
-
-        Parameters
-        ----------
-        number : int
-            Index of the piece.
-        """
+        """Release a piece that is held in memory."""
         for name in ("mesh", "labels"):
             self._held.pop(f"{name}{number}", None)
 
     def near(self, points: NDArray[np.float64], reach: float) -> tuple[Mesh, NDArray[np.int64]]:
         """Triangles with a corner near points, as one mesh.
 
-        Parameters
-        ----------
-        points : ndarray of float64, shape (n, 3)
-            Points, scene units.
-        reach : float
-            All corners within this distance along each axis are near.
-
-        Returns
-        -------
-        Mesh
-            The triangles.
-        ndarray of int64, shape (k,)
-            Their indices, ascending, counted from the first piece on.
+        `points`: float64 (n, 3), scene units. Returns int64 (k,).
         """
         parts, numbers = NOTHING, list[NDArray[np.int64]]()
         for number, mesh in enumerate(self.meshes()):
             chosen = near(mesh.vertices, mesh.triangles, points, reach)
             numbers.append(self.starts[number] + chosen)
             part = mesh.selected(np.bincount(chosen, minlength=len(mesh.triangles)) > 0)
-            parts = joined(parts, part, self.ends[number - 1], reach / 2) if number else part
+            parts = join_at_seam(parts, part, self.ends[number - 1], reach / 2) if number else part
         return parts, np.concatenate(numbers)
 
     def together(self, first: int, last: int, seam: float) -> Mesh:
         """Join consecutive pieces to one mesh.
 
-        Parameters
-        ----------
-        first, last : int
-            Pieces `first` to `last` - 1.
-        seam : float
-            Maximum distance from the seam of vertices to be joined, scene units.
+        `seam` in scene units.
         """
         mesh = self.mesh(first)
         for number in range(first + 1, last):
-            mesh = joined(mesh, self.mesh(number), self.ends[number - 1], seam)
+            mesh = join_at_seam(mesh, self.mesh(number), self.ends[number - 1], seam)
         return mesh
 
     def _put(self, name: str, **arrays: NDArray[np.generic]) -> None:
@@ -204,35 +123,15 @@ class Pieces:
         return {path.stem[begin:]: np.load(path, "r") for path in self.folder.glob(f"{name}-*.npy")}
 
 
-def joined(one: Mesh, other: Mesh, seam: float, near: float) -> Mesh:
-    """Join two meshes: bitwise equal vertices near the plane x = `seam` become one.
-
-    Parameters
-    ----------
-    one, other : Mesh
-        Meshes; the triangles of `one` come first.
-    seam : float
-        x of the plane.
-    near : float
-        Maximum distance of a joined vertex from the plane.
-    """
-    return seamed(one, other, seam, near)[0].compact()
+def join_at_seam(one: Mesh, other: Mesh, seam: float, near: float) -> Mesh:
+    """Join two meshes: bitwise equal vertices near the plane x = `seam` become one."""
+    return concatenate_at_seam(one, other, seam, near)[0].compact()
 
 
-def seamed(one: Mesh, other: Mesh, seam: float, near: float) -> tuple[Mesh, NDArray[np.int32]]:
-    """Join two meshes as `joined` does, but keep all vertices.
+def concatenate_at_seam(one: Mesh, other: Mesh, seam: float, near: float) -> tuple[Mesh, NDArray[np.int32]]:
+    """Join two meshes as `join_at_seam` does, but keep all vertices.
 
-    Parameters
-    ----------
-    one, other, seam, near
-        As in `joined`.
-
-    Returns
-    -------
-    Mesh
-        The joined mesh.
-    ndarray of int32, shape (n,)
-        The first vertex with the same position, for each vertex; those of `other` come first.
+    Returns int32 (n,).
     """
     vertices = np.concatenate([other.vertices, one.vertices])
     close = near_plane(vertices, seam, near)
@@ -246,19 +145,7 @@ def seamed(one: Mesh, other: Mesh, seam: float, near: float) -> tuple[Mesh, NDAr
 def near_plane(points: NDArray[np.float64], seam: float, near: float) -> NDArray[np.int64]:
     """Points near a plane x = `seam`.
 
-    Parameters
-    ----------
-    points : ndarray of float64, shape (n, 3)
-        Points.
-    seam : float
-        x of the plane; no point is near an infinite one.
-    near : float
-        Maximum distance from the plane.
-
-    Returns
-    -------
-    ndarray of int64, shape (k,)
-        Their indices, ascending.
+    `points`: float64 (n, 3). Returns int64 (k,).
     """
     return np.flatnonzero(np.abs(points[:, 0] - seam) < near) if np.isfinite(seam) else np.empty(0, int)
 
@@ -266,14 +153,24 @@ def near_plane(points: NDArray[np.float64], seam: float, near: float) -> NDArray
 def rows(points: NDArray[np.float64]) -> NDArray[np.void]:
     """View points as scalars, for bitwise comparison.
 
-    Parameters
-    ----------
-    points : ndarray of float64, shape (n, 3)
-        Points.
-
-    Returns
-    -------
-    ndarray of void, shape (n,)
-        One value per point.
+    `points`: float64 (n, 3). Returns void (n,).
     """
     return np.ascontiguousarray(points).view("V24").ravel()
+
+
+ROWS = 1 << 17
+"""Rows per task."""
+
+
+def gather_rows(table: np.ndarray, rows: np.ndarray, threads: int = 0) -> np.ndarray:
+    """Gather rows of a table by several threads.
+
+    `table`: [m, ...]; `rows`: int [n, ...]. Returns `table[rows]`.
+    """
+    result = np.empty(rows.shape + table.shape[1:], table.dtype)
+
+    def task(part: slice) -> None:
+        np.take(table, rows[part], axis=0, out=result[part], mode="clip")  # "raise" would copy the output
+
+    Work(threads or os.cpu_count() or 1).map(task, chunks(len(rows), ROWS))
+    return result

@@ -32,69 +32,35 @@ def grid_planes(signs: SignBricks) -> NDArray[np.float64]:
     Contoured triangles do not intersect (`fracslice/native/mesh/contour.h`), nor do quantised ones if no
     vertex changes its position relative to these planes (`quantise.h`).
 
-    Parameters
-    ----------
-    signs : SignBricks
-        Samples.
-
-    Returns
-    -------
-    ndarray of float64, shape (k, 3)
-        Planes across each axis, ascending, scene units.
+    Returns float64 (k, 3), scene units.
     """
     steps = np.arange(-BRICK, BRICK * (max(signs.index.shape) + 1) + 1)
     return np.array(signs.origin) + signs.voxel * steps[:, None]
 
 
 class Quantised(NamedTuple):
-    """Result of `quantise`.
+    """Result of `quantise`."""
 
-    Attributes
-    ----------
-    mesh : Mesh
-        Quantised mesh.
-    displaced : ndarray of bool, shape (n,)
-        True for each displaced vertex: only these can coincide with others.
-    places : ndarray of int64, shape (k,)
-        Indices of the edited triangles; -1 for removed ones.
-    """
-
-    mesh: Mesh
-    displaced: NDArray[np.bool_]
-    places: NDArray[np.int64]
+    mesh: Mesh  # quantised mesh
+    displaced: NDArray[np.bool_]  # true for each displaced vertex: only these can coincide with others
+    places: NDArray[np.int64]  # indices of the edited triangles; -1 for removed ones
 
 
-def quantised(mesh: Mesh, threads: int = 0) -> Mesh:
+def quantise_mesh(mesh: Mesh, threads: int = 0) -> Mesh:
     """Quantise and weld a mesh, as a reader of its STL does.
 
     Every triangle is kept, in order; unused vertices are removed. Quantise once, before the check and the
     export, so that both treat the same mesh.
 
-    Returns
-    -------
-    Mesh
-        Coordinates rounded to float32, equal positions welded.
-
-    Raises
-    ------
-    MeshError
-        If a coordinate is not finite or an index is out of range.
+    Returns coordinates rounded to float32.
     """
-    return welded(quantise(mesh, used(mesh), threads=threads).mesh)
+    return weld(quantise(mesh, used_vertices(mesh), threads=threads).mesh)
 
 
-def used(mesh: Mesh) -> NDArray[np.bool_]:
+def used_vertices(mesh: Mesh) -> NDArray[np.bool_]:
     """Vertices of triangles.
 
-    Returns
-    -------
-    ndarray of bool, shape (n,)
-        True for each used vertex.
-
-    Raises
-    ------
-    MeshError
-        If an index is out of range.
+    Returns bool (n,).
     """
     if len(mesh.triangles) and not 0 <= mesh.triangles.min() <= mesh.triangles.max() < len(mesh.vertices):
         raise MeshError("a triangle names a vertex that does not exist")
@@ -114,33 +80,7 @@ def quantise(
 ) -> Quantised:
     """Place the vertices of a mesh and round them to float32, without negative zeros.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        The mesh.
-    keep : ndarray of bool, shape (n,)
-        Vertices of the triangles that stay.
-    displaced : ndarray of bool, shape (n,), optional
-        Vertices that count as displaced.
-    edits : Edits, optional
-        Triangles with other corners, or removed ones.
-    planes : ndarray of float64, shape (k, 3), optional
-        Placed planes of a grid across each axis, ascending. A vertex that is no longer in the same planes and
-        strictly between the same ones is displaced; without planes all are.
-    frame : Frame, optional
-        Placement; none by default.
-    threads : int, optional
-        Threads; 0 for all cores.
-
-    Returns
-    -------
-    Quantised
-        The triangles that stay, in order.
-
-    Raises
-    ------
-    MeshError
-        If a coordinate is not finite.
+    `keep`, `displaced`: bool (n,); `planes`: float64 (k, 3).
     """
     if displaced is None:
         displaced = np.zeros(len(keep), bool)
@@ -153,20 +93,10 @@ def quantise(
     return Quantised(Mesh(vertices, triangles), moved, places)
 
 
-def placed(points: NDArray[np.float64], frame: Frame) -> NDArray[np.float64]:
+def place_and_round(points: NDArray[np.float64], frame: Frame) -> NDArray[np.float64]:
     """Place points and round them, as `quantise` does.
 
-    Parameters
-    ----------
-    points : ndarray of float64, shape (n, 3)
-        Points.
-    frame : Frame
-        Placement.
-
-    Returns
-    -------
-    ndarray of float64, shape (n, 3)
-        Rounded points.
+    `points`: float64 (n, 3). Returns float64 (n, 3).
     """
     scale, offset, bed = frame
     result = points * scale + np.array(offset)
@@ -175,13 +105,10 @@ def placed(points: NDArray[np.float64], frame: Frame) -> NDArray[np.float64]:
     return rounded
 
 
-def welded(mesh: Mesh) -> Mesh:
+def weld(mesh: Mesh) -> Mesh:
     """Weld equal positions.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        Mesh with float32 coordinates.
+    `mesh`: mesh with float32 coordinates.
     """
     first, labels = _native.weld(mesh.vertices.astype(np.float32))
     return Mesh(mesh.vertices[first], labels[mesh.triangles]) if len(first) < len(mesh.vertices) else mesh

@@ -4,17 +4,356 @@ from __future__ import annotations
 
 import re
 import struct
+import zipfile
+import zlib
+from array import array
 from pathlib import Path
+from typing import IO, Any, NamedTuple
+from xml.parsers import expat
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.digits import counted
+from ..common.messages import format_count
 from ..errors import MeshError
-from .model import Mesh
-from .quantisation import quantised
-from .reading_3mf import read_3mf
-from .reading_ply import read_ply
+from .model import Mesh, concatenate
+from .quantisation import quantise_mesh
+
+MILLIMETRES = {
+    "micron": 1e-3,
+    "millimeter": 1.0,
+    "centimeter": 10.0,
+    "inch": 25.4,
+    "foot": 304.8,
+    "meter": 1000.0,
+}
+DEEPEST, LARGEST = 32, 1 << 28
+"""Limits for a 3MF file: nesting depth of components, and number of triangles and components that the build
+may expand to. A few lines could ask for any number.
+"""
+MODEL_RELATION = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
+
+
+def read_3mf(path: Path) -> Mesh:
+    """Read the build of a 3MF file, mm."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            relations, package = _Relations(), _Package()
+            with archive.open("_rels/.rels") as part:
+                _parse(part, relations.start)
+            package.read(archive, relations.model)
+            return package.laid_out()
+    except (zipfile.BadZipFile, EOFError, KeyError, RuntimeError, zlib.error) as error:
+        raise MeshError("not a whole 3MF file: it is cut short, or of another kind") from error
+    except (expat.ExpatError, ValueError, OverflowError) as error:
+        raise MeshError(f"not a valid 3MF file: {error}") from error
+
+
+def _parse(part: IO[bytes], start: Any, end: Any = None) -> None:
+    """Stream XML through handlers. A document type, and hence entities, is refused."""
+    parser = expat.ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.StartDoctypeDeclHandler = _refuse
+    parser.ParseFile(part)
+
+
+def _refuse(*_: Any) -> None:
+    """Refuse a document type."""
+    raise MeshError("not a valid 3MF file: it has a document type")
+
+
+class _Relations:
+    """Finds the 3D model in the relationships of the package."""
+
+    model = ""
+
+    def start(self, name: str, attributes: dict[str, str]) -> None:
+        if attributes.get("Type") == MODEL_RELATION:
+            self.model = attributes.get("Target", "")
+
+
+_Name = tuple[str, str]
+"""File of an object in the package, and its identifier there."""
+
+_Placed = tuple[_Name, NDArray[np.float64]]
+"""Object and its transform."""
+
+
+class _Package:
+    """Collects the meshes of a 3MF model from XML streams, then expands its build.
+
+    Objects may lie in further files of the package, as its production extension has it.
+    """
+
+    def __init__(self) -> None:
+        self.meshes: dict[_Name, Mesh] = {}
+        self.parts: dict[_Name, list[_Placed]] = {}
+        self.build: list[_Placed] = []
+        self.unit, self.file, self.object = "millimeter", "", ("", "")
+        self.vertices, self.triangles = array("d"), array("q")
+
+    def read(self, archive: zipfile.ZipFile, model: str) -> None:
+        """Read a model, whose unit and build count, and the files that components name."""
+        self.parse(archive, model.lstrip("/"))
+        unit, build, known = self.unit, self.build, {self.file}
+        while more := self.named(build) - known:
+            known |= more
+            for file in sorted(more):
+                self.parse(archive, file)
+        self.unit, self.build = unit, build
+
+    def parse(self, archive: zipfile.ZipFile, file: str) -> None:
+        """Collect the objects of a file; its unit and build take the place of earlier ones."""
+        self.file, self.build = file, []
+        with archive.open(file) as part:
+            _parse(part, self.start, self.end)
+
+    def named(self, build: list[_Placed]) -> set[str]:
+        """Files of the objects that are built or components of others."""
+        return {name[0] for placed in (build, *self.parts.values()) for name, _ in placed}
+
+    def start(self, name: str, get: dict[str, str]) -> None:
+        """Handle the start of an element."""
+        match name.rpartition(":")[2]:
+            case "triangle":
+                self.triangles.extend((int(get["v1"]), int(get["v2"]), int(get["v3"])))
+            case "vertex":
+                self.vertices.extend((float(get["x"]), float(get["y"]), float(get["z"])))
+            case "object":
+                self.object = self.file, get["id"]
+                self.parts[self.object] = []
+            case "levelset":
+                raise MeshError("the 3MF file holds a formula (a level set), and no mesh")
+            case "component":
+                self.parts[self.object].append(self.reference(get))
+            case "item":
+                self.build.append(self.reference(get))
+            case "model":
+                self.unit = get.get("unit", self.unit)
+
+    def reference(self, get: dict[str, str]) -> _Placed:
+        """The object that an item or a component names, in this file or in that of its path."""
+        paths = [value for key, value in get.items() if key.rpartition(":")[2] == "path"]
+        file = paths[0].lstrip("/") if paths else self.file
+        return (file, get["objectid"]), _matrix(get.get("transform"))
+
+    def end(self, name: str) -> None:
+        """Handle the end of an element."""
+        if name.rpartition(":")[2] == "object":
+            self.meshes[self.object] = _validated_mesh(self.vertices, self.triangles)
+            self.vertices, self.triangles = array("d"), array("q")
+
+    def laid_out(self) -> Mesh:
+        """All build items as one mesh, mm."""
+        if self.unit not in MILLIMETRES:
+            raise MeshError(f"not a valid 3MF file: no such unit: {self.unit}")
+        if not self.build:
+            raise MeshError("the 3MF file asks to build nothing")
+        known: dict[_Name, int] = {}
+        if sum(self.size(name, known) for name, _ in self.build) > LARGEST:
+            raise MeshError(f"not a valid 3MF file: it builds more than {LARGEST} triangles and parts")
+        return concatenate([self.placed(*item) for item in self.build]).scaled(MILLIMETRES[self.unit])
+
+    def size(self, name: _Name, known: dict[_Name, int], depth: int = 0) -> int:
+        """Triangles and objects of an expanded object, its components included."""
+        self.check(name, depth)
+        if name not in known:
+            inner = sum(self.size(part, known, depth + 1) for part, _ in self.parts[name])
+            known[name] = 1 + len(self.meshes[name].triangles) + inner
+        return known[name]
+
+    def check(self, name: _Name, depth: int) -> None:
+        """Refuse an unknown object, or components nested too deep."""
+        if name not in self.meshes or depth > DEEPEST:
+            raise MeshError(f"not a valid 3MF file: no such object: {name[1]}")
+
+    def placed(self, name: _Name, matrix: NDArray[np.float64], depth: int = 0) -> Mesh:
+        """An object with its components, in the frame of the build."""
+        self.check(name, depth)
+        inner = [self.placed(part, at, depth + 1) for part, at in self.parts[name]]
+        whole = concatenate([self.meshes[name], *inner])
+        order = -1 if np.linalg.det(matrix[:3]) < 0 else 1
+        turned = sum(whole.vertices[:, k, None] * matrix[k] for k in range(3))
+        return Mesh(turned + matrix[3], whole.triangles[:, ::order])
+
+
+def _matrix(text: str | None) -> NDArray[np.float64]:
+    """3MF transform: four rows of three numbers, applied to row vectors. Raises ValueError."""
+    if text is None:
+        return np.vstack([np.eye(3), np.zeros(3)])
+    matrix = np.array(text.split(), dtype=np.float64).reshape(4, 3)
+    if not np.isfinite(matrix).all():
+        raise ValueError(f"a transform that is not of finite numbers: {text[:60]}")
+    return matrix
+
+
+def _validated_mesh(vertices: array[float], triangles: array[int]) -> Mesh:
+    """Validated mesh of an object."""
+    corners = np.array(vertices, dtype=np.float64).reshape(-1, 3)
+    indices = np.array(triangles, dtype=np.int64).reshape(-1, 3)
+    if not np.isfinite(corners).all():
+        raise MeshError("not a valid 3MF file: a coordinate is not a finite number")
+    if len(indices) and not 0 <= indices.min() <= indices.max() < len(corners):
+        raise MeshError("not a valid 3MF file: a triangle names a vertex that does not exist")
+    if (indices == np.roll(indices, 1, axis=1)).any():
+        raise MeshError("not a valid 3MF file: a triangle names a vertex twice")
+    return Mesh(corners, indices.astype(np.int32))
+
+
+KINDS = {
+    "char": "i1",
+    "uchar": "u1",
+    "short": "i2",
+    "ushort": "u2",
+    "int": "i4",
+    "uint": "u4",
+    "int8": "i1",
+    "uint8": "u1",
+    "int16": "i2",
+    "uint16": "u2",
+    "int32": "i4",
+    "uint32": "u4",
+    "float": "f4",
+    "double": "f8",
+    "float32": "f4",
+    "float64": "f8",
+}
+ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": "="}
+HEADER = re.compile(rb"ply\s*?\n(.*?\n)end_header[ \t]*\r?\n", re.DOTALL)
+CORNERS = "vertex_indices", "vertex_index"
+
+Numbers = NDArray[Any]
+
+
+class _Property(NamedTuple):
+    """A number of each row or, with the kind of a length, a list of numbers."""
+
+    name: str
+    kind: np.dtype[Any]
+    length: np.dtype[Any] | None
+
+
+class _Element(NamedTuple):
+    """A table of the file."""
+
+    name: str
+    rows: int
+    properties: list[_Property]
+
+
+class _Column(NamedTuple):
+    """Values of a property, row after row, and their number in each row."""
+
+    lengths: Numbers
+    values: Numbers
+
+
+def read_ply(path: Path) -> Mesh:
+    """Read a PLY file; polygons become fans of triangles."""
+    data = path.read_bytes()
+    try:
+        elements, body = _layout(data)
+        tables, at = {}, 0
+        for element in elements:
+            tables[element.name], at = _table(element, body, at)
+        x, y, z = (tables["vertex"][axis].values for axis in "xyz")
+        face = tables.get("face", {})
+        lengths, corners = next((face[name] for name in CORNERS if name in face), _Column(*np.empty((2, 0))))
+    except (ValueError, KeyError, IndexError, OverflowError) as error:
+        raise MeshError("not a whole PLY file: it is cut short, broken or of another kind") from error
+    if len(corners) and not 0 <= corners.min() <= corners.max() < len(x):
+        raise MeshError("not a valid PLY file: a face names a vertex that does not exist")
+    return Mesh(np.stack([x, y, z], axis=1).astype(np.float64), _fans(lengths, corners.astype(np.int32)))
+
+
+def _layout(data: bytes) -> tuple[list[_Element], bytes]:
+    """Elements of the header, and the numbers after it: those of a text as float64. Raises ValueError."""
+    header = HEADER.match(data)
+    if header is None:
+        raise ValueError("no header")
+    order, elements, body = "", list[_Element](), data[header.end() :]
+    for line in header[1].decode("ascii", "replace").splitlines():
+        match line.split():
+            case ["format", name, _]:
+                order = ORDERS[name]
+            case ["element", name, rows]:
+                elements.append(_Element(name, int(rows), []))
+            case ["property", "list", length, kind, name]:
+                elements[-1].properties.append(_Property(name, _kind(kind, order), _kind(length, order)))
+            case ["property", kind, name]:
+                elements[-1].properties.append(_Property(name, _kind(kind, order), None))
+    if order == "=":
+        body = np.array(body.split(), np.bytes_).astype(np.float64).tobytes()
+    return elements, body
+
+
+def _kind(name: str, order: str) -> np.dtype[Any]:
+    """Type of a number in the body."""
+    return np.dtype(np.float64) if order == "=" else np.dtype(order + KINDS[name])
+
+
+def _table(element: _Element, body: bytes, at: int) -> tuple[dict[str, _Column], int]:
+    """Columns of an element, and the offset of its end."""
+    names = [one.name for one in element.properties]
+    if not element.rows:
+        return {name: _Column(*np.empty((2, 0), np.int64)) for name in names}, at
+    lengths = [len(values) for values in _row(element, body, at)[0]]
+    alike = _alike(element, lengths, body, at)
+    if alike is not None:
+        columns = [
+            _Column(np.full(element.rows, length), alike[name].reshape(-1))
+            for name, length in zip(names, lengths, strict=True)
+        ]
+        return dict(zip(names, columns, strict=True)), at + alike.nbytes
+    rows = []
+    for _ in range(element.rows):
+        row, at = _row(element, body, at)
+        rows.append(row)
+    parts = zip(*rows, strict=True)
+    columns = [_Column(np.array([len(part) for part in column]), np.concatenate(column)) for column in parts]
+    return dict(zip(names, columns, strict=True)), at
+
+
+def _row(element: _Element, body: bytes, at: int) -> tuple[list[Numbers], int]:
+    """Values of each property in the row at an offset, and the offset of the next one."""
+    values = []
+    for _, kind, length in element.properties:
+        count = 1
+        if length is not None:
+            count = int(np.frombuffer(body, length, 1, at)[0])
+            at += length.itemsize
+        if count < 0:
+            raise ValueError("a list of a negative length")
+        values.append(np.frombuffer(body, kind, count, at))
+        at += count * kind.itemsize
+    return values, at
+
+
+def _alike(element: _Element, lengths: list[int], body: bytes, at: int) -> Numbers | None:
+    """All rows as one array, if their lists are as long as those of the first row."""
+    fields: list[tuple[str, np.dtype[Any], tuple[int]]] = []
+    for (name, kind, length), count in zip(element.properties, lengths, strict=True):
+        if length is not None:
+            fields.append((f"length of {name}", length, (1,)))
+        fields.append((name, kind, (count,)))
+    row = np.dtype(fields)
+    if at + element.rows * row.itemsize > len(body):
+        return None
+    table = np.frombuffer(body, row, element.rows, at)
+    counted = zip(element.properties, lengths, strict=True)
+    same = all((table[f"length of {one.name}"] == count).all() for one, count in counted if one.length)
+    return table if same else None
+
+
+def _fans(lengths: Numbers, corners: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Triangles of polygons, each from its first corner."""
+    lengths = lengths.astype(np.int64)
+    triangles = np.maximum(lengths - 2, 0)
+    first = np.repeat(np.cumsum(lengths) - lengths, triangles)
+    second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(triangles) - triangles, triangles)
+    result: NDArray[np.int32] = corners[np.stack([first, second, second + 1], axis=1)]
+    return result
+
 
 ASCII_STL = re.compile(rb"\s*solid[^\n]*\n\s*(facet|endsolid)", re.IGNORECASE)
 STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -26,20 +365,7 @@ def read_mesh(path: str | Path) -> Mesh:
     STL, PLY and OBJ have no unit: mm are assumed. 3MF and GLB have one. Coordinates are rounded to float32,
     equal positions welded, and every triangle is kept.
 
-    Parameters
-    ----------
-    path : str or Path
-        File; the extension selects the format.
-
-    Returns
-    -------
-    Mesh
-        Quantised mesh, mm.
-
-    Raises
-    ------
-    MeshError
-        For a missing, unknown, truncated or otherwise invalid file.
+    Returns `Mesh` in mm.
     """
     path = Path(path)
     reader = READERS.get(path.suffix.lower())
@@ -49,7 +375,7 @@ def read_mesh(path: str | Path) -> Mesh:
         if path.is_file() and not path.stat().st_size:
             raise MeshError("the file is empty")
         with np.errstate(invalid="ignore"):  # of coordinates that are not finite, which are refused
-            mesh = quantised(reader(path))
+            mesh = quantise_mesh(reader(path))
     except FileNotFoundError:
         raise MeshError(f"{path}: no such file") from None
     except (OSError, MeshError) as error:
@@ -79,7 +405,7 @@ def _wrong_length(count: int, size: int) -> str:
     there = size // STL_TRIANGLE.itemsize
     if there >= count:
         extra = size - count * STL_TRIANGLE.itemsize
-        return f"not an STL file: {counted(extra, 'byte')} after the {count} triangles that it announces"
+        return f"not an STL file: {format_count(extra, 'byte')} after the {count} triangles that it announces"
     return f"not a whole STL file: {there} of {count} triangles; the file is cut short, or of another kind"
 
 

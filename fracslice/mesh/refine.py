@@ -1,21 +1,332 @@
-"""Adaptive refinement: triangles are subdivided until none is farther from the surface than a chord."""
+"""Adaptive refinement: triangles are split, and edges flipped, until none is farther from the surface than
+a chord.
+
+Red-green refinement (Bank, Sherman and Weiser 1983, "Some refinement algorithms and data structures for
+regular local mesh refinement"): both triangles at a split edge are split.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..kernel import Field
 from ..work import Work
-from .creases import on_creases
-from .fit import Fit, Fitted
-from .flips import flip
+from .contouring import anywhere, project
+from .fit import OFF, UPRIGHT, Fit, Fitted
 from .model import Mesh
-from .projection import anywhere, project
-from .self_intersections import self_intersecting_triangles
-from .subdivision import Edges, cut, edges_of, with_needles
+from .spatial import self_intersecting_triangles
+
+STEPS = 6
+NEAREST = 4e-3
+"""Minimum distance from the sharp edge at which planes are evaluated, relative to the length of the mesh
+edge.
+"""
+
+ANGLE = 0.05
+"""Minimum sine between two planes; below it they count as one."""
+
+
+LEAST = 0.1
+"""Minimum determinant of the normals of three sides that meet in a corner."""
+
+SAME = 0.95
+"""Minimum cosine between the normals of one side, far from the sharp edge and near it."""
+
+REACH = 0.9
+"""Maximum displacement of the midpoint, relative to the length of its edge."""
+
+
+def on_creases(
+    fit: Fit, ends: NDArray[np.float64], starts: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Points on sharp edges near the midpoints of mesh edges.
+
+    The tangent planes of the field on both sides are intersected repeatedly, each time closer to their
+    intersection: Newton's method for two equations.
+
+    `ends`, `starts`: float64 (n, 2, 3). Returns float64 (n, 3); bool (n,).
+    """
+    middles = there = ends.mean(axis=1)
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    points, spacing, first = starts, length / 4, np.empty(0)
+    for step in range(STEPS):
+        planes = fit.planes(points.reshape(-1, 3)).reshape(-1, 2, 4)
+        normals = planes[..., :3]
+        first = normals if step == 0 else first
+        points = points - planes[..., 3:] * normals
+        move = _nearest(normals, ((points - there[:, None]) * normals).sum(axis=2))
+        size = np.linalg.norm(move, axis=1)
+        there = there + move * np.minimum(1, length / np.maximum(size, 1e-300))[:, None]
+        directions = points - there[:, None]
+        directions /= np.maximum(np.linalg.norm(directions, axis=2, keepdims=True), 1e-300)
+        spacing = np.clip(2 * size, NEAREST * length, spacing / 2)
+        points = there[:, None] + spacing[:, None, None] * directions
+    result = ((first * normals).sum(axis=2) > SAME).all(axis=1) & (size < NEAREST / 4 * length)
+    result &= np.linalg.norm(there - middles, axis=1) < REACH * length
+    return there, result
+
+
+def on_three(
+    fit: Fit, corners: NDArray[np.float64], size: float
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Corners of the surface near triangles, where three of its sides meet.
+
+    As `on_creases`, with the three of the tangent planes near the triangle that differ most.
+
+    `corners`: float64 (n, 3, 3); `size` in scene units. Returns float64 (n, 3); bool (n,).
+    """
+    there = corners.mean(axis=1)
+    around = np.concatenate(
+        [0.9 * corners + 0.1 * there[:, None], (corners + np.roll(corners, 1, axis=1)) / 2], 1
+    )
+    normals, each = fit.planes(around.reshape(-1, 3))[:, :3].reshape(-1, 6, 3), np.arange(len(corners))
+    second = (normals * normals[:, :1]).sum(axis=2).argmin(axis=1)
+    across = np.cross(normals[:, 0], normals[each, second])
+    third = np.abs((normals * across[:, None]).sum(axis=2)).argmax(axis=1)
+    points = np.stack([around[:, 0], around[each, second], around[each, third]], axis=1)
+    result = np.ones(len(corners), bool)
+    first: NDArray[np.float64] = np.empty(0)
+    moved = spacing = np.full(len(corners), size / 4, np.float64)
+    for step in range(STEPS):
+        planes = fit.planes(points.reshape(-1, 3)).reshape(-1, 3, 4)
+        normals = planes[..., :3]
+        first = normals if step == 0 else first
+        result &= np.abs(np.linalg.det(normals)) > LEAST
+        points = points - planes[..., 3:] * normals
+        off = ((points - there[:, None]) * normals).sum(axis=2)
+        move = np.linalg.solve(np.where(result[:, None, None], normals, np.eye(3)), off[..., None])[..., 0]
+        there, moved = there + move, np.linalg.norm(move, axis=1)
+        directions = points - there[:, None]
+        directions /= np.maximum(np.linalg.norm(directions, axis=2, keepdims=True), 1e-300)
+        spacing = np.clip(2 * moved, NEAREST * size, spacing / 2)
+        points = there[:, None] + spacing[:, None, None] * directions
+    result &= ((first * normals).sum(axis=2) > SAME).all(axis=1) & (moved < NEAREST / 4 * size)
+    return there, result
+
+
+def _nearest(normals: NDArray[np.float64], off: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Shortest vectors from points to the intersection of two planes at signed distances `off`, or, if these
+    are nearly parallel, to the plane midway.
+    """
+    cosine = (normals[:, 0] * normals[:, 1]).sum(axis=1)
+    square = 1 - cosine**2
+    sharp = square > ANGLE**2
+    share = (off - cosine[:, None] * off[:, ::-1]) / np.where(sharp, square, 1)[:, None]
+    share[~sharp] = off[~sharp] / 2
+    result: NDArray[np.float64] = (share[..., None] * normals).sum(axis=1)
+    return result
+
+
+NEEDLE = 0.3
+"""Maximum ratio of the shortest to the longest side of a needle. A needle is split at both of its long sides
+or at none.
+"""
+
+
+class Edges(NamedTuple):
+    """Edges of a closed mesh."""
+
+    ends: NDArray[np.int64]  # end points, the lower index first
+    sides: NDArray[np.int64]  # edges of each triangle; side k runs from corner k to the next
+
+    @property
+    def keys(self) -> NDArray[np.int64]:
+        """Unique key of each edge, made of its end points, int64 [e]."""
+        result: NDArray[np.int64] = self.ends[:, 0] << 32 | self.ends[:, 1]
+        return result
+
+    @property
+    def beside(self) -> NDArray[np.int64]:
+        """The two triangles at each edge, int64 [e, 2]."""
+        return np.argsort(self.sides.ravel(), kind="stable").reshape(-1, 2) // 3
+
+
+def edges_of(triangles: NDArray[np.int32]) -> Edges:
+    """Edges of a closed mesh.
+
+    `triangles`: int32 (m, 3).
+    """
+    ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).astype(np.int64)
+    ends.sort(axis=2)
+    keys, sides = np.unique(ends[..., 0] << 32 | ends[..., 1], return_inverse=True)
+    return Edges(np.stack([keys >> 32, keys & 0xFFFFFFFF], axis=1), sides.reshape(-1, 3))
+
+
+def with_needles(
+    split: NDArray[np.bool_], sides: NDArray[np.int64], lengths: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Add the other long side of needles with a split side. Half a needle would be nearly degenerate.
+
+    `split`: bool (e,); `sides`: int64 (m, 3); `lengths`: float64 (e,). Returns bool (e,).
+    """
+    own = lengths[sides]
+    longest = own.max(axis=1, keepdims=True)
+    needles = np.flatnonzero(own.min(axis=1) < NEEDLE * longest[:, 0])
+    sides, long = sides[needles], own[needles] > longest[needles] / 2
+    while True:
+        more = np.unique(sides[(split[sides] & long).any(axis=1)[:, None] & long & ~split[sides]])
+        if not len(more):
+            return split
+        split = split.copy()
+        split[more] = True
+
+
+def split_edges(
+    mesh: Mesh, sides: NDArray[np.int64], split: NDArray[np.bool_], there: NDArray[np.float64]
+) -> tuple[Mesh, NDArray[np.int64]]:
+    """Split edges of a mesh.
+
+    `sides`: int64 (m, 3); `split`: bool (e,); `there`: float64 (k, 3). Returns int64 (j,).
+    """
+    number = np.full(len(split), -1, np.int32)
+    number[split] = len(mesh.vertices) + np.arange(split.sum(), dtype=np.int32)
+    vertices = np.concatenate([mesh.vertices, there])
+    cuts = split[sides].sum(axis=1)
+    parts, parents = [mesh.triangles[cuts == 0]], [np.flatnonzero(cuts == 0)]
+    for count in (1, 2, 3):
+        own = np.flatnonzero(cuts == count)
+        pieces = _split_triangles(mesh.triangles[own], number[sides[own]], count, vertices)
+        parts += pieces
+        parents += [own] * len(pieces)
+    return Mesh(vertices, np.concatenate(parts)), np.concatenate(parents)
+
+
+def _split_triangles(
+    triangles: NDArray[np.int32], middles: NDArray[np.int32], count: int, vertices: NDArray[np.float64]
+) -> list[NDArray[np.int32]]:
+    """Triangles split at `count` of their sides. Midpoint vertices int32 [m, 3]; -1 for a whole side."""
+    # Rotated so that the split side comes first, or the whole one last.
+    first = np.argmax(middles >= 0, axis=1) if count == 1 else (np.argmin(middles, axis=1) + 1) % 3
+    turn = (first[:, None] + np.arange(3)) % 3
+    a, b, c = np.take_along_axis(triangles, turn, axis=1).T
+    p, q, r = np.take_along_axis(middles, turn, axis=1).T
+    if count == 1:
+        return [np.stack([a, p, c], 1), np.stack([p, b, c], 1)]
+    corner = np.stack([p, b, q], 1)
+    if count == 3:
+        return [corner, np.stack([a, p, r], 1), np.stack([r, q, c], 1), np.stack([p, q, r], 1)]
+    across = vertices[[a, p]] - vertices[[q, c]]
+    shorter = np.diff(np.linalg.norm(across, axis=2), axis=0)[0, :, None] > 0
+    one = np.where(shorter, np.stack([a, p, q], 1), np.stack([a, p, c], 1))
+    other = np.where(shorter, np.stack([a, q, c], 1), np.stack([p, q, c], 1))
+    return [corner, one, other]
+
+
+ROUNDS = 12
+"""Maximum rounds of independent flips."""
+
+FINE = np.cos(np.radians(10))
+"""Cosine between the normals of a triangle and of the field down to which a flip may reduce it."""
+
+STEEP, BETTER = np.cos(np.radians(29)), 0.02
+"""Triangles with a smaller cosine than `STEEP` are flipped only if the smaller of both cosines grows by more
+than `BETTER`.
+"""
+
+OBTUSE = 1e-6
+"""An edge is flipped if the sine of the sum of its opposite angles is below the negative of this."""
+
+
+class Flips(NamedTuple):
+    """Candidate flips."""
+
+    old: NDArray[np.int64]  # the two triangles at each edge
+    new: NDArray[np.int32]  # corners of the triangles that replace them
+    ends: NDArray[np.int32]  # end points of the new edge, ascending
+
+    def some(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Flips:
+        """Select flips.
+
+        `which`: bool (k,).
+        """
+        return Flips(self.old[which], self.new[which], self.ends[which])
+
+
+def flip(state: Fitted, due: NDArray[np.bool_]) -> tuple[Fitted, NDArray[np.bool_]]:
+    """Flip edges whose opposite angles sum up to more than 180 degrees.
+
+    An edge stays if the flip would increase the angle between a triangle's normal and the field's, for
+    example at a sharp edge, or the distance from the surface.
+
+    `due`: bool (m,). Returns bool (m,).
+    """
+    triangles, measured = state.mesh.triangles.copy(), state.measured.copy()
+    mesh = Mesh(state.mesh.vertices, triangles)
+    changed = np.zeros(len(measured), bool)
+    for _ in range(ROUNDS):
+        flips, worth = _candidates(mesh, due, measured[:, UPRIGHT] < STEEP)
+        flips = flips.some(_independent(flips, worth, len(measured)))
+        if not len(flips.old):
+            break
+        before = measured[flips.old]
+        after = state.fit.triangles(mesh.vertices[flips.new].reshape(-1, 3, 3)).reshape(
+            -1, 2, before.shape[2]
+        )
+        was, now = before[..., UPRIGHT].min(axis=1), after[..., UPRIGHT].min(axis=1)
+        good = np.where(was < STEEP, now > was + BETTER, now >= np.minimum(was, FINE))
+        good &= after[..., OFF].max(axis=1) <= np.maximum(before[..., OFF].max(axis=1), state.fit.reach)
+        flips = flips.some(good)
+        triangles[flips.old], measured[flips.old] = flips.new, after[good]
+        due = np.zeros(len(measured), bool)
+        changed[flips.old] = due[flips.old] = True
+    return Fitted(mesh, state.fit, measured), changed
+
+
+def _candidates(
+    mesh: Mesh, due: NDArray[np.bool_], steep: NDArray[np.bool_]
+) -> tuple[Flips, NDArray[np.float64]]:
+    """Candidate flips at due triangles and their worth: edges with too large opposite angles, and edges of
+    steep triangles. A smaller worth is better.
+    """
+    near = np.zeros(len(mesh.vertices), bool)
+    near[mesh.triangles[due]] = True
+    some = np.flatnonzero(near[mesh.triangles].any(axis=1))
+    edges = edges_of(mesh.triangles[some])
+    order = np.argsort(edges.sides.ravel(), kind="stable")
+    at = edges.sides.ravel()[order]
+    first = np.flatnonzero(at[1:] == at[:-1])
+    half = np.stack([order[first], order[first + 1]], axis=1)
+    old = some[half // 3]
+    half = half[due[old].any(axis=1)]
+    old, side = some[half // 3], half % 3
+    a, b, c = (mesh.triangles[old[:, 0], (side[:, 0] + k) % 3] for k in range(3))
+    d = mesh.triangles[old[:, 1], (side[:, 1] + 2) % 3]
+    worth = _sine_of_sum(mesh.vertices, a, b, c, d)
+    new = np.stack([np.stack([a, d, c], axis=1), np.stack([d, b, c], axis=1)], axis=1)
+    ends = np.sort(np.stack([c, d], axis=1), axis=1)
+    worth = np.where(steep[old].any(axis=1), worth - 2, worth)
+    kept = np.flatnonzero((worth < -OBTUSE) & (c != d))
+    kept = kept[~np.isin(ends[kept].astype(np.int64) @ [1 << 32, 1], edges.keys)]
+    return Flips(old, new, ends).some(kept), worth[kept]
+
+
+def _sine_of_sum(p: NDArray[np.float64], a, b, c, d) -> NDArray[np.float64]:  # type: ignore[no-untyped-def]
+    """Sine of the sum of the angles at c and d, opposite to the edge (a, b)."""
+    parts = []
+    for tip in (c, d):
+        u, v = p[a] - p[tip], p[b] - p[tip]
+        size = np.maximum(np.linalg.norm(u, axis=1) * np.linalg.norm(v, axis=1), 1e-300)
+        parts.append(((u * v).sum(axis=1) / size, np.linalg.norm(np.cross(u, v), axis=1) / size))
+    (cos_c, sin_c), (cos_d, sin_d) = parts
+    result: NDArray[np.float64] = sin_c * cos_d + cos_c * sin_d
+    return result
+
+
+def _independent(flips: Flips, worth: NDArray[np.float64], count: int) -> NDArray[np.int64]:
+    """Independent flips: the best one of each triangle, with no triangle or new edge in common."""
+    order = np.argsort(worth, kind="stable")
+    rank = np.empty(len(order), np.int64)
+    rank[order] = np.arange(len(order))
+    best = np.full(count, len(order), np.int64)
+    np.minimum.at(best, flips.old.ravel(), np.repeat(rank, 2))
+    own = np.flatnonzero((best[flips.old] == rank[:, None]).all(axis=1))
+    _, first = np.unique(flips.ends[own].astype(np.int64) @ [1 << 32, 1], return_index=True)
+    return own[np.sort(first)]
+
 
 PASSES = 12
 AIM = 0.9
@@ -31,7 +342,7 @@ than a voxel the fraction decreases. Refinement would not follow a rough edge.
 WORTH = 10
 """Refinement stops when fewer than one edge is split per this many triangles out of tolerance."""
 
-UPRIGHT = np.cos(np.radians(29))
+UPRIGHT_COSINE = np.cos(np.radians(29))
 """Minimum cosine between the normals of a new triangle and of the field."""
 
 CREASED = 0.9
@@ -40,24 +351,14 @@ CREASED = 0.9
 
 @dataclass(frozen=True)
 class Refined:
-    """Result of a refinement.
+    """Result of a refinement."""
 
-    Attributes
-    ----------
-    chord_mm : float
-        Maximum distance of a triangle from the surface.
-    from_triangles : int
-        Triangles before the refinement.
-    off_mm : float
-        Estimate of the greatest distance, from samples of the triangles a quarter of a side apart.
-    left : int
-        Triangles with a sample out of tolerance: in rough places, or where smaller triangles would turn over
-        or intersect.
-    """
-
-    chord_mm: float
-    from_triangles: int
+    chord_mm: float  # maximum distance of a triangle from the surface
+    from_triangles: int  # triangles before the refinement
+    # estimate of the greatest distance, from samples of the triangles a quarter of a side apart
     off_mm: float
+    # triangles with a sample out of tolerance: in rough places, or where smaller triangles would turn over or
+    # intersect
     left: int
 
     @property
@@ -68,18 +369,7 @@ class Refined:
         return (far,) if self.left else ()
 
     def scaled(self, scale: float) -> Refined:
-        """Convert the lengths to other units.
-
-        Parameters
-        ----------
-        scale : float
-            New units per old unit.
-
-        Returns
-        -------
-        Refined
-            Converted result.
-        """
+        """Convert the lengths to other units."""
         return replace(self, chord_mm=scale * self.chord_mm, off_mm=scale * self.off_mm)
 
 
@@ -92,30 +382,7 @@ def refine(
     flipped to improve the normals of triangles. Old vertices do not move. The surface stays closed and free
     of self-intersections: a split that would cause one is refused.
 
-    Parameters
-    ----------
-    root : Field
-        Field of the scene.
-    mesh : Mesh
-        Closed mesh with vertices on the zero set of the field, scene units.
-    chord : float
-        Maximum distance, scene units.
-    voxel : float
-        Voxel, scene units.
-    work : Work, optional
-        Threads, progress and cancellation.
-
-    Returns
-    -------
-    Mesh
-        Refined mesh, scene units.
-    Refined
-        Result, with lengths in scene units.
-
-    Raises
-    ------
-    Cancelled
-        If the work is cancelled.
+    `mesh`, `chord`, `voxel` in scene units. Returns `Mesh` in scene units; with lengths in scene units.
     """
     work, count = work or Work(), len(mesh.triangles)
     state = Fitted.of(mesh, Fit(root, AIM * chord, voxel, work))
@@ -123,11 +390,11 @@ def refine(
     for number in range(PASSES):
         work.progress("refining", number / PASSES)
         edges = edges_of(state.mesh.triangles)
-        free = ~np.isin(edges.keys, np.concatenate([latest, _repeated(refused)]))
-        split, there = _wanted(root, state, edges, free, voxel, work)
+        free = ~np.isin(edges.keys, np.concatenate([latest, _repeated_values(refused)]))
+        split, there = _edges_to_split(root, state, edges, free, voxel, work)
         if not split.any():
             break
-        state, left = _split(state, edges, split, there, work)
+        state, left = _split_and_flip(state, edges, split, there, work)
         latest = edges.keys[left]
         refused = np.concatenate([refused, latest])
         if (split.sum() - len(latest)) * WORTH < np.count_nonzero(state.off > state.fit.reach):
@@ -136,13 +403,13 @@ def refine(
     return state.mesh, Refined(chord, count, float(state.off.max()) / AIM, int(far))
 
 
-def _repeated(keys: NDArray[np.int64]) -> NDArray[np.int64]:
+def _repeated_values(keys: NDArray[np.int64]) -> NDArray[np.int64]:
     """Values that occur more than once."""
     result, counts = np.unique(keys, return_counts=True)
     return result[counts > 1]
 
 
-def _wanted(
+def _edges_to_split(
     root: Field, state: Fitted, edges: Edges, free: NDArray[np.bool_], voxel: float, work: Work
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
     """Edges to split, bool [e], and the new vertices: edges out of tolerance, or the longest edges of
@@ -154,7 +421,7 @@ def _wanted(
     np.maximum.at(off, sides, state.sides)
     far = np.flatnonzero(free & (off > state.fit.reach))
     there = ends.mean(axis=1)
-    points, creased = _creased(state, edges, far)
+    points, creased = _crease_points(state, edges, far)
     there[far[creased]] = points[creased]
     rough = ROUGH * lengths * np.minimum(1, np.sqrt(lengths / voxel))
     rough[far[creased]] = np.inf
@@ -169,7 +436,7 @@ def _wanted(
     return split, chosen
 
 
-def _creased(
+def _crease_points(
     state: Fitted, edges: Edges, which: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Points on the sharp edges across or along some mesh edges, [k, 3], and whether there is a sharp edge,
@@ -194,7 +461,7 @@ def _creased(
     return points, creased
 
 
-def _split(
+def _split_and_flip(
     state: Fitted, edges: Edges, split: NDArray[np.bool_], there: NDArray[np.float64], work: Work
 ) -> tuple[Fitted, NDArray[np.int64]]:
     """Split edges, then flip edges of the new triangles.
@@ -208,24 +475,24 @@ def _split(
         work.check()
         now = np.zeros(len(split), bool)
         now[chosen[keep]] = True
-        mesh, parents = cut(old, edges.sides, now, there[keep])
+        mesh, parents = split_edges(old, edges.sides, now, there[keep])
         cut_up = np.asarray(now[edges.sides]).any(axis=1)
         fresh = np.take(cut_up, parents)
         result, flipped = flip(state.become(mesh, parents, fresh), fresh)
-        blamed = _blamed(result, fresh | flipped, len(old.vertices), work)
+        blamed = _folding_vertices(result, fresh | flipped, len(old.vertices), work)
         if not blamed.any():
             return result, chosen[~keep]
         keep[np.flatnonzero(keep)[blamed]] = False
     return state, chosen
 
 
-def _blamed(state: Fitted, fresh: NDArray[np.bool_], first: int, work: Work) -> NDArray[np.bool_]:
+def _folding_vertices(state: Fitted, fresh: NDArray[np.bool_], first: int, work: Work) -> NDArray[np.bool_]:
     """New vertices, from index `first` on, at or next to triangles that turn away from the surface or
     intersect others.
     """
     mesh = state.mesh
     crossing = self_intersecting_triangles(mesh, threads=work.threads, among=fresh)
-    away = fresh & (state.upright < UPRIGHT) & (mesh.triangles >= first).any(axis=1)
+    away = fresh & (state.upright < UPRIGHT_COSINE) & (mesh.triangles >= first).any(axis=1)
     marked = np.zeros(len(mesh.vertices), bool)
     marked[mesh.triangles[crossing]] = True
     if crossing.any() and not marked[first:].any():

@@ -17,18 +17,16 @@ from numpy.typing import NDArray
 
 from .._native import connected_components
 from ..volume import Plan
-from ..volume.evaluation import values_at
+from ..volume.lattice import values_at
 from ..work import Work
-from .caps import Cap, capped, heights, spans
 from .contouring import BLUNT, Piece
-from .creases import on_creases, on_three
 from .fit import OFF, UPRIGHT, Fit
 from .model import Mesh
 from .pieces import Pieces, rows
-from .quantisation import quantise, used
-from .self_intersections import self_intersecting_triangles
-from .subdivision import Edges, cut, edges_of
-from .tip_triangles import tips_to_end
+from .quantisation import quantise, used_vertices
+from .refine import Edges, edges_of, on_creases, on_three, split_edges
+from .spatial import self_intersecting_triangles
+from .tips import Cap, heights, replace_by_fans, spans, tips_to_end
 from .topology import component_sizes
 
 APART = 5e-5
@@ -89,30 +87,8 @@ def with_ridges(
     surface, for example of a fractal, is not changed, nor one of more than `LARGE` triangles. The new
     triangles are the last ones of their pieces; pieces that they span are joined.
 
-    Parameters
-    ----------
-    planned : Plan
-        Sampled field.
-    pieces : Pieces
-        Pieces of a closed, oriented 2-manifold with vertices on the zero set of the field, scene units.
-    blunt : ndarray of float64, shape (n, 3)
-        Middles of its blunt cells.
-    tips : ndarray of float64, shape (k, 3)
-        Tips that were added to it; their triangles are the last ones.
-    work : Work
-        Threads and cancellation.
-
-    Returns
-    -------
-    Pieces
-        The surface with sharp edges.
-    ndarray of float64, shape (j, 3)
-        The tips, then the new vertices, scene units.
-
-    Raises
-    ------
-    Cancelled
-        If the work is cancelled.
+    `pieces` in scene units; `blunt`: float64 (n, 3); `tips`: float64 (k, 3). Returns float64 (j, 3), scene
+    units.
     """
     if not 0 < len(blunt) <= BLUNT or pieces.triangles > LARGE:
         return pieces, tips
@@ -132,7 +108,7 @@ def with_ridges(
     for first, last in spans(caps, pieces, near):
         part, start = pieces.together(first, last, near), pieces.starts[first]
         own = [Cap(c.old - start, c.fan) for c in caps if 0 <= c.old[0] - start < len(part.triangles)]
-        part, _, fresh = tips_to_end(capped(part, own) if own else part, points)
+        part, _, fresh = tips_to_end(replace_by_fans(part, own) if own else part, points)
         result.add(Piece(part, pieces.ends[last - 1]), fresh)
     return result, points
 
@@ -262,21 +238,12 @@ class _Missed:
 
 @dataclass(frozen=True, eq=False)
 class _Sharpened:
-    """A remeshed part of a surface.
+    """A remeshed part of a surface."""
 
-    Attributes
-    ----------
-    old, mesh : Mesh
-        The part before and after; the first vertices are the same.
-    parents : ndarray of int64, shape (m,)
-        Triangle of `old` that each one is; -1 for new ones.
-    measured : ndarray of float64, shape (m, 8)
-        Measures of the new triangles; of others, their own normals and no distance.
-    """
-
-    old: Mesh
+    old: Mesh  # the part before and after; the first vertices are the same
     mesh: Mesh
-    parents: NDArray[np.int64]
+    parents: NDArray[np.int64]  # triangle of `old` that each one is; -1 for new ones
+    # measures of the new triangles; of others, their own normals and no distance
     measured: NDArray[np.float64]
 
     @classmethod
@@ -334,27 +301,13 @@ class _Sharpened:
 
 @dataclass(frozen=True, eq=False)
 class _Cornered:
-    """A part of a surface with some corners.
+    """A part of a surface with some corners."""
 
-    Attributes
-    ----------
-    corners : ndarray of int64, shape (k,)
-        Numbers of the corners, which are the last vertices.
-    mesh : Mesh
-        The part.
-    parents : ndarray of int64, shape (m,)
-        Triangle that each one was; -1 for new ones.
-    edges : Edges
-        Its edges.
-    missed : _Points
-        Points of sharp edges that it lacks, for edges with two triangles.
-    """
-
-    corners: NDArray[np.int64]
-    mesh: Mesh
-    parents: NDArray[np.int64]
-    edges: Edges
-    missed: _Points
+    corners: NDArray[np.int64]  # numbers of the corners, which are the last vertices
+    mesh: Mesh  # the part
+    parents: NDArray[np.int64]  # triangle that each one was; -1 for new ones
+    edges: Edges  # its edges
+    missed: _Points  # points of sharp edges that it lacks, for edges with two triangles
 
 
 class _Sharpening:
@@ -415,7 +368,7 @@ class _Sharpening:
         split = np.zeros(len(edges.ends), bool)
         split[given.missed.edges[splits]] = True
         whole = ~split[edges.sides].any(axis=1)
-        mesh, origin = cut(mesh, edges.sides, split, points)
+        mesh, origin = split_edges(mesh, edges.sides, split, points)
         parents = np.where(whole, given.parents, -1)[origin]
         state = _Sharpened.plain(self._mesh, mesh, parents).measured_at(
             np.flatnonzero(parents < 0), self._fit
@@ -433,7 +386,7 @@ class _Sharpening:
     def _wrong(self, state: _Sharpened) -> NDArray[np.int64]:
         """New triangles that are turned over or too thin, or intersect others after quantisation."""
         mesh = state.mesh
-        as_written = quantise(mesh, used(mesh), threads=self._work.threads).mesh
+        as_written = quantise(mesh, used_vertices(mesh), threads=self._work.threads).mesh
         new = state.parents < 0
         crossing = self_intersecting_triangles(as_written, threads=self._work.threads, among=new)
         return np.union1d(state.bad(self._voxel, 0.0), np.flatnonzero(crossing))

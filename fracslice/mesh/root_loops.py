@@ -1,4 +1,4 @@
-"""Loops over a compiled field that find roots on segments.
+"""Loops over a compiled field that find roots on segments, for lanes of a CPU and threads of a GPU.
 
 P holds the parameters of the scene. X, Y and Z hold n points, scene units, or the starts of n segments; then
 DX, DY and DZ hold the vectors to their ends. n is a multiple of WIDTH.
@@ -12,8 +12,7 @@ segment.
 from __future__ import annotations
 
 from ..formulas.vocabulary import absolute, any_of, maximum, minimum, rsqrt, where
-from ..kernel.intrinsics import WIDTH, field, load, store
-from ..kernel.loops import loop
+from ..kernel.loops import WIDTH, field, kernel, load, loop, real, store, thread
 
 STEPS = 48
 """Largest number of steps to a root."""
@@ -27,11 +26,7 @@ def find(P, FRAME, X, Y, Z, DX, DY, DZ, T, n):
     two points on one side. If it leaves the bracket, the bracket is halved; after many steps every other step
     halves it too.
 
-    Parameters
-    ----------
-    T
-        Receives the roots as fractions of the segments, [n]. If both ends have the same sign, the end nearer
-        to zero.
+    `T`: [n].
     """
     over, small, near, close = FRAME[0], FRAME[1], FRAME[2], FRAME[5]
     for i in range(0, n, WIDTH):
@@ -76,14 +71,7 @@ def find(P, FRAME, X, Y, Z, DX, DY, DZ, T, n):
 def polish(P, FRAME, X, Y, Z, DX, DY, DZ, T, NX, NY, NZ, MISS, n):
     """Take one Newton step along each of n segments.
 
-    Parameters
-    ----------
-    T
-        Roots as fractions of the segments, [n]; modified in place.
-    NX, NY, NZ
-        Receive the unit normals where the steps started, [n] each.
-    MISS
-        Receives the lengths of the steps as fractions of the segments, [n].
+    `T`: [n]; `NX`, `NY`, `NZ`: [n] each; `MISS`: [n].
     """
     e = FRAME[3]
     for i in range(0, n, WIDTH):
@@ -112,12 +100,7 @@ def polish(P, FRAME, X, Y, Z, DX, DY, DZ, T, NX, NY, NZ, MISS, n):
 def aim(P, FRAME, X, Y, Z, DX, DY, DZ, T, MISS, n):
     """Take one Newton step along each of n segments if it comes nearer to zero.
 
-    Parameters
-    ----------
-    T
-        Roots as fractions of the segments, [n]; modified in place.
-    MISS
-        Receives |f| at the new roots in voxels, [n].
+    `T`: [n]; `MISS`: receives |f| at the new roots in voxels, [n].
     """
     over = FRAME[0]
     for i in range(0, n, WIDTH):
@@ -152,16 +135,8 @@ def lead(P, FRAME, X, Y, Z, LX, LY, LZ, HX, HY, HZ, OX, OY, OZ, MX, MY, MZ, DX, 
     planes that met in the point then belong to a bend that is rounder, or folded finer, than they indicate.
     The vector is then M, if the surface lies between.
 
-    Parameters
-    ----------
-    LX, LY, LZ, HX, HY, HZ
-        Distances to the lower and upper sides of the trust regions, [n] each, scene units.
-    OX, OY, OZ
-        Vectors to points of opposite sign, [n] each, scene units, or NaN.
-    MX, MY, MZ
-        Vectors to the middle of the known part of the surface, [n] each, scene units, or NaN.
-    DX, DY, DZ
-        Receive the vectors, [n] each, scene units.
+    `LX`, `LY`, `LZ`, `HX`, `HY`, `HZ`, `OX`, `OY`, `OZ`, `MX`, `MY`, `MZ`, `DX`, `DY`, `DZ`: [n] each, scene
+    units.
     """
     e, tight = FRAME[3], FRAME[4]
     for i in range(0, n, WIDTH):
@@ -212,3 +187,52 @@ def lead(P, FRAME, X, Y, Z, LX, LY, LZ, HX, HY, HZ, OX, OY, OZ, MX, MY, MZ, DX, 
         store(DX, i, where(between, mx, gx))
         store(DY, i, where(between, my, gy))
         store(DZ, i, where(between, mz, gz))
+
+
+@kernel
+def lay(E, ox, oy, oz, h, R, S, n):
+    """Lay grid edges out as segments.
+
+    `E`: int16 (n or more, 4); `ox`, `oy`, `oz`, `h` in scene units; `R`, `S`: float32 (6, n or more); `n`:
+    number of edges.
+    """
+    i = thread()
+    if i < n:
+        R[0, i] = ox + h * real(E[i, 0])
+        R[1, i] = oy + h * real(E[i, 1])
+        R[2, i] = oz + h * real(E[i, 2])
+        for k in range(3):
+            R[3 + k, i] = h if E[i, 3] == k else real(0)
+        for k in range(6):
+            S[k, i] = R[k, i]
+
+
+@kernel
+def start(U, T, n):
+    """Start `polish` from the roots of `find`.
+
+    `U`: roots of `find`; `T`: receives them; `n`: number of segments.
+    """
+    i = thread()
+    if i < n:
+        T[i] = U[i]
+
+
+@kernel
+def collect(U, T, D, sure, N, F, n):
+    """Collect results of `polish`; where a root is not exact, that of `find` stays.
+
+    `U`: roots of `find`; `T`: roots of `polish`, modified in place; `D`: float64 (4, n or more); `N`:
+    float32 (3, n or more); `F`: receives 1 for roots that are not exact, else 0; `n`: number of segments.
+    """
+    i = thread()
+    if i < n:
+        for k in range(3):
+            N[k, i] = D[k, i]
+        F[i] = 0
+        if not D[3, i] <= sure:
+            F[i] = 1
+            T[i] = U[i]
+
+
+LOOPS = lay, start, collect

@@ -34,31 +34,7 @@ class Roots:
 
     Segments are float [6, n] of that precision; n is a multiple of `width`.
 
-    Parameters
-    ----------
-    root
-        Field.
-    precision
-        "float32" or "float64".
-    voxel
-        Voxel size, scene units.
-    device
-        "cpu" or "cuda".
-
-    Attributes
-    ----------
-    frame
-        FRAME of the loops.
-    dtype
-        Floating-point type.
-    width
-        Lanes.
-    batch
-        Segments per call that amortise its overhead.
-    runs
-        Compiled loops by name.
-    on_gpu
-        Whether they can be launched on arrays in GPU memory.
+    `precision`: "float32" or "float64"; `voxel` in scene units.
     """
 
     def __init__(self, root: Field, precision: Precision, voxel: float, device: Device = "cpu") -> None:
@@ -70,11 +46,5 @@ class Roots:
         self.width, self.batch, self.runs, self.on_gpu = loops.width, loops.batch, loops.runs, loops.on_gpu
 
     def native(self, name: str) -> tuple[Any, ...] | Callable[..., None]:
-        """Return a loop for native code.
-
-        Returns
-        -------
-        tuple or Callable
-            Machine code and its constant arguments, or a Python function.
-        """
+        """Return a loop for native code."""
         return self.runs[name].native(self.frame)

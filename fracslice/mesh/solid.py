@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..common.extras import lacking
+from ..common.messages import lacking
 from ..errors import MeshError
 from .model import Mesh
 
@@ -22,18 +22,7 @@ _REASONS = {
 
 
 def to_manifold(mesh: Mesh) -> Manifold:
-    """Convert a mesh to a manifold3d solid, in double precision, without repair.
-
-    Returns
-    -------
-    manifold3d.Manifold
-        The solid.
-
-    Raises
-    ------
-    MeshError
-        If manifold3d is not installed or refuses the mesh, or the mesh has no triangles.
-    """
+    """Convert a mesh to a manifold3d solid, in double precision, without repair."""
     if reason := lacking("manifold3d", "solids need"):
         raise MeshError(reason)
     import manifold3d

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..common.arrays import from_linear, to_linear
 from ..common.compiled import compiled
-from ..common.srgb import from_linear, to_linear
 
 if TYPE_CHECKING:
     from .model import Mesh
@@ -33,27 +33,16 @@ LIGHT = np.array([-0.48, 0.62, 0.62])
 
 
 def thumbnail(mesh: Mesh) -> bytes:
-    """Draw a mesh in its colours, or in clay, on a transparent background.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        A mesh with triangles.
-
-    Returns
-    -------
-    bytes
-        A PNG file.
-    """
+    """Draw a mesh in its colours, or in clay, on a transparent background."""
     from PIL import Image
 
     file = io.BytesIO()
-    drawn = Image.fromarray(_drawn(mesh, WIDTH * FINER, HEIGHT * FINER))
+    drawn = Image.fromarray(_render_small(mesh, WIDTH * FINER, HEIGHT * FINER))
     drawn.resize((WIDTH, HEIGHT), Image.Resampling.BOX).save(file, "PNG")
     return file.getvalue()
 
 
-def _drawn(mesh: Mesh, width: int, height: int) -> np.ndarray:
+def _render_small(mesh: Mesh, width: int, height: int) -> np.ndarray:
     """The picture with one sample per pixel, uint8 [height, width, 4]."""
     seen = mesh.vertices @ AXES.T
     low, high = seen.min(0), seen.max(0)

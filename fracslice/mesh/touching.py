@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from .._native import near_bodies
 from ..kernel.depth import WIDE
 from ..meshjob import JOINING
-from .whole_shells import WholeShells
+from .shells import WholeShells
 
 REACH = 2
 """Edge length of the cubes in which bodies meet, voxels."""
@@ -22,16 +22,7 @@ class NearBodies:
     Vertices are sorted into the cubes of two lattices; bodies with vertices in one cube are near. Bodies that
     are nearer than half the reach share one, but for a few.
 
-    Parameters
-    ----------
-    shells : WholeShells
-        Shells of the surface.
-    stays : ndarray of bool, shape (s,)
-        Shells that stay.
-    voxel : float
-        Voxel, in the units of the shells.
-    threads : int, optional
-        Threads; 0 for all cores.
+    `stays`: bool (s,).
     """
 
     def __init__(self, shells: WholeShells, stays: NDArray[np.bool_], voxel: float, threads: int = 0) -> None:
@@ -58,24 +49,14 @@ class NearBodies:
     def include(self, bodies: NDArray[np.int64]) -> None:
         """Add near bodies that another process searched.
 
-        Parameters
-        ----------
-        bodies : ndarray of int64, shape (k,)
-            Their shells.
+        `bodies`: int64 (k,).
         """
         self._near[bodies] = True
 
     def add(self, points: NDArray[np.float64], labels: NDArray[np.int32], end: float) -> None:
         """Add the next piece.
 
-        Parameters
-        ----------
-        points : ndarray of float64, shape (n, 3)
-            Vertices of the piece.
-        labels : ndarray of int32, shape (n,)
-            Their labels.
-        end : float
-            x at which the piece ends; infinite for the last one.
+        `points`: float64 (n, 3); `labels`: int32 (n,).
         """
         if not self._several:
             return
@@ -96,21 +77,7 @@ class NearBodies:
 def touching_note(near: int, voxel: float, settings: Sequence[str], off: Sequence[str]) -> tuple[str, ...]:
     """Describe the bodies that touch at points or edges only, and the options that help.
 
-    Parameters
-    ----------
-    near : int
-        Number of these bodies.
-    voxel : float
-        Voxel size, mm.
-    settings : sequence of str
-        Changes of the scene, such as "flake.level=3", whose bodies are several voxels wide.
-    off : sequence of str
-        Note on missing volume, if any.
-
-    Returns
-    -------
-    tuple of str
-        One note, which ends with `off`, or `off` if no body is near another.
+    `voxel` in mm; `settings`: whose bodies are several voxels wide.
     """
     if not near:
         return tuple(off)

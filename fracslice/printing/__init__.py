@@ -22,7 +22,7 @@ def printable(planned: Plan, size: Sizing, how: Print, work: Work | None = None)
     Parameters
     ----------
     planned : Plan
-        The scene, around the bodies that stay; see `framed`.
+        The scene, around the bodies that stay; see `frame_bodies`.
     size : Sizing
         Size of that, before anything is cut off or added.
     how : Print
@@ -47,6 +47,6 @@ def printable(planned: Plan, size: Sizing, how: Print, work: Work | None = None)
     scale = size.scale(planned.box)
     if how == Print():
         return planned, scale
-    from .make import edited  # most objects are printed as they are
+    from .preparation import apply_print_edits  # most objects are printed as they are
 
-    return edited(planned, size, how, scale, work or Work()), scale
+    return apply_print_edits(planned, size, how, scale, work or Work()), scale

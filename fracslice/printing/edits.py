@@ -8,12 +8,12 @@ from typing import Literal
 
 import numpy as np
 
-from ..common.keys import key
+from ..common.cache import key
 from ..formulas import difference, intersection, union
 from ..formulas.box import Box
 from ..formulas.field import Bounds, Cells, Device, Precision
 from ..kernel import Field, Kernel
-from ..kernel.arrays import ArrayField
+from ..kernel.tree import ArrayField
 
 Does = Literal["cut", "add", "keep"]
 _FOLDED = {"cut": difference, "add": union, "keep": intersection}
@@ -21,21 +21,11 @@ _FOLDED = {"cut": difference, "add": union, "keep": intersection}
 
 @dataclass(frozen=True, eq=False)
 class EditedField(ArrayField):
-    """A field changed by another field.
+    """A field changed by another field."""
 
-    Attributes
-    ----------
-    root : Field
-        The field to change.
-    does : {"cut", "add", "keep"}
-        Subtract the other field's inside, add it, or intersect with it.
-    shape : Field
-        The other field.
-    """
-
-    root: Field
-    does: Does
-    shape: Field
+    root: Field  # the field to change
+    does: Does  # subtract the other field's inside, add it, or intersect with it
+    shape: Field  # the other field
 
     @cached_property
     def bounds(self) -> Bounds:
@@ -107,22 +97,7 @@ class _Composite(Kernel):
 
 
 def edited_field(root: Field, does: Does, shape: Field) -> Field:
-    """Apply an edit to a field.
-
-    Parameters
-    ----------
-    root : Field
-        The field to change.
-    does : {"cut", "add", "keep"}
-        As of `EditedField`.
-    shape : Field
-        The field that changes it.
-
-    Returns
-    -------
-    Field
-        A formula tree if both are formula trees, an `EditedField` otherwise.
-    """
+    """Apply an edit to a field."""
     if root.tree and shape.tree:
         return _FOLDED[does](root.tree, shape.tree)
     return EditedField(root, does, shape)

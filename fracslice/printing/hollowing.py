@@ -10,8 +10,8 @@ from ..formulas import Box, Node, cylinder, transform, union
 from ..kernel import Field
 from ..volume import Bricks, Drain
 from ..volume.grid import from_grid, to_grid
+from .components import components_of
 from .samples import Samples, positions
-from .solid_components import components_of
 
 POCKET = 0.1
 """Fraction of the largest hollow's volume below which another hollow stays solid instead of being drained."""
@@ -22,23 +22,7 @@ def hollows(solid: Bricks, wall: float, drain: float, outer: Box) -> tuple[list[
 
     With drain holes, hollows under `POCKET` of the largest stay solid.
 
-    Parameters
-    ----------
-    solid : Bricks
-        Samples of the object.
-    wall : float
-        Thickness of the walls, scene units.
-    drain : float
-        Diameter of the holes, scene units; 0 for none.
-    outer : Box
-        Conservative bounds of the object, scene units.
-
-    Returns
-    -------
-    list of Field
-        Fields to cut, in order; empty if the walls leave nothing to hollow out.
-    tuple of Drain
-        The drain holes.
+    `wall`, `drain`, `outer` in scene units.
     """
     inner = from_grid(to_grid(solid).redistance().offset(-wall))
     components = components_of(inner)

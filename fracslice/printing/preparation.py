@@ -1,24 +1,33 @@
-"""An object during the edits that make it printable, and its samples."""
+"""Preparation for printing: thickness, bridges, base and raft, each measured on samples of the previous
+result.
+
+Distances come from the field where its values are distances, else from its samples by fast sweeping (Zhao
+2004): a millimetre is a millimetre for any formula.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import VolumeError
+from ..formulas import Box, box, plane, transform
 from ..kernel import Field
-from ..meshjob import DUST
+from ..meshjob import DUST, PIECES
 from ..scene import Print
-from ..volume import Bricks, Plan, extent
+from ..volume import Bricks, Plan, extent, sample_scene
 from ..volume.sizing import Sizing
 from ..work import Work
+from .edits import edited_field
+
+if TYPE_CHECKING:
+    from .components import SolidComponents
+    from .samples import Samples
 
 # Measuring needs Numba and SciPy, whose import takes as long as a small mesh: import where needed.
-if TYPE_CHECKING:
-    from .samples import Samples
-    from .solid_components import SolidComponents
 
 COARSE, FINE = 128, 640
 """Minimum and maximum number of samples along the longest side for measuring lengths."""
@@ -77,20 +86,22 @@ class Preparation:
                 f"a length of {length:g} mm is too small for an object of {self.size:g} mm: "
                 f"expected at least {least:.3g} mm, or 0"
             )
-        from .connectivity import sampled_object
+        from .thin_features import sampled_object
 
         return sampled_object(self.root, self.planned.outer, max(self.planned.box.size), samples, self.work)
 
     def connected(self) -> SolidComponents:
         """Components of samples that resolve connectivity; shared by cavities, bodies and bridges."""
-        from .connectivity import resolved
-        from .solid_components import components_of
+        from .components import components_of
+        from .thin_features import resolve_connectivity
 
         if self.known is None:
             coarse = self.sampled()
             components = components_of(coarse)
             unit = max(self.planned.box.size) / self.size
-            bricks = resolved(self.root, coarse, THIN * unit**2, len(large_bodies(components)) > 1, self.work)
+            bricks = resolve_connectivity(
+                self.root, coarse, THIN * unit**2, len(large_bodies(components)) > 1, self.work
+            )
             self.known = components if bricks is coarse else components_of(bricks)
         return self.known
 
@@ -104,15 +115,231 @@ class Preparation:
 def large_bodies(components: SolidComponents) -> np.ndarray:
     """Bodies that are not dust.
 
-    Parameters
-    ----------
-    components : SolidComponents
-        Connected components of a sampled solid.
-
-    Returns
-    -------
-    int64 [k]
-        Their numbers, the largest first.
+    Returns int64 [k].
     """
     bodies = components.bodies
     return np.asarray(bodies[components.count[bodies] > DUST * components.count[components.inside].sum()])
+
+
+def standing(made: Plan, how: Print, scale: float, work: Work) -> Plan:
+    """Cut off the base and add the raft.
+
+    The raft extends a tenth of the longest side beyond the object, and half its height into it.
+
+    `how` in mm; `scale`: mm per scene unit.
+    """
+    root, extents, outer = made.root, made.box, made.outer
+    (x0, y0, z0), (x1, y1, z1) = extents.lo, extents.hi
+    base, raft = how.base / scale, how.raft / scale
+    if 0 < raft < made.voxel:
+        raise VolumeError(
+            f"a raft of {how.raft:g} mm: expected at least a voxel, {made.voxel * scale:.4g} mm"
+        )
+    if base:
+        z0 += base
+        if z0 >= z1:
+            raise VolumeError(f"a base of {base * scale:g} mm leaves nothing of the object")
+        root = edited_field(root, "keep", plane(normal=(0, 0, -1), offset=-z0))
+        left = extent(root, work).box  # the widest part may be cut off
+        (x0, y0, _), (x1, y1, _) = left.lo, left.hi
+        extents = Box((x0, y0, z0), (x1, y1, z1))
+    if raft:
+        rim = max(extents.size) / 10
+        lying = Box((x0 - rim, y0 - rim, z0 - raft / 2), (x1 + rim, y1 + rim, z0 + raft / 2))
+        root = edited_field(root, "add", transform(box(size=lying.size), translate=lying.centre))
+        extents, outer = extents | lying, (outer | lying).about(outer.centre)
+    return replace(made, root=root, box=extents, outer=outer)
+
+
+# Measuring needs Numba and SciPy, whose import takes as long as a small mesh: import where needed.
+
+REPEATS = 4
+"""Maximum number of times that fragments are joined."""
+
+
+def apply_print_edits(planned: Plan, size: Sizing, how: Print, scale: float, work: Work) -> Plan:
+    """Make the changes of a `Print`; see `fracslice.printing.printable`."""
+    for name in ("bridge", "gap", "thickness", "hollow", "drain", "base", "raft"):
+        if (length := getattr(how, name)) > size.longest and (name != "drain" or how.hollow):
+            raise VolumeError(
+                f"{name} {length:g} mm: expected at most the object's size, {size.longest:g} mm"
+            )
+    job = _Edits(planned, size, how, work, scale)
+    for stage, change in job.changes():
+        job.work.check()
+        job.work.progress(stage, 0.0)
+        job.put(change())
+        job.work.progress(stage, 1.0)
+    return standing(job.planned, how, job.scale, job.work)
+
+
+class _Edits(Preparation):
+    """The edits."""
+
+    @property
+    def grown(self) -> bool:
+        """True if an edit adds to the outside."""
+        return bool(self.how.bridge or self.how.thickness)
+
+    def changes(self) -> Iterator[tuple[str, Callable[[], Field]]]:
+        """The requested edits in order: name of the stage, and function that returns the edited field."""
+        how = self.how
+        if how.cavities == "fill":
+            yield "filling cavities", self.filled
+        if how.bodies is not None:
+            before = self.root
+            yield "keeping the largest", self.largest
+            if self.root is not before:
+                self.bound()
+        if how.gap:
+            yield "closing gaps", self.closed
+        if how.thickness:
+            yield "thickening", self.thickened
+        if how.bridge:
+            yield "bridging", self.bridged
+        if self.grown:
+            self.enlarged()
+            yield "joining fragments", self.rejoined
+            if how.thickness and self.known and self.known.solid.voxel < self.planned.voxel:
+                yield "filling pores", self.unsealed
+        if how.hollow:
+            yield "hollowing", self.hollowed
+
+    def filled(self) -> Field:
+        """Fill enclosed cavities."""
+        return self.without(self.connected().cavities)
+
+    def without(self, cavities: np.ndarray) -> Field:
+        """Fill the given cavities."""
+        from .bridging import nearer
+
+        if not len(cavities):
+            return self.root
+        components = self.connected()
+        self.known = components.filled(cavities)
+        return edited_field(self.root, "add", nearer(components, cavities, np.array([0])))
+
+    def largest(self) -> Field:
+        """Keep only the largest bodies."""
+        from .bridging import nearer
+
+        components = self.connected()
+        first, others = np.split(components.bodies, [self.how.bodies or 0])
+        if not len(others):
+            return self.root
+        return edited_field(self.root, "keep", nearer(components, first, others))
+
+    def bridged(self) -> Field:
+        """Join bodies by struts of minimum total length, and drop dust."""
+        from .bridging import bridging_struts, capsules, nearer
+
+        components = self.connected()
+        large = large_bodies(components)
+        dust = np.setdiff1d(components.bodies, large)
+        start, end = bridging_struts(components, large)
+        if len(dust):
+            self.put(edited_field(self.root, "cut", nearer(components, dust, large)))
+        if not len(start):
+            return self.root
+        return self.with_capsules(capsules(start, end, self.width / 2, components.solid), self.width)
+
+    @property
+    def width(self) -> float:
+        """Diameter of struts and minimum thickness of walls, scene units."""
+        return max(self.how.bridge, self.how.thickness) / self.scale
+
+    def rejoined(self) -> Field:
+        """Join the fragments of bodies that the voxels of the mesh break, and drop broken tips."""
+        from .bridging import capsules, fragments, nearer
+        from .components import components_of
+
+        known, voxel = self.known, max(self.planned.voxel, max(self.planned.box.size) / FINE)
+        for _ in range(REPEATS if known or self.how.bridge else 0):
+            meshed = components_of(sample_scene(replace(self.planned, voxel=voxel), self.work))
+            if meshed.thin_share >= PIECES:  # crumbs of walls; `thickness` is for them
+                break
+            tips, others, (start, end) = fragments(meshed, None if self.how.bridge else known)
+            if len(tips):
+                self.put(edited_field(self.root, "cut", nearer(meshed, tips, others)))
+            if not len(start):
+                break
+            grid = replace(meshed.solid, voxel=min(voxel, self.width / SHARP))
+            self.put(self.with_capsules(capsules(start, end, self.width / 2, grid), self.width))
+            self.known = known
+            self.enlarged()
+        return self.root
+
+    def unsealed(self) -> Field:
+        """Fill cavities that are sealed only at the sample spacing of the mesh."""
+        from .components import components_of
+
+        fine, self.known = self.known, components_of(sample_scene(self.planned, self.work))
+        return self.without(self.known.sealed(fine)) if fine else self.root
+
+    def closed(self) -> Field:
+        """Fill gaps from face to face."""
+        from .bridging import capsules
+        from .thin_features import all_walls
+
+        solid = self.seen(self.how.gap)
+        gaps = all_walls(self.root, solid, self.how.gap / self.scale, self.work, gaps=True)
+        one = _space_points(gaps.middle, solid.bricks.voxel)
+        if not len(one):
+            return self.root
+        radius = solid.bricks.voxel
+        made = capsules(gaps.start[one], gaps.end[one], radius, solid.bricks)
+        return self.with_capsules(made, 2 * radius)
+
+    def thickened(self) -> Field:
+        """Add balls as wide as the minimum thickness along the medial axis of thinner walls.
+
+        They restore what opening with such a ball would remove (Serra 1982), along the part of the medial
+        axis between opposite faces. Bodies that touch are joined. Pores that this seals are filled.
+        """
+        from .bridging import capsules, contacts
+        from .components import components_of
+        from .samples import together
+        from .thin_features import all_walls
+
+        solid, least = self.seen(self.how.thickness), self.how.thickness / self.scale
+        middle = all_walls(self.root, solid, least, self.work).middle
+        middle = middle[_space_points(middle, solid.bricks.voxel)]
+        before, start, end = components_of(solid.bricks), *np.empty((2, 0, 3))
+        if not self.root.bounds.exterior_only:
+            start, end = contacts(before, large_bodies(before), self.root.kernel(), self.work)
+        if not len(middle) + len(start):
+            return self.root
+        start, end = np.concatenate([middle, start]), np.concatenate([middle, end])
+        balls = capsules(start, end, least / 2, solid.bricks)
+        self.put(self.with_capsules(balls, least))
+        self.known = components_of(together(solid.bricks, balls.bricks))
+        return self.without(self.known.sealed(before))
+
+    def with_capsules(self, made: Samples, width: float) -> Field:
+        """Add capsules of a width in scene units. They may connect components, which are forgotten."""
+        self.known = None
+        self.planned = replace(self.planned, outer=self.planned.outer.grown(width))
+        return edited_field(self.root, "add", made)
+
+    def hollowed(self) -> Field:
+        """Remove everything deeper than the wall thickness, and drill drain holes."""
+        from .hollowing import hollows
+
+        samples, how, root = self.sampled(self.how.hollow), self.how, self.root
+        cuts, drains = hollows(samples, how.hollow / self.scale, how.drain / self.scale, self.planned.outer)
+        if not cuts:
+            raise VolumeError(f"walls of {how.hollow:g} mm leave nothing to hollow out")
+        self.planned = replace(self.planned, drains=drains)
+        for cut in cuts:
+            root = edited_field(root, "cut", cut)
+        return root
+
+
+def _space_points(points: np.ndarray, voxel: float) -> np.ndarray:
+    """Numbers of points, one in each occupied cell of a quarter voxel, ordered along x, then y, then z."""
+    if not len(points):
+        return np.empty(0, np.int64)
+    cells = np.round(4 * points / voxel).astype(np.int64)
+    cells -= cells.min(0)
+    _, first = np.unique(np.ravel_multi_index(tuple(cells.T), tuple(cells.max(0) + 1)), return_index=True)
+    return np.asarray(first)

@@ -1,11 +1,20 @@
-"""Problems of an object: what, where, how large, and the option that mends it."""
+"""Problems of an object: the limits of the checks, what is wrong, where, how much, and the option that
+mends it.
+
+Guides of makers of resin printers advise supports for flat cantilevers over 1 mm (Addema, "Recommendations -
+SLA"; EnvisionTEC, "Self-Supporting Features") and keep bridges under 21 mm (Addema): beyond, surfaces
+suffer. Prints fail later; the limit of cantilevers, 5 mm, is ours, as are those of necks, cups and specks.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..common.digits import place
+from ..common.messages import place
+from ..errors import SceneError
+from ..formulas.parameters import Number, attribute, validate
+from ..scene.lengths import Length
 
 SUPPORTS = "supports in the slicer"
 
@@ -15,34 +24,17 @@ Place = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Problem:
-    """One reason why an object would not print.
+    """One reason why an object would not print."""
 
-    Attributes
-    ----------
-    kind : str
-        "bodies", "islands", "overhangs", "necks", "cavities", "cups", "traps", "walls", "floors",
-        "fit" or "lost".
-    text : str
-        Description with the size.
-    layer : int or None
-        First layer of the largest one; None if layers were not examined.
-    at : Place or None
-        Place of the largest one.
-    mend : tuple of (str, str)
-        Print settings that mend it, by name; empty if none does.
-    advice : str
-        What else helps.
-    count : int
-        Number of features, such as traps.
-    """
-
+    # "bodies", "islands", "overhangs", "necks", "cavities", "cups", "traps", "walls", "floors", "fit" or
+    # "lost"
     kind: str
-    text: str
-    layer: int | None = None
-    at: Place | None = None
-    mend: tuple[tuple[str, str], ...] = ()
-    advice: str = ""
-    count: int = 1
+    text: str  # description with the size
+    layer: int | None = None  # first layer of the largest one; None if layers were not examined
+    at: Place | None = None  # place of the largest one
+    mend: tuple[tuple[str, str], ...] = ()  # print settings that mend it, by name; empty if none does
+    advice: str = ""  # what else helps
+    count: int = 1  # number of features, such as traps
 
     def __str__(self) -> str:
         """The problem in one line."""
@@ -57,13 +49,7 @@ class Problem:
 
 
 def verdict(problems: Sequence[object]) -> str:
-    """Say whether an object with some problems would print: as it is, with supports, or not.
-
-    Parameters
-    ----------
-    problems : sequence
-        Problems of its layers, as `Problem`, and of its mesh.
-    """
+    """Say whether an object with some problems would print: as it is, with supports, or not."""
     if not problems:
         return "would print"
     held = all(isinstance(problem, Problem) and SUPPORTS in problem.advice for problem in problems)
@@ -75,13 +61,7 @@ WEIGHTS = {"fit": 1000.0, "bodies": 100.0, "cavities": 10.0, "cups": 10.0, "trap
 
 
 def severity(problems: Sequence[object]) -> tuple[int, float]:
-    """How bad problems are: the rank of their verdict, then a weighted count of what is wrong.
-
-    Parameters
-    ----------
-    problems : sequence
-        Problems of its layers, as `Problem`, and of its mesh.
-    """
+    """How bad problems are: the rank of their verdict, then a weighted count of what is wrong."""
     rank = ["would print", "would print with supports", "would not print"].index(verdict(problems))
     own = [problem for problem in problems if isinstance(problem, Problem)]
     return rank, 1000.0 * (len(problems) - len(own)) + sum(WEIGHTS.get(p.kind, 1.0) * p.count for p in own)
@@ -90,27 +70,13 @@ def severity(problems: Sequence[object]) -> tuple[int, float]:
 def flat_base(height: float) -> str:
     """Setting "base" by which an object stands flat: a fiftieth of it, 0.5 mm or more, but at most a quarter.
 
-    Parameters
-    ----------
-    height : float
-        Height of the object, mm.
-
-    Returns
-    -------
-    str
-        The length.
+    `height` in mm.
     """
     return f"{min(max(height / 50, 0.5), height / 4):.2g}mm"
 
 
-def mended(problems: Sequence[Problem]) -> dict[str, str]:
-    """Print settings that mend as many problems as they can.
-
-    Returns
-    -------
-    dict
-        Values by the name of the setting; the largest one where several ask for the same length.
-    """
+def mend_settings(problems: Sequence[Problem]) -> dict[str, str]:
+    """Print settings that mend as many problems as they can."""
     result: dict[str, str] = {}
     for name, value in (setting for problem in problems for setting in problem.mend):
         if name not in result or _mm(value) > _mm(result[name]):
@@ -120,3 +86,32 @@ def mended(problems: Sequence[Problem]) -> dict[str, str]:
 
 def _mm(value: str) -> float:
     return float(value[:-2]) if value.endswith("mm") else 0.0
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of the checks. Lengths are numbers of mm, or text such as "0.4mm"."""
+
+    # components with less area in every layer (mm^2; at least 8 pixels), or less volume (mm^3), are counted
+    # as specks but are not a problem
+    speck: float = attribute(Number, 0.02, "an area", least=0)
+    # minimum area of a suction cup, a resin trap or, in layers, a sealed cavity, mm^2
+    cup: float = attribute(Number, 1.0, "an area", least=0)
+    # minimum height of a suction cup, mm; every hole in the first layers is a shallow one
+    deep: float = attribute(Length, 2.0, "a height", zero=True)
+    # thinnest allowed wall, mm; layers are judged by their thinnest hundredth
+    wall: float = attribute(Length, 0.1, "a thickness", zero=True)
+    # thinnest allowed floor or roof along z, mm
+    floor: float = attribute(Length, 0.1, "a thickness", zero=True)
+    # minimum area of thin walls, or thin floors, that is a problem, mm^2
+    thin: float = attribute(Number, 1.0, "an area", least=0)
+    overhang: float = attribute(Length, 5.0, "a length")  # longest flat cantilever, mm
+    span: float = attribute(Length, 20.0, "a length")  # longest flat bridge between two supports, mm
+    # largest area that an area of 1 carries; a layer on less contact tears off
+    neck: float = attribute(Number, 50.0, "a ratio", above=0)
+    # cross-section from which a component counts as carried, mm^2
+    heavy: float = attribute(Number, 20.0, "an area", least=0)
+    density: float = attribute(Number, 1.1, "of the resin", above=0)  # density of the resin, g/cm^3
+
+    def __post_init__(self) -> None:
+        validate(self, SceneError)

@@ -12,31 +12,10 @@ LEAST = 27
 """Cells of the smallest cavity; smaller ones are noise of the grid."""
 
 
-def sealed(root: Field, outer: Box, cell: float, work: Work) -> tuple[int, float]:
+def count_sealed(root: Field, outer: Box, cell: float, work: Work) -> tuple[int, float]:
     """Count the components of the empty space that no outside cell reaches.
 
-    Parameters
-    ----------
-    root : Field
-        The object.
-    outer : Box
-        Conservative bounds, scene units.
-    cell : float
-        Side of a cell, scene units.
-    work : Work
-        Cancellation.
-
-    Returns
-    -------
-    int
-        Number of cavities.
-    float
-        Their volume, cubed scene units.
-
-    Raises
-    ------
-    Cancelled
-        When the work is cancelled.
+    `outer`, `cell` in scene units. Returns cubed scene units.
     """
     from scipy.ndimage import label
 

@@ -8,20 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from ..common.digits import counted, place, significant
+from ..common.messages import format_count, place, significant
 from ..formulas import Box
 from ..formulas.box import Triple
 from ..kernel import Field
 from ..volume import Bricks, Drain
 from ..work import Work
-from .connectivity import resolved, sampled_object
-from .limits import Limits
-from .problems import Problem
+from .components import components_of
+from .problems import Limits, Problem
 from .samples import Samples
-from .solid_components import components_of
-from .thin_features import thin_features
-from .wall_faces import projected
-from .walls import Measure, Walls, walls_of
+from .thin_features import resolve_connectivity, sampled_object, thin_features
+from .walls import Measure, Walls, project_faces, walls_of
 from .widths import BINS, Widths, widths_of
 
 COARSE, FINE = 96, 192
@@ -49,34 +46,18 @@ BRIDGE, FILL = (("bridge", "1mm"),), (("cavities", "fill"),)
 
 @dataclass(frozen=True)
 class SolidReport:
-    """Report on a solid, measured on samples and, for thin features, on the field.
+    """Report on a solid, measured on samples and, for thin features, on the field."""
 
-    Attributes
-    ----------
-    voxel : float
-        Sample spacing, mm; lengths are accurate to one voxel.
-    bodies, cavities : list of float
-        Volumes without specks, mm^3, the largest first.
-    walls, gaps, floors : Widths or None
-        Thicknesses up to 2 mm, or up to the larger limit if that is more.
-    thin_walls, thin_floors : float
-        Surface below the limits, mm^2.
-    unseen : str
-        Walls that a mesh or layers may lose; empty if there are none.
-    problems : list of Problem
-        The problems.
-    """
-
-    voxel: float
-    bodies: list[float]
+    voxel: float  # sample spacing, mm; lengths are accurate to one voxel
+    bodies: list[float]  # volumes without specks, mm^3, the largest first
     cavities: list[float]
-    walls: Widths | None
+    walls: Widths | None  # thicknesses up to 2 mm, or up to the larger limit if that is more
     gaps: Widths | None
     floors: Widths | None
-    thin_walls: float
+    thin_walls: float  # surface below the limits, mm^2
     thin_floors: float
-    unseen: str
-    problems: list[Problem]
+    unseen: str  # walls that a mesh or layers may lose; empty if there are none
+    problems: list[Problem]  # the problems
 
     @property
     def thin(self) -> list[Problem]:
@@ -84,13 +65,7 @@ class SolidReport:
         return [problem for problem in self.problems if problem.kind in ("walls", "floors")]
 
     def as_dict(self) -> dict[str, Any]:
-        """The report as plain JSON types.
-
-        Returns
-        -------
-        dict
-            Keyed by attribute name.
-        """
+        """The report as plain JSON types."""
         return asdict(self)
 
 
@@ -106,23 +81,7 @@ def check_object(
 ) -> SolidReport:
     """Check an object given by its field.
 
-    Parameters
-    ----------
-    root : Field
-        The object, all depths of its tree known.
-    outer : Box
-        Conservative bounds of the object, scene units.
-    scale : float
-        mm per scene unit.
-    limits, work, finest, origin, drains
-        As for `check_solid`.
-
-    Raises
-    ------
-    VolumeError
-        If the field cannot be sampled.
-    Cancelled
-        When the work is cancelled.
+    `outer` in scene units; `scale`: mm per scene unit.
     """
     limits, work = limits or Limits(), work or Work()
     longest = max(outer.size)
@@ -144,31 +103,8 @@ def check_solid(
 ) -> SolidReport:
     """Check a sampled solid: bodies, sealed cavities, thin walls and thin floors.
 
-    Parameters
-    ----------
-    root : Field
-        The sampled field.
-    bricks : Bricks
-        Its samples.
-    scale : float
-        mm per scene unit.
-    limits : Limits, optional
-        Limits of the checks.
-    work : Work, optional
-        Threads, progress and cancellation.
-    finest : float, optional
-        Width in mm below which a mesh or layers may lose walls; the sample spacing if not given.
-    origin : three floats, optional
-        Point from which places are measured, scene units; by default the middle of the samples' lower face.
-    drains : sequence of Drain, optional
-        Drain holes, whose rims may be sharp.
-
-    Raises
-    ------
-    VolumeError
-        If the field cannot be sampled.
-    Cancelled
-        When the work is cancelled.
+    `scale`: mm per scene unit; `finest`: width in mm below which a mesh or layers may lose walls; `origin`
+    in scene units.
     """
     limits, work = limits or Limits(), work or Work()
     work.progress("checking the solid", 0.0)
@@ -178,7 +114,7 @@ def check_solid(
     thin, tight = thin_features(root, solid, work)
 
     kinds = walls_of(solid, most, work, [Measure(), Measure(gaps=True), Measure(direction=UP)])
-    solid_walls, gaps, upright = (projected(root, kind, bricks.voxel, work) for kind in kinds)
+    solid_walls, gaps, upright = (project_faces(root, kind, bricks.voxel, work) for kind in kinds)
     thick = thin.beside(solid_walls, most)
     between = tight.beside(gaps, most)
     floors = thin.beside(upright, most, UP)
@@ -189,7 +125,7 @@ def check_solid(
     speck = max(limits.speck, SPECK * (bricks.voxel * scale) ** 3) / scale**3
     result = _volumes(bricks, speck)
     missed = thin.walls + tight.walls
-    fine = resolved(root, bricks, limits.thin / scale**2, len(result[0]) > 1, work, missed)
+    fine = resolve_connectivity(root, bricks, limits.thin / scale**2, len(result[0]) > 1, work, missed)
     if fine is not bricks:
         result = _volumes(fine, speck)
     bodies, cavities = ([v * scale**3 for v in volumes] for volumes in result)
@@ -220,7 +156,7 @@ def _problems_of_components(bodies: Sequence[float], cavities: Sequence[float]) 
     if len(bodies) > 1:
         yield loose(len(bodies))
     if cavities:
-        sealed = counted(len(cavities), "sealed cavity", "sealed cavities")
+        sealed = format_count(len(cavities), "sealed cavity", "sealed cavities")
         yield Problem("cavities", f"{sealed} of {significant(sum(cavities))} mm3", mend=FILL)
 
 
@@ -288,18 +224,10 @@ def _off_rims(thin: Walls, drains: Sequence[Drain], near: float) -> Walls:
 
 
 def loose(count: int, **where: Any) -> Problem:
-    """Problem of bodies that nothing holds.
-
-    Parameters
-    ----------
-    count : int
-        Number of bodies.
-    **where
-        Fields of `Problem`.
-    """
+    """Problem of bodies that nothing holds."""
     return Problem(
         "bodies",
-        counted(count, "loose body", "loose bodies"),
+        format_count(count, "loose body", "loose bodies"),
         mend=BRIDGE,
         advice="--keep largest",
         count=count,

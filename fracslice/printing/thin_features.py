@@ -1,4 +1,5 @@
-"""Walls and gaps that are too thin for samples, which miss them or show only some of them.
+"""Walls and gaps that are too thin for samples, which miss them or show only some of them, found by rays
+from an offset field.
 
 An offset field, the field less `NEAR` voxels, is sampled: each wall is thicker by that on both sides and no
 longer fits between samples. From its surface, rays follow the normal inwards on the field itself: to where
@@ -7,21 +8,145 @@ the object begins, and on to where it ends. For gaps all signs are reversed.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from ..common.arrays import Rows, weighted_quantiles
+from ..common.cache import key
+from ..common.compiled import compiled
 from ..errors import VolumeError
+from ..formulas.box import Box
+from ..formulas.confining import moved_slope
+from ..formulas.field import Bounds, Device, Precision
 from ..kernel import Field, Kernel
-from ..volume import Lattice, sample
-from ..volume.evaluation import values_at
+from ..kernel.tree import ArrayField
+from ..volume import Bricks, Lattice, sample
+from ..volume.lattice import BRICK, values_at
 from ..work import Work
-from .edge_crossings import edge_crossings, slopes
-from .offset_field import OffsetField
-from .rays import Rays, first_negative
 from .samples import Samples
-from .walls import AT_ONCE, OPPOSITE, Direction, Walls, in_blocks, walls
+from .walls import AT_ONCE, OPPOSITE, Direction, Walls, edge_crossings, in_blocks, slopes, walls
+
+ROUNDS = 400
+"""Maximum number of steps along a ray."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rays(Rows):
+    """Rays that start next to a surface and pass through it."""
+
+    start: np.ndarray  # origins, scene units, and unit directions
+    directions: np.ndarray
+    area: np.ndarray  # surface that each ray represents
+    enter: np.ndarray  # distances along the ray to the beginning and the end of a thin wall or gap
+    leave: np.ndarray
+
+    def points(self, s: np.ndarray) -> np.ndarray:
+        """Points at distances `s` along the rays, [3, n]."""
+        return np.asarray(self.start.T + s * self.directions.T)
+
+    def some_points(self, which: np.ndarray, s: np.ndarray) -> np.ndarray:
+        """Points at distances `s` along the rays of these numbers, [3, n]."""
+        points: np.ndarray = _points(self.start, self.directions, which, s)
+        return points
+
+
+def first_negative(
+    field: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    begin: np.ndarray,
+    end: np.ndarray,
+    bound: float,
+    least: float,
+) -> np.ndarray:
+    """Distance along each ray at which a field first turns negative.
+
+    Steps follow the distance (sphere tracing, Hart 1996). Over the last step the field is taken as linear.
+
+    `begin`, `end`: float64 [n]. Returns float64 [n].
+    """
+    s, before, todo = begin + least, begin.copy(), np.arange(len(begin))
+    high, low = np.full((2, len(begin)), least * bound / 2)
+    for _ in range(ROUNDS):
+        f = field(todo, s[todo])
+        on, below = todo[f >= 0], todo[f < 0]
+        before[on], high[on], low[below] = s[on], f[f >= 0], f[f < 0]
+        s[on] += np.maximum(high[on] / bound, least)
+        far = below[s[below] - before[below] > 1.01 * least]
+        s[far] = (before[far] + s[far]) / 2
+        todo = np.concatenate([on[s[on] < end[on]], far])
+        if not len(todo):
+            break
+    s[todo] = end[todo]
+    negative = s < end
+    share = low[negative] / (low[negative] - high[negative])
+    s[negative] -= share * (s[negative] - before[negative])
+    return s
+
+
+@compiled
+def _points(start, directions, which, s):  # type: ignore[no-untyped-def]
+    """Points at distances `s` along some rays, [3, n]."""
+    points = np.empty((3, len(s)))
+    for i in range(len(s)):
+        for axis in range(3):
+            points[axis, i] = start[which[i], axis] + s[i] * directions[which[i], axis]
+    return points
+
+
+@dataclass(frozen=True, eq=False)
+class OffsetField(ArrayField):
+    """A field less a constant."""
+
+    root: Field  # the field to offset
+    by: float  # constant to subtract, scene units; positive values grow the inside
+
+    @cached_property
+    def bounds(self) -> Bounds:
+        """Bounds as of the formula `offset`. A flatter field's inside can extend farther from its box."""
+        own = self.root.bounds
+        return replace(own, box=own.box.grown(self.by), lipschitz=moved_slope(own, self.by))
+
+    @property
+    def key(self) -> str:
+        """`Field.key`."""
+        return key(self.root.key, "offset", self.by)
+
+    @property
+    def proved_box(self) -> Box:
+        """`Field.proved_box`."""
+        return self.root.proved_box.grown(self.by)
+
+    def conservative(self) -> OffsetField:
+        """`Field.conservative`. An escape-time fractal is not shrunk: its interior values bound nothing."""
+        by = max(self.by, 0.0) if self.root.bounds.exterior_only else self.by
+        return OffsetField(self.root.conservative(), by)
+
+    def kernel(self, device: Device = "cpu", precision: Precision = "float32") -> Kernel:
+        """`Field.kernel`."""
+        return _Shifted(self.root.kernel(device, precision), self.by)
+
+
+class _Shifted(Kernel):
+    """Kernel of an offset field."""
+
+    def __init__(self, root: Kernel, by: float) -> None:
+        self.dtype, self.batch = root.dtype, root.batch
+        self._root, self._by = root, root.dtype.type(by)
+
+    def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """`Kernel.points`."""
+        f: np.ndarray = self._root.points(x, y, z) - self._by
+        return f
+
+    def bricks(
+        self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray
+    ) -> None:
+        """`Kernel.bricks`."""
+        self._root.bricks(corners, origin, voxel, out)
+        out -= self._by
+
 
 NEAR = 0.9
 """Offset in voxels: more than the distance from any point to the nearest sample, half the diagonal."""
@@ -44,36 +169,17 @@ RAYS = 1 << 13
 
 @dataclass(frozen=True, eq=False)
 class ThinFeatures:
-    """Thin walls, or thin gaps, accurate to a hundredth of a voxel.
+    """Thin walls, or thin gaps, accurate to a hundredth of a voxel."""
 
-    Attributes
-    ----------
-    walls : Walls
-        The walls or gaps.
-    replaces : float
-        Width, scene units, below which they replace those measured on samples. 0 if the samples are accurate,
-        and `walls` has only those that the samples miss.
-    """
-
-    walls: Walls
+    walls: Walls  # the walls or gaps
+    # width, scene units, below which they replace those measured on samples. 0 if the samples are accurate,
+    # and `walls` has only those that the samples miss
     replaces: float
 
     def beside(self, sampled: Walls, limit: float, direction: Direction | None = None) -> Walls:
         """Combine with walls measured on samples.
 
-        Parameters
-        ----------
-        sampled : Walls
-            Walls or gaps measured on samples.
-        limit : float
-            Maximum width, scene units.
-        direction : three floats, optional
-            Measure the thin ones along it.
-
-        Returns
-        -------
-        Walls
-            Thin and sampled walls or gaps.
+        `limit` in scene units.
         """
         mine = self.walls if direction is None else self.walls.along(direction)
         return sampled.chosen(sampled.width >= self.replaces) + mine.chosen(mine.width < limit)
@@ -84,27 +190,6 @@ def thin_features(root: Field, seen: Samples, work: Work) -> tuple[ThinFeatures,
 
     The values of escape-time fractals are far from distances: their samples are more accurate, and only
     features that the samples miss are searched for. A gap between thin walls is reached through them.
-
-    Parameters
-    ----------
-    root : Field
-        The object, all depths known.
-    seen : Samples
-        Its samples.
-    work : Work
-        Threads and cancellation.
-
-    Returns
-    -------
-    walls, gaps : ThinFeatures
-        Thin walls and thin gaps.
-
-    Raises
-    ------
-    VolumeError
-        If the field cannot be sampled.
-    Cancelled
-        When the work is cancelled.
     """
     look = _Look(root, seen, THIN * seen.bricks.voxel, work)
     return look.features(look.walls()), look.features(look.gaps())
@@ -258,30 +343,7 @@ class _Look:
 def all_walls(root: Field, seen: Samples, limit: float, work: Work, *, gaps: bool = False) -> Walls:
     """Find all walls or gaps, on the samples and on the field.
 
-    Parameters
-    ----------
-    root : Field
-        The object.
-    seen : Samples
-        Its samples.
-    limit : float
-        Maximum width, scene units.
-    work : Work
-        Threads and cancellation.
-    gaps : bool
-        Find gaps instead of walls.
-
-    Returns
-    -------
-    Walls
-        Walls or gaps thinner than `limit`.
-
-    Raises
-    ------
-    VolumeError
-        If the field cannot be sampled.
-    Cancelled
-        When the work is cancelled.
+    `limit` in scene units.
     """
     exterior_only, most = root.bounds.exterior_only, THIN * seen.bricks.voxel
     look = _Look(root, seen, most if exterior_only else max(most, limit), work)
@@ -289,3 +351,62 @@ def all_walls(root: Field, seen: Samples, limit: float, work: Work, *, gaps: boo
     if exterior_only:
         result = walls(seen, limit, work, gaps=gaps) + result
     return result.chosen(result.width < limit)
+
+
+FINEST = 768
+"""Maximum number of samples along the longest side in the search for a surface."""
+
+MOST = 150_000
+"""Approximate maximum number of bricks in samples that resolve connectivity, for a field whose batches are of
+the usual size; fewer if its values take longer.
+"""
+
+AGAIN = 3.0
+"""Refinement factor for fractals that appear disconnected."""
+
+
+def sampled_object(root: Field, outer: Box, longest: float, samples: float, work: Work) -> Bricks:
+    """Sample an object, finer until a surface appears: a plate may lie between all samples.
+
+    `outer`, `longest` in scene units.
+    """
+    while True:
+        try:
+            return sample(root.kernel(), root.bounds, Lattice.around(outer, longest / samples), work)
+        except VolumeError:
+            samples *= 2
+            if samples > FINEST:
+                raise
+
+
+def resolve_connectivity(
+    root: Field, bricks: Bricks, least: float, loose: bool, work: Work, thin: Walls | None = None
+) -> Bricks:
+    """Resample an object finer if its samples may miss walls or gaps: two samples across the thinnest.
+
+    A plate thicker than sqrt 3 samples is not pierced, whatever its tilt (Andres, Acharya and Sibata 1997,
+    "Discrete analytical hyperplanes"). A fractal has walls of every thickness; it is resampled only if it
+    appears disconnected.
+
+    `least`: squared scene units.
+    """
+    times = AGAIN if loose else 1.0
+    if not root.bounds.exterior_only:
+        if thin is None:
+            walls, gaps = thin_features(root, Samples(bricks), work)
+            thin = walls.walls + gaps.walls
+        times = _times(bricks, thin, least, MOST * root.kernel().batch / Kernel.batch)
+    if times <= 1:
+        return bricks
+    lattice = Lattice.around(Samples(bricks).bounds.box, bricks.voxel / times)
+    return sample(root.kernel(), root.bounds, lattice, work)
+
+
+def _times(bricks: Bricks, thin: Walls, least: float, most: float) -> float:
+    """Refinement factor for these walls and gaps, up to `most` bricks; 1 if fewer than `least` are thin."""
+    voxel = bricks.voxel
+    if thin.chosen(thin.width < 2 * voxel).area.sum() < least:
+        return 1.0
+    count = max(len(bricks), float(thin.area.sum()) / (BRICK * voxel) ** 2)
+    (thinnest,) = weighted_quantiles(thin.width, thin.area, 0.01)
+    return float(min(2 * voxel / thinnest, (most / count) ** 0.5))

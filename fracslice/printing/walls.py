@@ -15,12 +15,99 @@ from typing import TypeVar
 
 import numpy as np
 
+from ..common.arrays import Rows
 from ..common.compiled import compiled
-from ..common.rows import Rows
+from ..kernel import Field, Kernel
+from ..volume.lattice import values_at
 from ..work import Work, chunks
-from .edge_crossings import edge_crossings, slopes
-from .interpolation import STRIDE, between, is_beside
-from .samples import Samples
+from .samples import SIDE, STRIDE, Samples, between, gather, is_beside
+
+FIRST_SIZE = 8
+"""Samples per crossing in the first allocation."""
+
+ALONG = 0.999
+"""Fraction of a normal's largest component above which another component ties with it."""
+
+
+def edge_crossings(solid: Samples, rows: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Crossings of the surface with grid edges that begin in some bricks.
+
+    A smooth surface has one crossing for each grid line along the axis nearest to its normal.
+
+    Returns points, normals float64 [n, 3], scene units; area float64 [n], squared scene units.
+    """
+    begin, end, _ = rows.indices(len(solid.bricks))
+    n, size = (end - begin) * 512 // FIRST_SIZE, -1
+    while n > size:
+        size = n
+        points, normals = np.empty((2, size, 3))
+        area = np.empty(size)
+        n = _cross(begin, end, solid.grid, points, normals, area)
+    return points[:n].copy(), normals[:n].copy(), area[:n].copy()
+
+
+def slopes(kernel: Kernel, points: np.ndarray, step: float, work: Work) -> tuple[np.ndarray, np.ndarray]:
+    """Gradient of a field by central differences.
+
+    `points`: float64 [3, n], scene units; `step` in scene units. Returns length, normals [n], [3, n].
+    """
+    shifts = step * np.eye(3)[:, :, None]
+    slope = np.stack(
+        [values_at(kernel, points + s, work) - values_at(kernel, points - s, work) for s in shifts]
+    )
+    length = np.maximum(np.linalg.norm(slope, axis=0), 1e-30)
+    return length / (2 * step), slope / length
+
+
+@compiled
+def _cross(begin, end, grid, points, normals, area):  # type: ignore[no-untyped-def]
+    """Write the results of `crossed` as far as the arrays reach; return the number of crossings."""
+    n, f = 0, np.empty(SIDE**3, np.float32)
+    ijk, voxel = grid.ijk, grid.voxel
+    for row in range(begin, end):
+        gather(grid, row, f)
+        for s in range(512):
+            u, v, w = s >> 6, (s >> 3) & 7, s & 7
+            at = (u + 1) * SIDE * SIDE + (v + 1) * SIDE + w + 1
+            for axis in range(3):
+                step = (SIDE * SIDE, SIDE, 1)[axis]
+                if (f[at] < 0) == (f[at + step] < 0):
+                    continue
+                if n < len(area):
+                    share = float(f[at]) / (float(f[at]) - float(f[at + step]))
+                    points[n, 0] = grid.x0 + voxel * (ijk[row, 0] + u)
+                    points[n, 1] = grid.y0 + voxel * (ijk[row, 1] + v)
+                    points[n, 2] = grid.z0 + voxel * (ijk[row, 2] + w)
+                    points[n, axis] += voxel * share
+                    _across(f, at, axis, share, normals[n])
+                    along = abs(normals[n, axis])
+                    if along < ALONG * np.abs(normals[n]).max():
+                        continue
+                    area[n] = voxel * voxel / along
+                n += 1
+    return n
+
+
+@compiled
+def _across(f, at, axis, share, normal):  # type: ignore[no-untyped-def]
+    """Write the unit normal at `share` along an edge, by interpolated central differences over a voxel."""
+    along = (SIDE * SIDE, SIDE, 1)[axis]
+    total = 0.0
+    for k in range(3):
+        step = (SIDE * SIDE, SIDE, 1)[k]
+        if k != axis:
+            here, there = f[at + step] - f[at - step], f[at + along + step] - f[at + along - step]
+            slope = ((1 - share) * here + share * there) / 2
+        elif share < 0.5:
+            middle = f[at] + (share + 0.5) * (f[at + along] - f[at])
+            slope = middle - f[at - along] - (share + 0.5) * (f[at] - f[at - along])
+        else:
+            middle = f[at] + (share - 0.5) * (f[at + along] - f[at])
+            slope = f[at + along] + (share - 0.5) * (f[at + 2 * along] - f[at + along]) - middle
+        normal[k] = slope
+        total += slope * slope
+    normal /= max(np.sqrt(total), 1e-30)
+
 
 OPPOSITE = -0.5
 """Maximum cosine between the normals of the two faces of a wall: wedges up to 60 degrees count."""
@@ -37,25 +124,13 @@ R = TypeVar("R", bound=Rows)
 
 @dataclass(frozen=True, eq=False)
 class Walls(Rows):
-    """Walls or gaps thinner than a limit. Lengths in scene units.
+    """Walls or gaps thinner than a limit. Lengths in scene units."""
 
-    Attributes
-    ----------
-    start, end : float64 [n, 3]
-        Points on the two faces.
-    width : float64 [n]
-        Distance between them.
-    area : float64 [n]
-        Surface that each represents.
-    facing : float64 [n]
-        Cosine between the normals of the faces: -1 where they are parallel.
-    """
-
-    start: np.ndarray
+    start: np.ndarray  # points on the two faces
     end: np.ndarray
-    width: np.ndarray
-    area: np.ndarray
-    facing: np.ndarray
+    width: np.ndarray  # distance between them
+    area: np.ndarray  # surface that each represents
+    facing: np.ndarray  # cosine between the normals of the faces: -1 where they are parallel
 
     @property
     def middle(self) -> np.ndarray:
@@ -68,18 +143,7 @@ class Walls(Rows):
         return cls(*np.empty((2, 0, 3)), *np.empty((3, 0)))
 
     def along(self, direction: Direction) -> Walls:
-        """Walls whose faces look along a direction or against it, measured along it.
-
-        Parameters
-        ----------
-        direction : three floats
-            A unit vector.
-
-        Returns
-        -------
-        Walls
-            The walls, with new ends and widths.
-        """
+        """Walls whose faces look along a direction or against it, measured along it."""
         span = self.end - self.start
         share = (span * direction).sum(1) / np.linalg.norm(span, axis=1)
         width = self.width / np.maximum(np.abs(share), 1e-9)
@@ -99,26 +163,7 @@ def walls(
     Widths are accurate to one voxel. Features thinner than a voxel appear only where they contain a sample,
     see `thin_features`.
 
-    Parameters
-    ----------
-    solid : Samples
-        The samples.
-    limit : float
-        Maximum width, scene units.
-    work : Work
-        Threads and cancellation.
-    gaps : bool
-        Measure gaps instead of walls.
-
-    Returns
-    -------
-    Walls
-        Walls or gaps thinner than `limit`.
-
-    Raises
-    ------
-    Cancelled
-        When the work is cancelled.
+    `limit` in scene units.
     """
     (one,) = walls_of(solid, limit, work, [Measure(gaps)])
     return one
@@ -126,45 +171,25 @@ def walls(
 
 @dataclass(frozen=True)
 class Measure:
-    """How walls are measured.
+    """How walls are measured."""
 
-    Attributes
-    ----------
-    gaps : bool
-        Measure gaps instead of walls.
-    direction : three floats, optional
-        Measure along this unit vector instead of the normal, through faces that look along it or against it.
-    """
-
-    gaps: bool = False
+    gaps: bool = False  # measure gaps instead of walls
+    # measure along this unit vector instead of the normal, through faces that look along it or against it
     direction: Direction | None = None
 
 
 def walls_of(solid: Samples, limit: float, work: Work, kinds: Sequence[Measure]) -> list[Walls]:
-    """Measure several kinds of walls from the same crossings of grid edges.
-
-    Parameters
-    ----------
-    solid, limit, work
-        As for `walls`.
-    kinds : sequence of Measure
-        How each is measured.
-
-    Raises
-    ------
-    Cancelled
-        When the work is cancelled.
-    """
+    """Measure several kinds of walls from the same crossings of grid edges."""
 
     def look(rows: slice) -> list[Walls]:
         crossings = edge_crossings(solid, rows)
-        return [_measured(solid, limit, work, how, *crossings) for how in kinds]
+        return [_measure_walls(solid, limit, work, how, *crossings) for how in kinds]
 
     blocks = work.collect(look, chunks(len(solid.bricks), AT_ONCE) or [slice(0, 0)])
     return [Walls.joined(list(parts)) for parts in zip(*blocks, strict=True)]
 
 
-def _measured(
+def _measure_walls(
     solid: Samples,
     limit: float,
     work: Work,
@@ -191,27 +216,7 @@ def _measured(
 
 
 def in_blocks(look: Callable[[slice], R], count: int, size: int, work: Work) -> R:
-    """Process rows in blocks on all threads and join the results in order.
-
-    Parameters
-    ----------
-    look : callable
-        Returns a record for a slice of rows.
-    count, size : int
-        Number of rows, and rows in a block.
-    work : Work
-        Threads and cancellation.
-
-    Returns
-    -------
-    Rows
-        The joined records.
-
-    Raises
-    ------
-    Cancelled
-        When the work is cancelled.
-    """
+    """Process rows in blocks on all threads and join the results in order."""
     result = work.collect(look, chunks(count, size) or [slice(0, 0)])
     return type(result[0]).joined(result)
 
@@ -233,3 +238,36 @@ def _through(points, directions, limit, towards, grid, beside, width):  # type: 
                 width[n] = voxel * (s - (STRIDE * f / (f - before) if before < 0 else 0.0))
                 break
             before, s = f, s + STRIDE
+
+
+STEP = 0.05
+"""Step of central differences, voxels."""
+
+AWAY = 0.5
+"""Maximum displacement of a face, voxels."""
+
+
+def project_faces(root: Field, walls: Walls, voxel: float, work: Work) -> Walls:
+    """Project the faces of walls or gaps to the surface, along the wall.
+
+    Walls whose faces do not look away from each other there are dropped: they are artefacts of features
+    thinner than a voxel. Walls of escape-time fractals are returned unchanged: samples are more accurate than
+    values.
+
+    `voxel` in scene units.
+    """
+    if root.bounds.exterior_only or not len(walls.width):
+        return walls
+    kernel, directions = root.kernel(), ((walls.end - walls.start) / walls.width[:, None]).T
+    ends, normals = [], []
+    for points in (walls.start.T, walls.end.T):
+        steep, normal = slopes(kernel, points, STEP * voxel, work)
+        along = steep * (normal * directions).sum(0)
+        shift = -values_at(kernel, points, work) / np.where(np.abs(along) > -OPPOSITE * steep, along, np.inf)
+        ends.append(points + np.clip(shift, -AWAY * voxel, AWAY * voxel) * directions)
+        normals.append(normal)
+    across = [np.abs((normal * directions).sum(0)) > -OPPOSITE for normal in normals]
+    facing = (normals[0] * normals[1]).sum(0)
+    width = ((ends[1] - ends[0]) * directions).sum(0)
+    stays = np.where(across[0] & across[1], facing < OPPOSITE, across[0] | across[1]) & (width > 0)
+    return Walls(ends[0].T, ends[1].T, width, walls.area, facing).chosen(stays)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..common.quantiles import weighted_quantiles
+from ..common.arrays import weighted_quantiles
 
 BINS = 0.05 * np.arange(41)
 """Bin edges of the histogram, mm; the last bin includes everything thicker."""
@@ -14,39 +14,20 @@ BINS = 0.05 * np.arange(41)
 
 @dataclass(frozen=True)
 class Widths:
-    """Statistics of the widths of walls or gaps, mm.
+    """Statistics of the widths of walls or gaps, mm."""
 
-    Attributes
-    ----------
-    smallest, thinnest_hundredth, median : float
-        Minimum, first percentile and median.
-    counts : tuple of float
-        Weight in each bin: pixels of medial axes in layers, mm^2 of surface in solids.
-    edges : tuple of float
-        Edges of the bins.
-    """
-
-    smallest: float
+    smallest: float  # minimum, first percentile and median
     thinnest_hundredth: float
     median: float
+    # weight in each bin: pixels of medial axes in layers, mm^2 of surface in solids
     counts: tuple[float, ...]
-    edges: tuple[float, ...] = tuple(round(float(b), 3) for b in BINS)
+    edges: tuple[float, ...] = tuple(round(float(b), 3) for b in BINS)  # edges of the bins
 
 
 def widths_of(values: np.ndarray, weights: np.ndarray | None = None) -> Widths | None:
     """Summarise widths.
 
-    Parameters
-    ----------
-    values : float64 [n]
-        Widths, mm.
-    weights : float64 [n], optional
-        Weights; equal if not given.
-
-    Returns
-    -------
-    Widths or None
-        None if there are no widths.
+    `values`: float64 [n], mm; `weights`: float64 [n], optional.
     """
     if not len(values):
         return None

@@ -5,7 +5,6 @@ from __future__ import annotations
 from .accumulator import Accumulator
 from .film import develop, picture
 from .host_accumulator import HostAccumulator
-from .passes import Pass
-from .progressive import Renderer
+from .progressive import Pass, Renderer
 
 __all__ = ["Accumulator", "HostAccumulator", "Pass", "Renderer", "develop", "picture"]

@@ -1,13 +1,18 @@
-"""Accumulators: per-pixel sums over samples of equal weight, and the goals of the pass under way."""
+"""Accumulators: per-pixel sums over samples of equal weight, and the goals of the pass under way, in tile
+order.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from ..scene.view import View
+from ..work import chunks
+from .film import BAND
 
 if TYPE_CHECKING:
     from .host_accumulator import HostAccumulator
@@ -35,15 +40,7 @@ UNIFORM = 3
 def grids(width: int, height: int) -> tuple[int, ...]:
     """Return the grid spacings of the first passes, which take one sample in each pixel of their grids.
 
-    Parameters
-    ----------
-    width, height : int
-        Picture size, pixels.
-
-    Returns
-    -------
-    tuple of int
-        Spacings, pixels; the last one is 1.
+    `width`, `height` in pixels. Returns a value in pixels.
     """
     spacings = [1, COARSE]
     while width * height > SOON * spacings[-1] ** 2:
@@ -53,48 +50,22 @@ def grids(width: int, height: int) -> tuple[int, ...]:
 
 @dataclass(frozen=True)
 class PassPlan:
-    """Pixels of a pass.
+    """Pixels of a pass."""
 
-    Attributes
-    ----------
-    pixels : array of int32
-        Pixels for the tracer, ``y << 16 | x``, in tile order.
-    samples : int
-        Samples to take; 0 when the picture is complete.
-    last : int
-        Largest goal of a pixel.
-    """
-
-    pixels: Any
-    samples: int
-    last: int
+    pixels: Any  # pixels for the tracer, ``y << 16 | x``, in tile order
+    samples: int  # samples to take; 0 when the picture is complete
+    last: int  # largest goal of a pixel
 
 
 def least_gain(passes: int) -> float:
-    """Return the least reduction of the squared error for which a pass takes a sample.
-
-    Parameters
-    ----------
-    passes : int
-        Completed passes after those over grids.
-
-    Returns
-    -------
-    float
-        Squared displayed brightness per sample.
-    """
+    """Return the least reduction of the squared error for which a pass takes a sample."""
     return FIRST / DECAY ** (passes - UNIFORM)
 
 
 def next_choice(passes: int, largest: float) -> int:
     """Return the number of passes after which the next one chooses a pixel.
 
-    Parameters
-    ----------
-    passes : int
-        Completed passes after those over grids.
-    largest : float
-        Largest gain of an unfinished pixel, above zero.
+    `largest`: largest gain of an unfinished pixel.
     """
     while least_gain(passes) > largest:
         passes += 1
@@ -193,3 +164,30 @@ class Accumulator(Protocol):
         HostAccumulator
             The same samples.
         """
+
+
+@lru_cache(maxsize=4)
+def band_order(width: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the pixels of a band in tile order, so that the pixels of a packet are neighbours.
+
+    Pixels are ordered by blocks of 64 x 32 pixels; within a block, by tiles of 8 x 4.
+
+    `width` in pixels. Returns pixels int32 (BAND * width,); places intp (BAND * width,).
+    """
+    y, x = np.divmod(np.arange(BAND * width, dtype=np.int32), np.int32(width))
+    places = np.lexsort((x, y, x // 8, y // 4, x // 64))
+    pixels = (y << 16 | x)[places]
+    for array in (pixels, places):
+        array.setflags(write=False)
+    return pixels, places
+
+
+def tile_order(width: int, height: int) -> np.ndarray:
+    """Return all pixels of a picture in tile order.
+
+    `width`, `height` in pixels. Returns int32 (width * height,).
+    """
+    order, _ = band_order(width)
+    bands = [order + np.int32(rows.start << 16) for rows in chunks(height, BAND)]
+    pixels = np.concatenate(bands)
+    return pixels[pixels >> 16 < height]

@@ -11,8 +11,7 @@ Conventions:
 from __future__ import annotations
 
 from ..formulas.vocabulary import maximum, where
-from ..kernel.intrinsics import WIDTH, load, store
-from ..kernel.loops import loop
+from ..kernel.loops import WIDTH, load, loop, store
 from .accumulator import CHANNELS, COUNT, GOAL, TRUSTED
 from .units.pixel import UNKNOWN, squared_error
 
@@ -21,18 +20,7 @@ from .units.pixel import UNKNOWN, squared_error
 def measure(P, A, N, E, R, T, first, rows, width, height, stride):
     """Compute the squared error of each pixel of a band and around it, and its ratio to the samples.
 
-    Parameters
-    ----------
-    P : pointer to float
-        Unused.
-    A : pointer to float
-        Sums of the picture.
-    N, E, R : pointer to float
-        Zeros; written: samples, and errors and ratios, of `UNKNOWN` below `TRUSTED` samples.
-    T : pointer to float
-        Written: squared errors, pixels with a known error, samples, samples up to the goals.
-    first, rows, width, height, stride : int
-        First row and rows of the band, picture size, numbers per row of N, E and R.
+    `P`: unused; `A`: sums of the picture; `N`, `E`, `R`: zeros; `T`: pixels with a known error.
     """
     total = 0.0
     known = 0.0
@@ -69,18 +57,9 @@ def measure(P, A, N, E, R, T, first, rows, width, height, stride):
 def judge(P, N, E, R, G, T, first, rows, width, stride, most):
     """Compute the gain of one more sample in each pixel of a band.
 
-    Parameters
-    ----------
-    P : pointer to float
-        Squared error at which a pixel has converged.
-    N, E, R : pointer to float
-        Samples, squared errors, ratios; R is overwritten.
-    G : pointer to float
-        Gains of the picture, written: -1 for a finished pixel.
-    T : pointer to float
-        Written: largest gain.
-    first, rows, width, stride, most : int
-        First row and rows of the band, picture width, numbers per row, maximum samples per pixel.
+    `P`: squared error at which a pixel has converged; `N`, `E`, `R`: samples, squared errors, ratios; `G`:
+    written: -1 for a finished pixel; `T`: written: largest gain; `first`, `rows`, `width`, `stride`, `most`:
+    maximum samples per pixel.
     """
     largest = 0.0
     for y in range(rows):
@@ -105,14 +84,8 @@ def judge(P, N, E, R, G, T, first, rows, width, stride, most):
 def choose(P, A, G, first, rows, width, most):
     """Set the goals of the pixels of a band: the next power of two if the gain is at least `P[0]`.
 
-    Parameters
-    ----------
-    P : pointer to float
-        Smallest gain.
-    A, G : pointer to float
-        Sums of the picture, whose goals are written, and gains.
-    first, rows, width, most : int
-        First row and rows of the band, picture width, maximum samples per pixel.
+    `P`: smallest gain; `A`, `G`: sums of the picture, whose goals are written, and gains; `first`, `rows`,
+    `width`, `most`: maximum samples per pixel.
     """
     for k in range(first * width, (first + rows) * width):
         n = A[CHANNELS * k + COUNT]
@@ -129,18 +102,8 @@ def choose(P, A, G, first, rows, width, most):
 def unfinished(P, A, order, pixels, L, T, first, rows, width, size):
     """List the pixels of a band that have not reached their goals.
 
-    Parameters
-    ----------
-    P, A : pointer to float
-        Unused, and sums of the picture.
-    order : pointer to int32
-        Pixels of a band at row 0, ``y << 16 | x``, in tile order.
-    pixels : pointer to int32
-        Written.
-    L, T : pointer to float
-        Written: samples to take in each pixel and a row of zeros; their sum, largest goal, pixels.
-    first, rows, width, size : int
-        First row and rows of the band, picture width, entries of `order`.
+    `P`, `A`: unused, and sums of the picture; `L`, `T`: written: samples to take in each pixel and a row of
+    zeros.
     """
     total = 0.0
     most = 0.0

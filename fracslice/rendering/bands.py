@@ -10,8 +10,7 @@ from ..formulas.registry import Node
 from ..scene.view import View
 from ..work import Work, chunks
 from .crops import BYTES, MARGIN, Crop
-from .passes import Pass
-from .progressive import Renderer
+from .progressive import Pass, Renderer
 from .sequence import SampleRange
 
 SHARE = 0.5
@@ -25,10 +24,7 @@ SCALED = ("depth", "distance", "position")
 def rows_of_bands(film: tuple[int, int]) -> int:
     """Return the rows of a band: all rows if the picture is no larger than the memory.
 
-    Parameters
-    ----------
-    film : tuple of int
-        Width and height of the picture, pixels.
+    `film` in pixels.
     """
     width, height = film
     free = available_bytes()
@@ -39,20 +35,7 @@ def rows_of_bands(film: tuple[int, int]) -> int:
 
 
 def check_bands(view: View, display: bool) -> None:
-    """Raise an error for a view whose pixels depend on the whole picture.
-
-    Parameters
-    ----------
-    view : View
-        The view.
-    display : bool
-        True for display values, False for linear ones.
-
-    Raises
-    ------
-    RenderError
-        If the picture has bloom, or scaled values of another mode.
-    """
+    """Raise an error for a view whose pixels depend on the whole picture."""
     if display and view.film.bloom and view.shading.mode == "light":
         raise RenderError('film.bloom: spreads light over the whole picture; expected bloom="0" in bands')
     if display and view.shading.mode in SCALED:
@@ -73,25 +56,7 @@ def render_bands(
 ) -> Iterator[Pass]:
     """Render a picture band by band; each has the pixels of the whole picture.
 
-    Parameters
-    ----------
-    root : Node
-        Root of the formula tree; depths may be "auto".
-    view : View
-        Camera, film, lights, fog and shading.
-    film : tuple of int
-        Picture width and height, pixels.
-    rows : int
-        Rows of a band.
-    work, device, sequence
-        As for `Renderer`.
-    samples
-        As for `Renderer.passes`.
-
-    Yields
-    ------
-    Pass
-        The last pass of each band, from the top.
+    `film` in pixels.
     """
     for part in chunks(film[1], rows):
         crop = 0, part.start, film[0], part.stop - part.start

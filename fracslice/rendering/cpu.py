@@ -12,9 +12,8 @@ from ..kernel.host import lane_count
 from ..kernel.machine import constant
 from ..work import Work, chunks
 from .accumulator import PassPlan
-from .lanes import Lane
 from .linking import Frame
-from .packets import loops, workspace
+from .packets import Lane, loops, workspace
 from .sequence import SampleRange
 
 TILE = 2048
@@ -38,14 +37,7 @@ WHOLE = 16
 class CpuTracer:
     """Tracer that adds samples to pixels, tile by tile, on all threads of the work.
 
-    Parameters
-    ----------
-    frame : Frame
-        Linked frame.
-    dtype : dtype
-        Kernel float type, float32 or float64.
-    width, height : int
-        Picture size, pixels.
+    `dtype`: float32 or float64; `width`, `height` in pixels.
     """
 
     prepasses = len(SHIFTS)
@@ -63,13 +55,7 @@ class CpuTracer:
         self.aim(frame)
 
     def aim(self, frame: Frame) -> None:
-        """Load the parameters of another frame of the same source, such as another camera or depth.
-
-        Parameters
-        ----------
-        frame : Frame
-            Linked frame.
-        """
+        """Load the parameters of another frame of the same source, such as another camera or depth."""
         self.frame = frame
         self._parameters = constant(frame.linked.parameters, self.dtype)
         self._shift, self._blocks, self._starts = WHOLE, 1, np.zeros(1, self.dtype)
@@ -102,19 +88,7 @@ class CpuTracer:
 
         Sums are valid at any time: those of a tile are added at once.
 
-        Parameters
-        ----------
-        sums : ndarray, shape (height * width * CHANNELS,)
-            Sums of the picture, changed in place.
-        plan : PassPlan
-            Pixels to sample.
-        work : Work
-            Threads and cancellation.
-
-        Raises
-        ------
-        Cancelled
-            If the work is cancelled before the last pixel.
+        `sums`: ndarray (height * width * CHANNELS,).
         """
         if len(self._points) < plan.last:
             self._points = self.samples.points(2 * plan.last, self.frame.samples)

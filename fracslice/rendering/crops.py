@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import RenderError
-from ..formulas.parameters import Vector
-from ..formulas.records import validated
+from ..formulas.parameters import Vector, validate_value
 from .accumulator import CHANNELS, COARSE
 
 BYTES = 4 * (CHANNELS + 4 + 3)
@@ -21,41 +20,23 @@ CROP = Vector(None, "left, top, width and height, pixels", sizes=(4,), least=0, 
 
 @dataclass(frozen=True)
 class Crop:
-    """Part of a film that is rendered.
+    """Part of a film that is rendered."""
 
-    Attributes
-    ----------
-    left, top, width, height : int
-        The part, pixels.
-    film : tuple of int
-        Width and height of the film, pixels.
-    """
-
-    left: int
+    left: int  # the part, pixels
     top: int
     width: int
     height: int
-    film: tuple[int, int]
+    film: tuple[int, int]  # width and height of the film, pixels
 
     @classmethod
     def of(cls, film: tuple[int, int], crop: tuple[int, int, int, int] | None) -> Crop:
         """Validate a crop.
 
-        Parameters
-        ----------
-        film : tuple of int
-            Width and height of the film, pixels.
-        crop : tuple of int or None
-            Left and upper pixel, width and height; None for the whole film.
-
-        Raises
-        ------
-        RenderError
-            If the crop is not a part of the film.
+        `film` in pixels; `crop`: left and upper pixel.
         """
         if crop is None:
             return cls(0, 0, *film, film)
-        x, y, width, height = validated("crop", crop, CROP, RenderError)
+        x, y, width, height = validate_value("crop", crop, CROP, RenderError)
         if width < 1 or height < 1 or x + width > film[0] or y + height > film[1]:
             raise RenderError(
                 f"crop={x},{y},{width},{height}: expected a part of {film[0]} x {film[1]} pixels"
@@ -84,14 +65,8 @@ class Crop:
     def within(self, pixels: np.ndarray) -> np.ndarray:
         """Cut the margin off.
 
-        Parameters
-        ----------
-        pixels : ndarray, shape (rows, columns, ...)
-            Values of `size` pixels.
-
-        Returns
-        -------
-        ndarray, shape (height, width, ...)
+        `pixels`: ndarray (rows, columns, ...), values of `size` pixels. Returns ndarray (height, width,
+        ...).
         """
         x, y = self.origin
         rows, columns = slice(self.top - y, None), slice(self.left - x, None)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..formulas.field import Precision
 from ..kernel.cuda_driver import require
-from ..kernel.cuda_launching import launched, load_loops, parameters
+from ..kernel.cuda_launching import launch, load_loops, parameters
 from ..work import Work
 from .accumulator import PassPlan
 from .cpu import BLOCK, STEPS
@@ -20,19 +20,7 @@ from .sequence import SampleRange
 class CudaTracer:
     """Tracer on the GPU, with the interface of `CpuTracer`.
 
-    Parameters
-    ----------
-    frame : Frame
-        Linked frame.
-    dtype : dtype
-        Kernel float type, float32 or float64.
-    width, height : int
-        Picture size, pixels.
-
-    Raises
-    ------
-    KernelError
-        If there is no GPU.
+    `dtype`: float32 or float64; `width`, `height` in pixels.
     """
 
     prepasses = 1
@@ -57,7 +45,7 @@ class CudaTracer:
         """Run the cone prepass; see `CpuTracer.look_ahead`."""
         if self.frame.sharp:
             given = (self._parameters, self._starts, self.blocks, self.dtype.type(STEPS[self.dtype.name]))
-            launched(self._loops.cones, self._starts.size, *given)
+            launch(self._loops.cones, self._starts.size, *given)
 
     def add(self, sums: Any, plan: PassPlan, work: Work) -> None:
         """Add samples without waiting for the GPU; see `CpuTracer.add`."""
@@ -67,4 +55,4 @@ class CudaTracer:
         film = (plan.pixels, sums, self.width, self.dtype.type(STEPS[self.dtype.name]), self.blocks)
         for _ in range((plan.last + 1) // 2):  # a goal is at most twice a count
             work.check()
-            launched(self._loops.tile, plan.pixels.size, self._parameters, self._points, self._starts, *film)
+            launch(self._loops.tile, plan.pixels.size, self._parameters, self._points, self._starts, *film)

@@ -10,14 +10,13 @@ import numpy as np
 
 from ..formulas.field import Precision
 from ..kernel.cuda_driver import require
-from ..kernel.cuda_launching import launched, load_loops
+from ..kernel.cuda_launching import launch, load_loops
 from ..kernel.linker import Linked
 from ..scene.view import View
-from .accumulator import TRUSTED, PassPlan, grids, least_gain, next_choice
-from .cuda_accumulator_loops import LOOPS
+from .accumulator import TRUSTED, PassPlan, grids, least_gain, next_choice, tile_order
+from .cuda_loops import LOOPS
 from .film import shows_background
 from .host_accumulator import HostAccumulator
-from .tiles import ordered
 from .units.pixel import linear
 
 PARTS = 8192
@@ -28,18 +27,7 @@ TONES = {"none": 0, "filmic": 1, "reinhard": 2}
 
 
 class CudaAccumulator:
-    """Picture in progress in GPU memory, with the interface of `HostAccumulator`.
-
-    Parameters
-    ----------
-    start : HostAccumulator
-        Picture to copy to the GPU.
-
-    Raises
-    ------
-    KernelError
-        If there is no GPU.
-    """
+    """Picture in progress in GPU memory, with the interface of `HostAccumulator`."""
 
     def __init__(self, start: HostAccumulator) -> None:
         cuda = self._cuda = require()
@@ -49,7 +37,7 @@ class CudaAccumulator:
         precision: Precision = "float32" if self.dtype == np.float32 else "float64"
         self._loops = load_loops(Linked("", np.zeros(1)), precision, LOOPS)
         self.sums = cuda.to_device(start.sums)
-        self._order = cuda.to_device(ordered(self.width, self.height))
+        self._order = cuda.to_device(tile_order(self.width, self.height))
         self._squares, self._gains = (cuda.device_array(pixels, self.dtype) for _ in range(2))
         self._parts = cuda.device_array((min(PARTS, pixels), 3), self.dtype)
         self._shown = cuda.device_array((pixels, 3), np.uint8)
@@ -58,7 +46,7 @@ class CudaAccumulator:
         """Return an empty accumulator in the same memory; this one becomes invalid."""
         fresh = copy(self)
         fresh.passes, self.passes = 0, GONE
-        launched(self._loops.clear, self.sums.size, self.sums)
+        launch(self._loops.clear, self.sums.size, self.sums)
         return fresh
 
     def host(self) -> HostAccumulator:
@@ -67,7 +55,7 @@ class CudaAccumulator:
 
     def _summed(self, loop: Any, *arguments: Any) -> np.ndarray:
         """Run a kernel over the partial sums and return them, float64 [threads, 3]."""
-        launched(loop, len(self._parts), *arguments)
+        launch(loop, len(self._parts), *arguments)
         return np.asarray(self._parts.copy_to_host(), np.float64)
 
     def statistics(self) -> tuple[float, float]:
@@ -107,7 +95,7 @@ class CudaAccumulator:
         coarse = spacings[self.passes - 1] if 0 < self.passes < len(spacings) else 1
         behind = linear(film.background) if shows_background(view) else (0, 0, 0)
         given = (2.0**film.exposure, *behind)
-        launched(
+        launch(
             self._loops.show,
             len(self._shown),
             self.sums,

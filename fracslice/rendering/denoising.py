@@ -7,13 +7,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.ndimage import uniform_filter
 
-from ..common.extras import lacking
+from ..common.messages import lacking
 from .accumulator import COUNT, COVER, GOAL
 from .crops import Crop
 from .host_accumulator import HostAccumulator
-from .passes import Pass
-from .picture_layers import layer
-from .progressive import Renderer
+from .progressive import Pass, Renderer, layer
 from .units.pixel import UNKNOWN, squared_error
 
 GUIDES = ("albedo", "normal")
@@ -26,29 +24,12 @@ ALIKE = 0.1
 
 
 def advice() -> str:
-    """Return what to install for Open Image Denoise.
-
-    Returns
-    -------
-    str
-        One line; empty if it is installed.
-    """
+    """Return what to install for Open Image Denoise."""
     return lacking("pyoidn", "by non-local means; Open Image Denoise, which leaves less noise, needs")
 
 
-def denoised(renderer: Renderer) -> Pass:
-    """Remove the noise of a renderer's picture, by Open Image Denoise or else by non-local means.
-
-    Parameters
-    ----------
-    renderer : Renderer
-        Renderer of the picture, in mode "light"; renders the guides.
-
-    Returns
-    -------
-    Pass
-        The picture without noise. The renderer keeps its own.
-    """
+def denoise(renderer: Renderer) -> Pass:
+    """Remove the noise of a renderer's picture, by Open Image Denoise or else by non-local means."""
     done, host, cut = renderer.seen(), renderer.accumulator.host(), renderer.crop.within
     mean = done.mean
     albedo, normal = (layer(renderer, mode) for mode in GUIDES)
@@ -78,19 +59,8 @@ def non_local_means(
     Rousselle, Knaus and Zwicker 2012, "Adaptive Rendering with Non-Local Means Filtering", which subtracts
     what noise explains. Other colours and normals are other surfaces.
 
-    Parameters
-    ----------
-    light : ndarray of float32, shape (height, width, 3)
-        Linear light.
-    variance : ndarray of float, shape (height, width)
-        Squared standard error of displayed brightness.
-    albedo, normal : ndarray of float32, shape (height, width, 3)
-        Colour without light, and unit normal.
-
-    Returns
-    -------
-    ndarray of float32, shape (height, width, 3)
-        Linear light.
+    `light`: float32 (height, width, 3); `variance`: float (height, width); `albedo`, `normal`: float32
+    (height, width, 3). Returns float32 (height, width, 3).
     """
     shown = light @ np.array((0.2126, 0.7152, 0.0722), np.float32)
     grey = shown / (1 + shown)

@@ -62,7 +62,7 @@ def develop(mean: np.ndarray, view: View, work: Work | None = None) -> np.ndarra
     film, mode, work = view.film, view.shading.mode, work or Work(1)
     alpha, light = mean[..., 3:], mean[..., :3]
     if mode != "light":
-        return layered(displayed(picture(mean, mode), mode, alpha[..., 0] > 0), alpha, film)
+        return over_background(display_values(picture(mean, mode), mode, alpha[..., 0] > 0), alpha, film)
     behind = np.array(linear(film.background if shows_background(view) else (0, 0, 0)), np.float32)
     exposure, bands = np.float32(2.0**film.exposure), chunks(len(mean), BAND)
     shown = np.empty(light.shape, np.float32)
@@ -73,7 +73,7 @@ def develop(mean: np.ndarray, view: View, work: Work | None = None) -> np.ndarra
 
     work.map(exposed, bands)
     if film.bloom:
-        shown = bloomed(shown, film.bloom, work)
+        shown = add_bloom(shown, film.bloom, work)
 
     def toned(rows: slice) -> None:
         part = shown[rows]
@@ -88,39 +88,16 @@ def develop(mean: np.ndarray, view: View, work: Work | None = None) -> np.ndarra
 
 
 def shows_background(view: View) -> bool:
-    """Return whether rays that miss show the film's background.
-
-    Parameters
-    ----------
-    view : View
-        The view, with its lights.
-
-    Returns
-    -------
-    bool
-        False if they show a sky or fog, or if the film is transparent.
-    """
+    """Return whether rays that miss show the film's background."""
     lit = view.shading.mode == "light"
     return not (view.film.transparent or (lit and (view.fog or any(x.surrounds for x in view.lights))))
 
 
-def displayed(values: np.ndarray, mode: str, hit: np.ndarray) -> np.ndarray:
+def display_values(values: np.ndarray, mode: str, hit: np.ndarray) -> np.ndarray:
     """Map the values of a mode other than "light" to display values.
 
-    Parameters
-    ----------
-    values : ndarray of float32, shape (height, width, 3)
-        Result of `picture`.
-    mode : str
-        `Shading.mode`.
-    hit : ndarray of bool, shape (height, width)
-        True where a ray hit.
-
-    Returns
-    -------
-    ndarray of float32, shape (height, width, 3)
-        sRGB in [0, 1]. Depth and distance: the picture's smallest value, divided by the value. Position: the
-        range of each coordinate. Steps: the more, the darker.
+    `values`: float32 (height, width, 3); `hit`: bool (height, width). Returns float32 (height, width, 3),
+    sRGB in [0, 1].
     """
     if mode in ("depth", "distance"):
         values = values.min() / np.maximum(values, LEAST)
@@ -137,22 +114,11 @@ def displayed(values: np.ndarray, mode: str, hit: np.ndarray) -> np.ndarray:
     return np.asarray(np.clip(values, 0, 1), np.float32)
 
 
-def layered(shown: np.ndarray, alpha: np.ndarray, film: Film) -> np.ndarray:
+def over_background(shown: np.ndarray, alpha: np.ndarray, film: Film) -> np.ndarray:
     """Place display values on the film's background.
 
-    Parameters
-    ----------
-    shown : ndarray of float32, shape (height, width, 3)
-        sRGB in [0, 1].
-    alpha : ndarray of float32, shape (height, width, 1)
-        Fraction of each pixel that is covered.
-    film : Film
-        The film.
-
-    Returns
-    -------
-    ndarray of float32, shape (height, width, 3)
-        sRGB in [0, 1]; (height, width, 4) with unassociated alpha for a transparent film.
+    `shown`: float32 (height, width, 3), sRGB in [0, 1]; `alpha`: float32 (height, width, 1), fraction of
+    each pixel that is covered. Returns float32 (height, width, 3), sRGB in [0, 1].
     """
     if film.transparent:
         return np.concatenate([shown, alpha], 2)
@@ -162,38 +128,18 @@ def layered(shown: np.ndarray, alpha: np.ndarray, film: Film) -> np.ndarray:
 def levels(shown: np.ndarray) -> np.ndarray:
     """Quantise sRGB in [0, 1] to uint8.
 
-    Parameters
-    ----------
-    shown : ndarray of float32
-        sRGB in [0, 1].
-
-    Returns
-    -------
-    ndarray of uint8
-        Levels of 256.
+    `shown`: sRGB in [0, 1].
     """
     return np.asarray(shown * np.float32(255) + np.float32(0.5), np.uint8)
 
 
-def bloomed(light: np.ndarray, part: float, work: Work) -> np.ndarray:
+def add_bloom(light: np.ndarray, part: float, work: Work) -> np.ndarray:
     """Add bloom to an image.
 
     Light above `BRIGHT` is spread by four Gaussians of standard deviation 1/256 to 1/32 of the picture's
     height (Spencer et al. 1995, "Physically-Based Glare Effects for Digital Images", as a sum of Gaussians).
 
-    Parameters
-    ----------
-    light : ndarray of float32, shape (height, width, 3)
-        Linear light.
-    part : float
-        Fraction of the bright light that is spread.
-    work : Work
-        Threads.
-
-    Returns
-    -------
-    ndarray of float32, shape (height, width, 3)
-        Linear light.
+    `light`: float32 (height, width, 3). Returns float32 (height, width, 3).
     """
     from scipy.ndimage import gaussian_filter
 

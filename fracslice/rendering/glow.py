@@ -4,14 +4,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from ..formulas.material import material, stops
 from ..formulas.registry import Fixed, Node
 from ..kernel.linker import Linker
-from .drawn import Drawn
 from .units import glowing
 from .units.glossy import highlight
 from .units.pixel import linear
+
+
+@dataclass
+class Drawn:
+    """Random numbers of a bounce."""
+
+    count: int = 0  # numbers in use
+
+    def names(self, count: int) -> list[str]:
+        """Reserve random numbers."""
+        self.count += count
+        return [f"u[{k}]" for k in range(self.count - count, self.count)]
+
 
 MOST = 16
 """Bodies of their own; more than that are one."""
@@ -21,18 +34,7 @@ CHANNELS, AXES = "rgb", "xyz"
 
 
 def glowing_bodies(root: Node) -> list[tuple[float, ...]]:
-    """Return the bodies that glow.
-
-    Parameters
-    ----------
-    root : Node
-        Root of the formula tree.
-
-    Returns
-    -------
-    list of tuple of float
-        Bodies with an end on all sides; see `units.glowing.prominence`.
-    """
+    """Return the bodies that glow."""
     nodes = {id(n): n for n in root.walk() if n.formula.name == material.name and n["glow"]}
     bodies = [_body(_only(root, node), node) for node in nodes.values()]
     known = [body for body in bodies if body]
@@ -72,12 +74,8 @@ def _numbers(low: Sequence[float], high: Sequence[float], power: float) -> tuple
 
 
 def bind(linker: Linker, bodies: list[tuple[float, ...]]) -> list[str]:
-    """Bind the units; return the lines for the start v of rays that continue and the share sent to bodies.
-
-    Returns
-    -------
-    list of str
-        Kernel source lines.
+    """Bind the units; return the lines for the start v of rays that continue and the share sent to
+    bodies.
     """
     values = {"bodies": tuple(bodies), "count": Fixed(len(bodies))}
     for function in (glowing.sent_share, glowing.towards_body, glowing.body_density):
@@ -90,41 +88,15 @@ def bind(linker: Linker, bodies: list[tuple[float, ...]]) -> list[str]:
 def density(name: str, to: str) -> str:
     """Return the line for the density of rays that continue in a direction.
 
-    Parameters
-    ----------
-    name : str
-        Variable to set.
-    to : str
-        First letter of the direction's components.
-
-    Returns
-    -------
-    str
-        Kernel source line.
+    `to`: first letter of the direction's components.
     """
     ray = ", ".join(f"{to}{a}" for a in AXES)
     beside = f"body_density_(vx, vy, vz, nx, ny, nz, {ray}, P)"
     return f"{name} = mixed_density(sent, {beside}, nx, ny, nz, dx, dy, dz, {ray}, roughness, share)"
 
 
-def scattered(linker: Linker, drawn: Drawn, u: str, v: str, choice: str) -> list[str]:
-    """Return the lines that choose between a reflected ray, a scattered one and one to a body.
-
-    Parameters
-    ----------
-    linker : Linker
-        Linker of the kernel.
-    drawn : Drawn
-        Random numbers of a bounce.
-    u, v, choice : str
-        Random numbers of the scattered ray.
-
-    Returns
-    -------
-    list of str
-        Kernel source lines for the direction e, its density eq, the throughput t and the probability
-        of survival: the throughput of a ray to a body is small, not its light.
-    """
+def scatter_lines(linker: Linker, drawn: Drawn, u: str, v: str, choice: str) -> list[str]:
+    """Return the lines that choose between a reflected ray, a scattered one and one to a body."""
     linker.share(highlight)
     (w,) = drawn.names(1)
     lines = [

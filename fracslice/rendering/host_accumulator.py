@@ -14,10 +14,20 @@ from ..kernel.linker import Linked
 from ..kernel.machine import Function
 from ..scene.view import View
 from ..work import Work, chunks
-from .accumulator import CHANNELS, COARSE, COUNT, COVER, GOAL, PassPlan, grids, least_gain, next_choice
+from .accumulator import (
+    CHANNELS,
+    COARSE,
+    COUNT,
+    COVER,
+    GOAL,
+    PassPlan,
+    band_order,
+    grids,
+    least_gain,
+    next_choice,
+)
 from .accumulator_loops import LOOPS
 from .film import BAND, develop, levels
-from .tiles import band_order
 
 
 @lru_cache
@@ -114,7 +124,7 @@ class HostAccumulator:
             step, finer = spacings[self.passes - 1 : self.passes + 1]
             if not self.channels[: finer + 1 : finer, : finer + 1 : finer, GOAL].all():
                 return self._means(step)
-        return filled(self._means(1), self.counts > 0, self.work)
+        return fill_gaps(self._means(1), self.counts > 0, self.work)
 
     def _means(self, step: int) -> np.ndarray:
         sums = self.channels[::step, ::step]
@@ -218,27 +228,16 @@ class HostAccumulator:
         return PassPlan(np.concatenate(rows), int(sums[:, 0].sum()), int(sums[:, 1].max()))
 
 
-def filled(mean: np.ndarray, known: np.ndarray, work: Work) -> np.ndarray:
+def fill_gaps(mean: np.ndarray, known: np.ndarray, work: Work) -> np.ndarray:
     """Give each pixel without samples the mean of the smallest block around it that has some.
 
-    Parameters
-    ----------
-    mean : ndarray of float32, shape (height, width, 4)
-        Mean of the samples of a pixel, 0 without samples; changed in place.
-    known : ndarray of bool, shape (height, width)
-        True for a pixel with samples.
-    work : Work
-        Threads.
-
-    Returns
-    -------
-    ndarray of float32, shape (height, width, 4)
-        The same array. Blocks have sides of powers of `COARSE`.
+    `mean`: float32 (height, width, 4), mean of the samples of a pixel; `known`: bool (height, width), true
+    for a pixel with samples. Returns float32 (height, width, 4).
     """
     if known.all() or not known.any():
         return mean
     count = _blocks(known.astype(np.float32))
-    means = filled(_blocks(mean) / np.maximum(count, 1)[..., None], count > 0, work)
+    means = fill_gaps(_blocks(mean) / np.maximum(count, 1)[..., None], count > 0, work)
 
     def spread(rows: slice) -> None:
         part = means[rows.start // COARSE : -(-rows.stop // COARSE)].repeat(COARSE, 0).repeat(COARSE, 1)

@@ -4,26 +4,180 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from ..formulas.registry import Fixed, Node
-from ..kernel.dialects import FieldDialect
-from ..kernel.linker import Linker
-from ..kernel.structure import link_tree
-from ..scene.view import Camera, Light, View
+from ..kernel.linker import FieldDialect, Linker, link_tree
+from ..scene.view import Camera, Fog, Light, View
 from . import glow
-from .colours import Look, opaque_part
-from .drawn import Drawn
-from .haze import fogged
-from .lamps import bind_light, casts_shadows
-from .optics import Optics, ray_bound
-from .scattering import divided, lacquered
-from .surroundings import Surroundings, seen_as_disc
-from .trace_syntax import text_of
+from .environments import PIXELS, Environment, environment, load_picture
+from .glow import Drawn
+from .materials import Look, opaque_part, text_of
+from .scattering import division_lines, lacquer_lines
+from .setup import Optics, ray_bound
+from .units import environment as units
+from .units import fog as fog_units
 from .units import lights, march, shade
 from .units.glossy import highlight
 from .units.intrinsics import background, blocker, transparent
 from .units.pixel import linear
-from .units.weights import mixed_weights, weights
+from .units.weights import behind, mixed_weights, sun_density, sunshine, weights
+
+
+def casts_shadows(light: Light) -> bool:
+    """Return whether the light may be blocked; the surfaces in view never block a light at the camera."""
+    return light.shadows == "yes" and light.kind != "camera"
+
+
+def bind_light(linker: Linker, name: str, light: Light, eye: tuple[float, float, float], far: float) -> None:
+    """Bind the unit of a sun or lamp, or of a light at the camera."""
+    if light.kind == "camera":
+        linker.bind(name, lights.sharp_lamp, {"position": eye})
+        return
+    if light.kind == "lamp":
+        soft, function = {"radius": light.size}, lights.lamp if light.size else lights.sharp_lamp
+        linker.bind(name, function, {"position": light.position, **(soft if light.size else {})})
+        return
+    length = math.hypot(*light.position)
+    values: dict[str, Any] = {"towards": tuple(p / length for p in light.position), "far": far}
+    if light.size:
+        values["spread"] = math.tan(math.radians(light.size) / 2)
+    linker.bind(name, lights.sun if light.size else lights.sharp_sun, values)
+
+
+def seen_as_disc(light: Light) -> bool:
+    """Return whether continued rays meet the light: a sun of some size."""
+    return light.kind == "sun" and light.size > 0 and light.shadows == "yes"
+
+
+def tint(light: Light) -> tuple[float, ...]:
+    """Return the linear colour of a light times its strength."""
+    return tuple(c * light.strength for c in linear(light.colour))
+
+
+@dataclass
+class Surroundings:
+    """Bindings of the lights that rays meet when they miss the scene."""
+
+    linker: Linker  # linker of the kernel
+    # true if lights are sampled by their own distribution and by the surface's; see `units.weights`
+    weighted: bool
+
+    def tables(self, light: Light) -> tuple[Environment, dict[str, Any]]:
+        """The tables of an environment, and values that its units share."""
+        assert light.file
+        made = environment(load_picture(light.file, PIXELS, light.fail))
+        return made, {"size": made.picture.size, "turn": light.rotation / 360}
+
+    def bind_light(self, light: Light) -> None:
+        """Bind the light of an environment in a direction."""
+        made, values = self.tables(light)
+        width, height = values.pop("size")
+        values |= {"width": width, "height": height, "tint": tint(light), "light": made.picture.light}
+        self.linker.bind("surroundings_", units.surroundings, values)
+
+    def bind_sampling(self, light: Light) -> None:
+        """Bind the sampling of an environment."""
+        made, values = self.tables(light)
+        rows, columns = made.distribution
+        values |= {"rows": rows, "columns": columns}
+        steps = {"steps": made.steps, "halves": made.halves}
+        self.linker.bind("towards_", units.towards, values | steps)
+        if self.weighted:
+            self.linker.bind("likelihood_", units.likelihood, values)
+
+    def bind_irradiance(self, name: str, light: Light) -> None:
+        """Bind the light of an environment without shadows."""
+        made, values = self.tables(light)
+        factors = zip(tint(light), made.harmonics(values["turn"]), strict=True)
+        harmonics = tuple(tuple(t * f for f in channel) for t, channel in factors)
+        self.linker.bind(name, units.irradiance, {"harmonics": harmonics})
+
+    def behind(self, light: Light) -> list[str]:
+        """Lines for an environment that a ray meets."""
+        self.bind_light(light)
+        lines = ["r, g, b = surroundings_(dx, dy, dz, P)"]
+        if self.weighted:
+            self.bind_sampling(light)
+            self.linker.share(behind)
+            lines.append("w = behind(q, likelihood_(dx, dy, dz, P))")
+            lines += [f"{c} = w * {c}" for c in "rgb"]
+        return lines
+
+    def bind_sun(self, k: int, light: Light) -> None:
+        """Bind the density of the samples of a sun."""
+        towards = tuple(p / math.hypot(*light.position) for p in light.position)
+        values = {"towards": towards, "spread": math.tan(math.radians(light.size) / 2)}
+        self.linker.bind(f"sun_density{k}", sun_density, values)
+
+    def disc(self, k: int, light: Light) -> list[str]:
+        """Lines for a sun that continued rays meet."""
+        self.bind_sun(k, light)
+        self.linker.share(sunshine)
+        lines = [f"w = sunshine(q, sun_density{k}(dx, dy, dz, P))"]
+        return lines + [
+            f"{c} = {c} + w * {self.linker.argument(t)}" for c, t in zip("rgb", tint(light), strict=True)
+        ]
+
+
+CHANNELS = "rgb"
+
+
+def fog_lines(lighting: Lighting, fog: Fog, onward: bool) -> list[str]:
+    """Return the lines that cover a surface with fog.
+
+    Without a colour of its own, surfaces fade into what is behind them.
+    """
+    linker, values = lighting.linker, {"density": fog.density}
+    if fog.height is None:
+        linker.bind("clearness", fog_units.fog, values)
+        lines = ["air = clearness(t, P)"]
+    else:
+        values |= {"level": fog.level, "height": fog.height}
+        linker.bind("clearness", fog_units.height_fog, values)
+        lines = ["air = clearness(t, z, dz, P)"]
+    if lighting.inside:
+        lines.append("air = where(side < 0.0, 1.0 + 0.0 * t, air)")
+    if fog.colour is None:
+        lines.append("fr, fg, fb = background(dx, dy, dz, 0.0, P)")
+    else:
+        colour = map(linker.argument, linear(fog.colour))
+        lines += [f"f{c} = {value}" for c, value in zip(CHANNELS, colour, strict=True)]
+    lines += [f"{c} = f{c} + air * ({c} - f{c})" for c in CHANNELS]
+    if fog.scatter:
+        lines += _inscatter_lines(lighting, fog, values)
+    return [*lines, *(f"t{c} = air * t{c}" for c in CHANNELS if onward)]
+
+
+def _inscatter_lines(lighting: Lighting, fog: Fog, values: dict[str, float]) -> list[str]:
+    """Lines for light that fog scatters to the eye, the same in all directions.
+
+    One point of the ray, uniform by its length, sees each sun and lamp.
+    """
+    linker = lighting.linker
+    (u,) = lighting.drawn.names(1)
+    lines = [f"along = {u} * t", *(f"p{a} = {a} - (t - along) * d{a}" for a in "xyz")]
+    if fog.height is None:
+        lines.append(f"haze = t * clearness(along, P) * {linker.argument(fog.density)}")
+    else:
+        linker.bind("thickness_", fog_units.thickness, values)
+        lines.append("haze = t * clearness(along, pz, dz, P) * thickness_(pz, P)")
+    if lighting.inside:
+        lines.append("haze = where(side < 0.0, 0.0, haze)")
+    part = linker.argument(fog.scatter / 4)
+    for k, light in enumerate(lighting.view.lights):
+        if light.kind not in ("sun", "lamp"):
+            continue
+        soft = lighting.drawn.names(2) if light.size else ["t", "t"]
+        lines.append(f"lx, ly, lz, far, power = light{k}(px, py, pz, {', '.join(soft)}, P)")
+        if light.shadows == "yes":
+            lines.append("power = power * visible_(px, py, pz, lx, ly, lz, far, h, P)")
+        lines += [
+            f"{c} = {c} + {part} * haze * power * {linker.argument(s)}"
+            for c, s in zip(CHANNELS, tint(light), strict=True)
+        ]
+    return lines
+
 
 PATIENCE = 800
 """Maximum steps of a shadow ray."""
@@ -31,33 +185,15 @@ PATIENCE = 800
 
 @dataclass
 class Lighting:
-    """Lights of a view, and the kernel lines for their light at a hit.
+    """Lights of a view, and the kernel lines for their light at a hit."""
 
-    Attributes
-    ----------
-    linker : Linker
-        Linker of the kernel.
-    drawn : Drawn
-        Random numbers of a bounce.
-    root : Node
-        Tree with resolved depths.
-    view : View
-        The view, with its lights.
-    camera : Camera
-        The camera.
-    seen : Optics
-        Lengths of the kernel.
-    inside : bool
-        True if rays pass through the solid.
-    """
-
-    linker: Linker
-    drawn: Drawn
-    root: Node
-    view: View
-    camera: Camera
-    seen: Optics
-    inside: bool
+    linker: Linker  # linker of the kernel
+    drawn: Drawn  # random numbers of a bounce
+    root: Node  # tree with resolved depths
+    view: View  # the view, with its lights
+    camera: Camera  # the camera
+    seen: Optics  # lengths of the kernel
+    inside: bool  # true if rays pass through the solid
 
     def __post_init__(self) -> None:
         self.around = Surroundings(self.linker, self.weighted)
@@ -78,7 +214,7 @@ class Lighting:
         if look.coated:
             lines += [f"glaze{c} = 0.0 * t" for c in "rgb"]
         if look.glossy:
-            lines += divided(self.linker, look)
+            lines += division_lines(self.linker, look)
             lines += [f"{c} = ambient * c{c}" + f" + glow * e{c}" * look.glows for c in "rgb"]
         else:
             lines += ["ambient = ambient + glow"] * look.glows
@@ -148,7 +284,7 @@ class Lighting:
             lines += [f"dense = sun_density{k}(lx, ly, lz, P)", *self.weights(look)]
             scattered, reflected = "scattered * ", "reflected * "
         if look.coated:
-            lines += lacquered(self.linker, colour)
+            lines += lacquer_lines(self.linker, colour)
         for c, s in zip("rgb", colour, strict=True):
             sent = f"{scattered}diffuse * c{c} + {reflected}{shine.format(c)}"
             lines.append(f"{c} = {c} + power * {s}{passed.format(c)} * ({sent})")
@@ -238,9 +374,9 @@ class Lighting:
         self.linker.bind("sky_", lights.sky, values)
 
     def fog(self, onward: bool) -> list[str]:
-        """Lines for fog; see `haze.fogged`."""
+        """Lines for fog; see `fog_lines`."""
         fog = self.view.fog
-        return [] if fog is None or fog.density == 0 else fogged(self, fog, onward)
+        return [] if fog is None or fog.density == 0 else fog_lines(self, fog, onward)
 
     def background(self) -> str:
         """Source of `units.intrinsics.background`: the sky, else the colour of the fog, else of the film."""

@@ -1,4 +1,4 @@
-"""Kernel generation: scene and view to one kernel that calls only the units in use.
+"""Kernel generation: scene, view and camera to one kernel that calls only the units in use.
 
 The generated text is straight-line code. Every calculation is in a unit of `fracslice.rendering.units`, bound
 to its parameters under a name. Effects that a scene does not use generate no code.
@@ -6,21 +6,96 @@ to its parameters under a name. Effects that a scene does not use generate no co
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
 
 from ..formulas.registry import Fixed, Node
 from ..kernel.linker import Linked, Linker
 from ..scene.view import Camera, View
-from .cameras import camera_unit
-from .colours import Look
-from .drawn import Drawn
+from .glow import Drawn
 from .lighting import Lighting
-from .optics import Optics, ray_bound
+from .materials import Look, text_of
 from .scattering import onward
-from .trace_syntax import text_of
+from .setup import Optics, footprint, ray_bound
+from .units import camera as units
 from .units import march
 from .units.intrinsics import GIVEN, surface
-from .units.normal import normal
+from .units.march import normal
+
+Unit = tuple[Callable[..., Any], dict[str, Any]]
+
+
+def camera_unit(camera: Camera, size: tuple[int, int]) -> Unit:
+    """Return the unit of a camera.
+
+    `size` in pixels.
+    """
+    return _KINDS[camera.kind](camera, size)
+
+
+def _flat(camera: Camera, size: tuple[int, int], pixel: float) -> dict[str, Any]:
+    """A plane film at distance 1: its corner and its steps per pixel."""
+    width, height = size
+    right, up = np.array(camera.right), np.array(camera.above)
+    corner = np.array(camera.forward) - right * (pixel * width / 2) + up * (pixel * height / 2)
+    return {
+        "eye": camera.eye,
+        "corner": tuple(corner),
+        "across": tuple(right * pixel),
+        "down": tuple(-up * pixel),
+    }
+
+
+def _perspective(camera: Camera, size: tuple[int, int]) -> Unit:
+    pixel, _ = footprint(camera, size)
+    right, up = np.array(camera.right), np.array(camera.above)
+    focus = camera.focus or math.dist(camera.eye, camera.target)
+    if camera.stereo:
+        half = size[0] // 2
+        eyes = {"offset": tuple(right * camera.stereo / 2), "half": float(half), "focus": focus}
+        return units.stereo, _flat(camera, (half, size[1]), pixel) | eyes
+    values = _flat(camera, size, pixel)
+    if camera.aperture == 0:
+        return units.pinhole, values
+    axes = {"right": tuple(right * camera.aperture), "up": tuple(up * camera.aperture), "focus": focus}
+    return units.lens, values | axes
+
+
+def _orthographic(camera: Camera, size: tuple[int, int]) -> Unit:
+    _, pixel = footprint(camera, size)
+    values = _flat(camera, size, pixel)
+    corner = np.array(values["corner"]) - camera.forward + camera.eye
+    return units.orthographic, values | {"corner": tuple(corner), "forward": camera.forward}
+
+
+def _fisheye(camera: Camera, size: tuple[int, int]) -> Unit:
+    pixel, _ = footprint(camera, size)
+    middle = {"middle": (size[0] / 2, size[1] / 2), "pixel": pixel}
+    return units.fisheye, _axes(camera) | middle
+
+
+def _equirectangular(camera: Camera, size: tuple[int, int]) -> Unit:
+    width = size[0] // 2 if camera.stereo else size[0]
+    film = {"width": float(width), "height": float(size[1]), "radius": camera.stereo / 2}
+    return units.equirectangular, _axes(camera) | film
+
+
+def _axes(camera: Camera) -> dict[str, Any]:
+    axes = {"right": camera.right, "up": camera.above, "forward": camera.forward}
+    return {"eye": camera.eye} | axes
+
+
+_KINDS: dict[str, Callable[[Camera, tuple[int, int]], Unit]] = {
+    "perspective": _perspective,
+    "orthographic": _orthographic,
+    "fisheye": _fisheye,
+    "equirectangular": _equirectangular,
+}
+
 
 CIRCLE = 1.4143 * 1.02
 """Radius of the circle around a pixel, half sides, with 2 % for the film's perspective."""
@@ -32,44 +107,21 @@ FAINTEST = 0.002
 
 @dataclass(frozen=True)
 class Frame:
-    """Kernel of one scene, camera and depth. Frames of one scene differ only in their parameters.
+    """Kernel of one scene, camera and depth. Frames of one scene differ only in their parameters."""
 
-    Attributes
-    ----------
-    linked : Linked
-        Kernel source and parameters P.
-    camera_samples, bounce_samples : int
-        Random numbers per camera ray, and per bounce.
-    bounces : int
-        Maximum bounces of a ray.
-    sharp : bool
-        True if all rays start at the eye, so that the cone prepass applies.
-    lit : bool
-        True for a picture of light, False for one of values such as depth.
-    transparent : bool
-        True if the light of camera rays that miss is left out.
-    weighted : bool
-        True if continued rays carry the density of their direction.
-    faintest : float
-        Sum of the throughputs up to which a ray ends; 0 on paths, which end at random.
-    far : int
-        Index in P of the far distance; the upper left pixel of the picture follows, and the half width of
-        a pixel's cone at distance 1.
-    block : int
-        Side of a block of the cone prepass on a GPU, pixels; a power of two.
-    """
-
-    linked: Linked
-    camera_samples: int
+    linked: Linked  # kernel source and parameters P
+    camera_samples: int  # random numbers per camera ray, and per bounce
     bounce_samples: int
-    bounces: int
-    sharp: bool
-    lit: bool
-    transparent: bool
-    weighted: bool
-    faintest: float
+    bounces: int  # maximum bounces of a ray
+    sharp: bool  # true if all rays start at the eye, so that the cone prepass applies
+    lit: bool  # true for a picture of light, False for one of values such as depth
+    transparent: bool  # true if the light of camera rays that miss is left out
+    weighted: bool  # true if continued rays carry the density of their direction
+    faintest: float  # sum of the throughputs up to which a ray ends; 0 on paths, which end at random
+    # index in P of the far distance; the upper left pixel of the picture follows, and the half width of a
+    # pixel's cone at distance 1
     far: int
-    block: int
+    block: int  # side of a block of the cone prepass on a GPU, pixels; a power of two
 
     @property
     def samples(self) -> int:
@@ -85,18 +137,7 @@ class Frame:
 def link_frame(root: Node, view: View, camera: Camera, seen: Optics, block: int) -> Frame:
     """Link the kernel of a scene.
 
-    Parameters
-    ----------
-    root : Node
-        Tree with resolved depths.
-    view : View
-        The view.
-    camera : Camera
-        The camera.
-    seen : Optics
-        Lengths of the kernel.
-    block : int
-        Side of a block of the cone prepass, pixels.
+    `block` in pixels.
     """
     return _Frame(root, view, camera, seen, block).linked()
 

@@ -1,4 +1,6 @@
-"""Live rendering: a background thread that follows camera input and changes of the scene file."""
+"""Live rendering: a background thread that follows camera input and changes of the scene file, with drafts
+while moving.
+"""
 
 from __future__ import annotations
 
@@ -12,15 +14,131 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import Cancelled, FracsliceError, SceneError
+from ..formulas.registry import Node
 from ..scene.model import Scene
 from ..scene.reader import read
-from ..scene.view import Camera
+from ..scene.view import Camera, View
 from ..work import Work
-from .draft import Follower, drafted
-from .passes import Pass
-from .progressive import Renderer
-from .steering import CameraInput
-from .watching import POLL, WatchedFile
+from .progressive import Pass, Renderer
+from .setup import clearance, default_lights
+
+NEARER = 2.0
+"""Ratio of surface distances, in either direction, at which depth and precision are chosen again."""
+VISIBLE = 0.7
+"""Fraction of the sky that is visible from an average point of a fractal."""
+
+
+def draft_view(root: Node, view: View) -> View:
+    """Return a view whose pictures are free of noise after one sample: hard shadows and a sharp lens."""
+    lights = tuple(
+        replace(light, shadows="no", strength=light.strength * VISIBLE)
+        if light.surrounds
+        else replace(light, size=0.0)
+        for light in view.lights or default_lights(root)
+    )
+    camera = view.camera and replace(view.camera, aperture=0.0)
+    return replace(view, camera=camera, lights=lights, shading=replace(view.shading, bounces=0, paths="no"))
+
+
+class Follower:
+    """Renderer of a scene that follows a camera."""
+
+    def __init__(self, root: Node, view: View, work: Work, device: str) -> None:
+        self._root, self._view, self._work, self._device = root, view, work, device
+        self._renderer: Renderer | None = None
+        self._distance_then = 0.0
+
+    def follow(self, camera: Camera | None, size: tuple[int, int]) -> Renderer:
+        """Return a renderer of an empty picture; it is made again only if depth or size must change.
+
+        `size` in pixels.
+        """
+        made = self._renderer
+        if made and camera and (made.width, made.height) == size and self._near(camera):
+            made.look(camera)
+            return made
+        view = replace(self._view, camera=camera) if camera else self._view
+        self._renderer = made = Renderer(self._root, view, size, self._work, self._device)
+        self._distance_then = self.distance
+        return made
+
+    def _near(self, camera: Camera) -> bool:
+        """True if depth and precision suit the camera's distance to the surface."""
+        assert self._renderer
+        try:
+            distance = clearance(self._renderer.setup.root, camera)
+        except SceneError:  # inside the solid at this depth
+            return False
+        return self._distance_then / NEARER < distance < self._distance_then * NEARER
+
+    @property
+    def distance(self) -> float:
+        """Lower bound of the distance from the camera to the surface, scene units."""
+        assert self._renderer
+        return clearance(self._renderer.setup.root, self._renderer.setup.camera)
+
+
+POLL = 0.2
+"""Interval between checks of the file, seconds."""
+
+
+class WatchedFile:
+    """File that another program may save again."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._checked, self._saved = time.monotonic(), self._stamp()
+
+    def changed(self) -> bool:
+        """Return whether the file was saved since the last call; the disk is asked at most every `POLL`."""
+        now, saved = time.monotonic(), self._saved
+        if now - self._checked < POLL:
+            return False
+        self._checked, self._saved = now, self._stamp() or saved
+        return self._saved != saved
+
+    def _stamp(self) -> tuple[int, int] | None:
+        """Modification time and size of the file; None while it is being replaced."""
+        try:
+            status = self._path.stat()
+        except OSError:
+            return None
+        return status.st_mtime_ns, status.st_size
+
+
+BOLD = 0.5
+"""Maximum fraction of the distance to the surface per step."""
+TURN = 60.0
+"""Rate of turning and rolling by keys, degrees per second."""
+
+
+@dataclass(frozen=True)
+class CameraInput:
+    """Steering input of the camera."""
+
+    forward: float = 0.0  # direction of flight, -1 to 1 each
+    right: float = 0.0
+    up: float = 0.0
+    yaw: float = 0.0  # rotation to the right, up and clockwise, -1 to 1 each
+    pitch: float = 0.0
+    roll: float = 0.0
+    pace: float = 1.0  # speed, in distances to the surface per second
+
+    def flown(self, camera: Camera, distance: float, seconds: float) -> Camera:
+        """Move and turn a camera for some time.
+
+        Speed is proportional to the distance of the surface, so the camera never reaches it.
+
+        `distance` in scene units.
+        """
+        direction = self.forward, self.right, self.up
+        if any(direction):
+            length = distance * min(self.pace * seconds, BOLD) / max(1.0, math.hypot(*direction))
+            camera = camera.moved(*(length * axis for axis in direction))
+        if self.yaw or self.pitch:
+            camera = camera.turned(TURN * seconds * self.yaw, TURN * seconds * self.pitch)
+        return camera.rolled(TURN * seconds * self.roll) if self.roll else camera
+
 
 WITHIN = 0.05
 """Aim for the time of a draft, seconds."""
@@ -36,27 +154,13 @@ LONGEST = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """Displayed state of a live picture.
+    """Displayed state of a live picture."""
 
-    Attributes
-    ----------
-    pixels : ndarray of uint8, shape (height, width, 3)
-        sRGB; a draft has fewer pixels than the window.
-    samples : float
-        Mean samples per pixel; 0 for a draft.
-    camera : Camera
-        Camera of the picture.
-    distance : float
-        Lower bound of the distance from the camera to the surface, scene units.
-    problem : str
-        Error message of the file's current version, or "".
-    """
-
-    pixels: np.ndarray = field(repr=False)
-    samples: float
-    camera: Camera
-    distance: float
-    problem: str = ""
+    pixels: np.ndarray = field(repr=False)  # sRGB; a draft has fewer pixels than the window
+    samples: float  # mean samples per pixel; 0 for a draft
+    camera: Camera  # camera of the picture
+    distance: float  # lower bound of the distance from the camera to the surface, scene units
+    problem: str = ""  # error message of the file's current version, or ""
 
 
 class Live:
@@ -65,34 +169,7 @@ class Live:
     While the camera moves, the picture is a draft with hard lights; at rest, it sharpens. If a later version
     of the file is invalid, the picture stays and the message is in `shown.problem`. Call `close` at the end.
 
-    Parameters
-    ----------
-    path : str or Path
-        Scene file.
-    settings : sequence of str
-        Settings as in `Scene.with_values`.
-    size : tuple of int
-        Picture width and height, pixels.
-    work : Work, optional
-        Threads and progress; it is copied with cancellation events of its own.
-    device : {"cpu", "cuda", "auto"}
-        Device that traces the rays.
-
-    Attributes
-    ----------
-    first : Camera
-        Camera of the first picture.
-    shown : Shown
-        Latest picture.
-    scene : Scene
-        Latest valid version of the scene.
-    making : float or None
-        Time at which the renderer under way was begun, by `time.monotonic`: it may need compilation.
-
-    Raises
-    ------
-    SceneError
-        If the scene cannot be rendered.
+    `size` in pixels.
     """
 
     def __init__(
@@ -134,13 +211,7 @@ class Live:
         return self._thread.is_alive()
 
     def steer(self, camera_input: CameraInput) -> None:
-        """Set the steering input.
-
-        Parameters
-        ----------
-        camera_input : CameraInput
-            Input that holds until the next call.
-        """
+        """Set the steering input."""
         if camera_input != self._camera_input:
             self._flown()  # a key held for less than the time of a draft counts, too
             with self._lock:
@@ -150,10 +221,7 @@ class Live:
     def turn(self, yaw: float, pitch: float) -> None:
         """Turn the camera.
 
-        Parameters
-        ----------
-        yaw, pitch : float
-            Angles to the right and up, degrees.
+        `yaw`, `pitch` in degrees.
         """
         with self._lock:
             self._aim = self._aim.turned(yaw, pitch)
@@ -168,10 +236,7 @@ class Live:
     def resize(self, size: tuple[int, int]) -> None:
         """Render at another size.
 
-        Parameters
-        ----------
-        size : tuple of int
-            Picture width and height, pixels.
+        `size` in pixels.
         """
         if size != self._size:
             self._size = size
@@ -267,7 +332,7 @@ class Live:
 
     def _load(self, scene: Scene, camera: Camera | None) -> None:
         """Show a scene from a camera, or from its own; if that fails, the former scene stays."""
-        hard, device = drafted(scene.root, scene.view), self._device
+        hard, device = draft_view(scene.root, scene.view), self._device
         drafts = Follower(scene.root, hard, self._drafting, device)
         self._problem = ""
         self._draft(drafts, camera or scene.view.camera, self._size)

@@ -10,18 +10,253 @@ Conventions:
   each lane, -1 for none.
 - `pixels` holds ``y << 16 | x``. `width` is that of the picture, pixels; `limit` the largest number of steps
   of a ray; `blocks` the number of blocks in a row of the picture; `frame` the linked frame.
+
+The arrays are those of `packets`.
+
+Packets are refilled: a lane whose ray is done takes the next ray at once, so no lane idles while rays are
+left. The arrays are those of `packets`.
 """
 
 from __future__ import annotations
 
-from ..kernel.intrinsics import WIDTH, load, store
-from ..kernel.loops import Loop, loop
-from .accumulator import CHANNELS, COUNT, GOAL
-from .lanes import Row, follow, store_vector
+from enum import IntEnum
+
+from ..formulas.vocabulary import any_of, where
+from ..kernel.loops import WIDTH, Loop, load, loop, store
+from .accumulator import CHANNELS, COUNT, COVER, GOAL
 from .linking import Frame
-from .packet_light import clear, cover, gather, shade
-from .units.intrinsics import camera_ray, span_box, step_cone, step_ray
+from .units.intrinsics import background, camera_ray, span_box, step_cone, step_ray, surface
+from .units.pixel import brightness, clamped
 from .units.random import centred, sample
+
+Row = IntEnum(
+    "Row", "ox oy oz dx dy dz start end side path t steps status r g b tr tg tb cover dense px py", start=0
+)
+"""State of a ray.
+
+- ox, oy, oz, dx, dy, dz: origin and unit direction.
+- start, end: interval of t to march.
+- side: -1 inside the solid.
+- path: length of the path before this ray; of a cone its half width at distance 1.
+- status: 1 hit, 2 missed, 3 out of steps.
+- r, g, b: light gathered.
+- tr, tg, tb: throughput, the factor on light still to come.
+- cover: 1 if the camera ray hit.
+- dense: density of the direction, for frames whose lights are weighted.
+- px, py: film position, the first two random numbers. The other random numbers are in the rows after them.
+"""
+Lane = IntEnum("Lane", "ox oy oz dx dy dz start end side path t steps done before stride", start=0)
+"""State of a ray in a packet. The first ten entries are those of `Row`."""
+
+
+def load_vector(W, row, m, i):
+    """Load three consecutive rows of rays.
+
+    `W`: workspace or lanes; `m`: numbers per row; `i`: first ray.
+    """
+    return load(W, row * m + i), load(W, (row + 1) * m + i), load(W, (row + 2) * m + i)
+
+
+def store_vector(W, row, m, i, a, b, c):
+    """Store three consecutive rows of rays.
+
+    `m`: numbers per row; `i`: first ray; `a`, `b`, `c`: WIDTH numbers of each row.
+    """
+    store(W, row * m + i, a)
+    store(W, (row + 1) * m + i, b)
+    store(W, (row + 2) * m + i, c)
+
+
+def follow(W, L, rays, n, m, limit, P, step):
+    """March n rays until each has hit, missed or run out of steps.
+
+    A ray has missed once its free distance exceeds its end; an over-relaxed step beyond the end does not
+    count.
+    """
+    for lane in range(WIDTH):
+        rays[lane] = -1
+        L[Lane.done * WIDTH + lane] = 1.0
+    under_way = 0
+    following = 0
+    while True:
+        for lane in range(WIDTH):
+            if L[Lane.done * WIDTH + lane] > 0.0:
+                under_way -= finish(W, L, rays, m, lane)
+                following = skip_missed(W, m, n, following)
+                L[Lane.before * WIDTH + lane] = 0.0
+                L[Lane.stride * WIDTH + lane] = 0.0
+                L[Lane.steps * WIDTH + lane] = 0.0
+                if following < n:
+                    take(W, L, rays, m, lane, following)
+                    following += 1
+                    under_way += 1
+                else:
+                    idle(L, rays, lane)
+        if under_way == 0:
+            break
+        march(L, limit, P, step)
+
+
+def finish(W, L, rays, m, lane):
+    """Write the result of a lane's ray."""
+    i = rays[lane]
+    if i < 0:
+        return 0
+    W[Row.t * m + i] = L[Lane.t * WIDTH + lane]
+    W[Row.steps * m + i] = L[Lane.steps * WIDTH + lane]
+    W[Row.status * m + i] = L[Lane.done * WIDTH + lane]
+    return 1
+
+
+def skip_missed(W, m, n, i):
+    """Mark rays with an empty interval as missed, from ray i on.
+
+    `m`, `n`, `i`: numbers per row of W, rays, first ray.
+    """
+    while i < n and W[Row.start * m + i] >= W[Row.end * m + i]:
+        W[Row.status * m + i] = 2.0
+        W[Row.steps * m + i] = 0.0
+        W[Row.t * m + i] = 0.0
+        i += 1
+    return i
+
+
+def take(W, L, rays, m, lane, i):
+    """Load a ray into a lane."""
+    for k in range(Row.path + 1):
+        L[k * WIDTH + lane] = W[k * m + i]
+    L[Lane.t * WIDTH + lane] = W[Row.start * m + i]
+    rays[lane] = i
+
+
+def idle(L, rays, lane):
+    """Park a lane without a ray far from the scene."""
+    for k in range(Lane.dz + 1):
+        L[k * WIDTH + lane] = 1e4
+    L[Lane.end * WIDTH + lane] = 1e30
+    L[Lane.side * WIDTH + lane] = 1.0
+    L[Lane.path * WIDTH + lane] = 0.0
+    L[Lane.t * WIDTH + lane] = 1.0
+    rays[lane] = -1
+
+
+def march(L, limit, P, step):
+    """Step all lanes until at least one is done."""
+    ox, oy, oz = load_vector(L, Lane.ox, WIDTH, 0)
+    dx, dy, dz = load_vector(L, Lane.dx, WIDTH, 0)
+    end = load(L, Lane.end * WIDTH)
+    side = load(L, Lane.side * WIDTH)
+    path = load(L, Lane.path * WIDTH)
+    t = load(L, Lane.t * WIDTH)
+    steps = load(L, Lane.steps * WIDTH)
+    before = load(L, Lane.before * WIDTH)
+    stride = load(L, Lane.stride * WIDTH)
+    while True:
+        t, before, stride, gap = step(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P)
+        steps = steps + 1.0
+        free = where(stride > 0.0, t - stride + before, t)
+        done = where(gap < 0.0, 1.0, where(free > end, 2.0, where(steps < limit, 0.0 * steps, 3.0)))
+        if any_of(done > 0.0):
+            break
+    store(L, Lane.t * WIDTH, t)
+    store(L, Lane.steps * WIDTH, steps)
+    store(L, Lane.before * WIDTH, before)
+    store(L, Lane.stride * WIDTH, stride)
+    store(L, Lane.done * WIDTH, done)
+
+
+def shade(W, m, first, last, P, frame):
+    """Add the light of every ray, and replace each ray by its continuation."""
+    for i in range(0, m, WIDTH):
+        status = load(W, Row.status * m + i)
+        dx, dy, dz = load_vector(W, Row.dx, m, i)
+        tr, tg, tb = load_vector(W, Row.tr, m, i)
+        missed = (status > 1.5) & (status < 2.5)
+        hit = (status < 1.5) | (status > 2.5)
+        r = 0.0 * dx
+        g = r
+        b = r
+        if any_of(missed):
+            r, g, b = background(dx, dy, dz, load(W, Row.dense * m + i) if frame.weighted else 0.0, P)
+        more = 0.0 * dx
+        if any_of(hit):
+            t = load(W, Row.t * m + i)
+            path = load(W, Row.path * m + i)
+            x = load(W, Row.ox * m + i) + t * dx
+            y = load(W, Row.oy * m + i) + t * dy
+            z = load(W, Row.oz * m + i) + t * dz
+            steps, side = load(W, Row.steps * m + i), load(W, Row.side * m + i)
+            u = tuple(load(W, (first + k) * m + i) for k in range(frame.bounce_samples))
+            light, onward = surface(x, y, z, dx, dy, dz, t, path, steps, side, last, u, P)
+            hr, hg, hb = light
+            r = where(hit, hr, r)
+            g = where(hit, hg, g)
+            b = where(hit, hb, b)
+            if frame.bounces:
+                er, eg, eb, ox, oy, oz, ex, ey, ez, es, dense = onward
+                er = where(hit, tr * er, 0.0)
+                eg = where(hit, tg * eg, 0.0)
+                eb = where(hit, tb * eb, 0.0)
+                more = er + eg + eb
+                store_vector(W, Row.tr, m, i, er, eg, eb)
+                store(W, Row.path * m + i, path + t)
+                store_vector(W, Row.ox, m, i, ox, oy, oz)
+                store_vector(W, Row.dx, m, i, ex, ey, ez)
+                store(W, Row.side * m + i, es)
+                if frame.weighted:
+                    store(W, Row.dense * m + i, dense)
+                enter, leave = span_box(ox, oy, oz, ex, ey, ez, P)
+                store(W, Row.start * m + i, enter)
+                store(W, Row.end * m + i, where(more > frame.faintest, leave, 0.0))
+        elif frame.bounces:
+            store_vector(W, Row.tr, m, i, more, more, more)
+        if frame.bounces:  # start beyond end: terminated rays, whose values may be NaN, are not marched
+            store(W, Row.start * m + i, where(more > frame.faintest, load(W, Row.start * m + i), 1e30))
+        sr, sg, sb = load_vector(W, Row.r, m, i)
+        store_vector(W, Row.r, m, i, sr + tr * r, sg + tg * g, sb + tb * b)
+
+
+def cover(W, m):
+    """Mark the camera rays that hit.
+
+    `W`: workspace.
+    """
+    for i in range(0, m, WIDTH):
+        status = load(W, Row.status * m + i)
+        missed = (status > 1.5) & (status < 2.5)
+        store(W, Row.cover * m + i, where(missed, 0.0, 1.0 + 0.0 * status))
+
+
+def clear(W, m):
+    """Remove the light of camera rays that missed."""
+    for i in range(0, m, WIDTH):
+        hit = load(W, Row.cover * m + i) > 0.5
+        r, g, b = load_vector(W, Row.r, m, i)
+        store_vector(W, Row.r, m, i, where(hit, r, 0.0), where(hit, g, 0.0), where(hit, b, 0.0))
+
+
+def gather(W, pixels, A, n, m, width, frame):
+    """Add one sample to each of n pixels. NaN, infinite and negative light is removed.
+
+    `A`: sums of the picture, changed in place.
+    """
+    for i in range(0, m, WIDTH):
+        r, g, b = load_vector(W, Row.r, m, i)
+        cr, cg, cb = clamped(r), clamped(g), clamped(b)
+        if frame.lit:
+            store_vector(W, Row.r, m, i, cr, cg, cb)
+        store(W, Row.t * m + i, brightness(cr, cg, cb))
+    for k in range(n):
+        pixel = pixels[k]
+        a = CHANNELS * ((pixel >> 16) * width + (pixel & 65535))
+        bright = W[Row.t * m + k]
+        A[a] += W[Row.r * m + k]
+        A[a + 1] += W[Row.g * m + k]
+        A[a + 2] += W[Row.b * m + k]
+        A[a + 3] += bright
+        A[a + 4] += bright * bright
+        A[a + COUNT] += 1.0
+        A[a + COVER] += W[Row.cover * m + k]
 
 
 def loops(frame: Frame) -> tuple[Loop, ...]:
@@ -38,20 +273,8 @@ def workspace(frame: Frame, rays: int) -> int:
 def tile(P, Q, S, W, L, rays, pixels, A, n, width, limit, shift, blocks, frame):
     """Add samples to each of n pixels up to their goals.
 
-    Parameters
-    ----------
-    P, Q, S : pointer to float, pointer to int32, pointer to float
-        Scene parameters, sample sequence, start distance of each block.
-    W, L, rays : pointer to float, pointer to float, pointer to int32
-        Workspace, lanes, ray of each lane.
-    pixels : pointer to int32
-        Pixels, ``y << 16 | x``, below their goals; overwritten.
-    A : pointer to float
-        Sums of the picture, `CHANNELS` per pixel.
-    n : int
-        Pixels.
-    shift, blocks : int
-        Binary logarithm of a block's side, and blocks per row of the picture.
+    `P`, `Q`, `S`: scene parameters, sample sequence, start distance of each block; `A`: `CHANNELS` per
+    pixel; `n` in pixels.
     """
     left = n
     while left > 0:
@@ -75,18 +298,7 @@ def tile(P, Q, S, W, L, rays, pixels, A, n, width, limit, shift, blocks, frame):
 
 
 def unfinished(pixels, A, n, width):
-    """Move the pixels below their goals to the front.
-
-    Parameters
-    ----------
-    pixels : pointer to int32
-        Pixels, changed in place.
-
-    Returns
-    -------
-    int
-        Their number.
-    """
+    """Move the pixels below their goals to the front."""
     kept = 0
     for k in range(n):
         pixel = pixels[k]
@@ -101,22 +313,7 @@ def unfinished(pixels, A, n, width):
 def cones(P, S, C, ids, W, L, rays, n, m, shift, blocks, coarser, parents, limit, frame):
     """Cone prepass: compute the distance up to which all rays of each block of pixels are free.
 
-    Parameters
-    ----------
-    P, S, C : pointer to float
-        Scene parameters; start distance of each block, written; that of each coarser block.
-    ids : pointer to int32
-        Block numbers.
-    W, L, rays : pointer to float, pointer to float, pointer to int32
-        Workspace, lanes, ray of each lane.
-    n, m : int
-        Blocks, and numbers per row of W.
-    shift, blocks : int
-        Binary logarithm of a block's side, and blocks per row of the picture.
-    coarser, parents : int
-        The same for the coarser blocks, whose free distance is known; `coarser` is relative to `shift`.
-    limit : int
-        Steps per cone.
+    `P`, `S`, `C`: scene parameters; `n`, `m`: blocks, and numbers per row of W.
     """
     for k in range(m):
         block = ids[min(k, n - 1)]
@@ -138,12 +335,7 @@ def draw(W, Q, P, pixels, A, n, m, width, frame):
 
     A pixel has the same numbers in the film and in a part of it.
 
-    Parameters
-    ----------
-    W : pointer to float
-        Workspace; rows from `Row.px` on are written.
-    Q, P, pixels, A : pointer
-        Sample sequence, scene parameters, pixels, sums of the picture.
+    `W`: workspace; `Q`, `P`, `pixels`, `A` in pixels.
     """
     first = (int(P[frame.far + 2]) << 16) + int(P[frame.far + 1])
     for k in range(m):

@@ -8,15 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.srgb import from_linear
+from ..common.arrays import from_linear
 from ..formulas import vocabulary
 from ..formulas.material import material
 from ..formulas.registry import Node
-from ..kernel.linker import CALLED, Linker
-from ..kernel.structure import link_tree
+from ..kernel.linker import CALLED, Linker, link_tree
 from ..work import Work, chunks
-from .colours import Look
-from .tracing import TraceDialect, traps
+from .materials import Look, TraceDialect, traps
 
 MATERIAL, PALETTE = "material", "viridis"
 
@@ -28,43 +26,22 @@ _FUNCTION = "colour"
 
 @dataclass(frozen=True)
 class Paint:
-    """Colours of points.
+    """Colours of points."""
 
-    Attributes
-    ----------
-    colours : ndarray of uint8, shape (n, 3)
-        sRGB.
-    scalars : mapping of str to ndarray of float32, shape (n,)
-        Property of the orbit, by the name of the trap, or "trap" where materials choose it; and the number of
-        the material, "material", 0 for none.
-    """
-
-    colours: NDArray[np.uint8]
+    colours: NDArray[np.uint8]  # sRGB
+    # property of the orbit, by the name of the trap, or "trap" where materials choose it; and the number of
+    # the material, "material", 0 for none
     scalars: Mapping[str, NDArray[np.float32]]
 
 
 def paint(root: Node, points: NDArray[np.float64], shown: str, work: Work) -> Paint:
     """Evaluate the colours of a scene.
 
-    Parameters
-    ----------
-    root : Node
-        Scene with resolved depths.
-    points : ndarray of float64, shape (n, 3)
-        Points of its surface, scene units.
-    shown : str
-        "material" for the materials of the scene, or one of `formulas.material.TRAPS` for all of it.
-    work : Work
-        Threads, progress and cancellation.
-
-    Returns
-    -------
-    Paint
-        Colours and scalars.
+    `points`: float64 (n, 3), scene units.
     """
     if shown != MATERIAL:
         root = material(_plain(root), palette=PALETTE, trap=shown)
-    source, parameters = _linked(root)
+    source, parameters = _link_painting(root)
     scope = {name: getattr(vocabulary, name) for name in vocabulary.NAMES}
     scope[CALLED] = lambda function: function
     exec(compile(source, "<linked colours>", "exec"), scope)
@@ -77,7 +54,7 @@ def paint(root: Node, points: NDArray[np.float64], shown: str, work: Work) -> Pa
     work.map(evaluate, chunks(len(points), COUNT))
     tone = {"trap" if shown == MATERIAL else shown: values[4].astype(np.float32)}
     number = {MATERIAL: values[3].astype(np.float32)} if shown == MATERIAL else {}
-    return Paint(_encoded(values[:3].T), {**tone, **number})
+    return Paint(_encode_srgb(values[:3].T), {**tone, **number})
 
 
 def _plain(node: Node) -> Node:
@@ -87,7 +64,7 @@ def _plain(node: Node) -> Node:
     return node.changed(tuple(map(_plain, node.children))) if node.children else node
 
 
-def _linked(root: Node) -> tuple[str, NDArray[np.float64]]:
+def _link_painting(root: Node) -> tuple[str, NDArray[np.float64]]:
     """Text and parameters of the function of linear red, green and blue, material number and tone."""
     linker = Linker()
     look = Look(linker, root)
@@ -103,7 +80,7 @@ def _linked(root: Node) -> tuple[str, NDArray[np.float64]]:
     return linker.text(), np.array(linker.parameters or [0.0])
 
 
-def _encoded(light: NDArray[np.float64]) -> NDArray[np.uint8]:
+def _encode_srgb(light: NDArray[np.float64]) -> NDArray[np.uint8]:
     """Linear light in sRGB."""
     colours: NDArray[np.uint8] = np.rint(255 * from_linear(light.clip(0.0, 1.0))).astype(np.uint8)
     return colours

@@ -1,33 +1,281 @@
-"""Progressive rendering: each pass adds one sample to the pixels that still need one."""
+"""Progressive rendering: each pass adds one sample to the pixels that still need one, here or as tasks of
+a cluster.
+"""
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
-from ..common.keys import key, program
+from ..common.cache import key, program
 from ..common.memory import available_bytes
-from ..errors import RenderError
-from ..formulas.parameters import Number, Vector
-from ..formulas.records import validated
+from ..errors import ClusterError, RenderError
+from ..formulas.parameters import Number, Vector, validate_value
 from ..formulas.registry import Node
-from ..kernel.devices import chosen
+from ..kernel.devices import choose_device
+from ..scene import Scene
+from ..scene.reader import reads
 from ..scene.view import Camera, Film, View
+from ..scene.writer import to_xml
 from ..work import Work
-from .accumulator import Accumulator, PassPlan, grids
+from .accumulator import CHANNELS, Accumulator, PassPlan, grids
 from .cpu import BLOCK, CpuTracer
 from .crops import Crop
+from .film import picture
 from .host_accumulator import HostAccumulator
 from .linking import Frame, link_frame
-from .optics import optics
-from .passes import Pass
 from .sequence import SampleRange
-from .setup import clipped, prepare
+from .setup import clip_scene, optics, prepare
+
+if TYPE_CHECKING:
+    from ..cluster import ResultFolder
+
+PASS_SAMPLES, PIXELS = 1 << 22, 1 << 20
+"""Samples of a task, about two seconds, and most pixels."""
+
+INPUT = "input"
+"""Name of the file with the pixels of a pass and their sums."""
+
+
+@dataclass(frozen=True)
+class PartTask:
+    """Samples of some pixels of a pass."""
+
+    scene: str  # XML of the scene
+    film: tuple[int, int]  # width and height of the film, pixels
+    crop: tuple[int, int, int, int] | None  # part of the film that is rendered
+    samples: SampleRange  # part of the sample sequence
+    size: tuple[int, int]  # width and height of the picture, pixels
+    dtype: str  # float type of the sums
+    pieces: ResultFolder  # folder with the input of the pass
+    job: str  # key of the pass: its frame, pixels and sums
+    frame: str  # key of the linked frame
+    number: int  # number of the pass
+    prepasses: int  # cone prepasses that were run
+    last: int  # largest goal of a pixel
+    start: int  # pixels of this part, and of the pass
+    end: int
+    count: int
+
+    @property
+    def name(self) -> str:
+        """Name of the part."""
+        return f"pass-{self.number:04}-pixels-{self.start:010}"
+
+    def make(self, work: Work) -> bytes:
+        """Sums of the pixels after the pass; see `Task.make`."""
+        of = _renderer(self.scene, self.film, self.crop, self.samples)
+        of.prepare(self.prepasses)
+        if of.dtype.name != self.dtype or frame_key(of.tracer.frame) != self.frame:
+            raise ClusterError("the frame linked here is another than that of the job")
+        width, dtype = 4 * self.count, of.dtype
+        pixels = np.frombuffer(self._input(4 * self.start, 4 * self.end), np.int32)
+        row = CHANNELS * dtype.itemsize
+        data = self._input(width + row * self.start, width + row * self.end)
+        sums, places = np.zeros((self.size[0] * self.size[1], CHANNELS), dtype), _places(pixels, self.size)
+        sums[places] = np.frombuffer(data, dtype).reshape(-1, CHANNELS)
+        of.tracer.add(sums.reshape(-1), PassPlan(pixels, len(pixels), self.last), work)
+        return bytes(sums[places].tobytes())
+
+    def _input(self, start: int, end: int) -> bytes:
+        return self.pieces.read(self.job, INPUT, start, end)
+
+
+def frame_key(frame: Frame) -> str:
+    """Key of a linked frame."""
+    return key(frame.linked.source, frame.linked.parameters)
+
+
+class PoolTracer:
+    """Tracer whose samples other processes make, in parts of a pass; used as a `CpuTracer`.
+
+    `film` in pixels.
+    """
+
+    def __init__(
+        self,
+        root: Node,
+        view: View,
+        tracer: CpuTracer,
+        film: tuple[int, int],
+        crop: tuple[int, int, int, int] | None,
+    ) -> None:
+        self.scene, self.tracer = to_xml(Scene(root, 1.0, view=view)), tracer
+        self._part = film, crop
+        self._passes, self._prepasses = 0, 0
+
+    @property
+    def frame(self) -> Frame:
+        """The frame."""
+        return self.tracer.frame
+
+    @property
+    def prepasses(self) -> int:
+        """Cone prepasses."""
+        return self.tracer.prepasses
+
+    @property
+    def samples(self) -> SampleRange:
+        """Part of the sequence."""
+        return self.tracer.samples
+
+    def aim(self, frame: Frame) -> None:
+        """Load another frame; see `CpuTracer.aim`."""
+        self.tracer.aim(frame)
+        self._prepasses = 0
+
+    def look_ahead(self, work: Work) -> None:
+        """Leave the next cone prepass to the workers."""
+        self._prepasses += 1
+
+    def add(self, sums: np.ndarray, plan: PassPlan, work: Work) -> None:
+        """Add samples to pixels up to their goals; see `CpuTracer.add`."""
+        pool, size = work.cluster, (self.tracer.width, self.tracer.height)
+        assert pool is not None
+        state, places = sums.reshape(-1, CHANNELS), _places(plan.pixels, size)
+        frame, count = frame_key(self.frame), len(plan.pixels)
+        known = np.ascontiguousarray(plan.pixels), state[places]
+        job = key(frame, size, self.samples, self._prepasses, *known)
+        of = self.scene, *self._part, self.samples, size, sums.dtype.name, pool.pieces, job, frame
+        about = *of, self._passes, self._prepasses, plan.last
+        step = max(1, min(PIXELS, PASS_SAMPLES * count // max(plan.samples, 1)))
+        tasks = [PartTask(*about, start, min(start + step, count), count) for start in range(0, count, step)]
+        pool.pieces.write(job, INPUT, b"".join(part.tobytes() for part in known))
+        parts = pool.results(tasks, work)
+        for task, data in zip(tasks, parts, strict=True):
+            state[places[task.start : task.end]] = np.frombuffer(data, sums.dtype).reshape(-1, CHANNELS)
+        pool.finished(job)
+        self._passes += 1
+
+
+def _places(pixels: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """Row-major indices of pixels ``y << 16 | x``."""
+    return np.asarray((pixels >> 16).astype(np.intp) * size[0] + (pixels & 65535))
+
+
+_OWN = threading.local()
+
+
+def _renderer(
+    scene: str, film: tuple[int, int], crop: tuple[int, int, int, int] | None, samples: SampleRange
+) -> Renderer:
+    """Renderer of a frame, the last one of this thread."""
+
+    of = scene, film, crop, samples
+    if getattr(_OWN, "of", None) != of:
+        read = reads(scene)
+        _OWN.renderer = Renderer(read.root, read.view, film, Work(threads=1), "cpu", samples, crop)
+        _OWN.of = of
+    renderer: Renderer = _OWN.renderer
+    return renderer
+
+
+@dataclass(frozen=True, eq=False)
+class Pass:
+    """The picture after a pass.
+
+    Attributes
+    ----------
+    number : int
+        Number of the pass, from 1.
+    samples : float
+        Mean samples per pixel.
+    error : float
+        Root mean square of the pixels' standard errors, in displayed brightness.
+    active : float
+        Samples of this pass per pixel of the picture.
+    rate : float
+        Samples per second.
+    view : View
+        View that develops the picture, with its lights.
+    source : Accumulator
+        Accumulator that holds the samples, with a margin around the picture.
+    crop : Crop
+        The picture in the film.
+    """
+
+    number: int
+    samples: float
+    error: float
+    active: float
+    rate: float
+    view: View = field(repr=False)
+    source: Accumulator = field(repr=False)
+    crop: Crop = field(repr=False)
+
+    @cached_property
+    def mean(self) -> np.ndarray:
+        """Mean of the samples.
+
+        Returns
+        -------
+        ndarray of float32, shape (height, width, 4)
+            Linear light, and the fraction of the samples whose camera ray hit.
+
+        Raises
+        ------
+        RenderError
+            If a later pass has replaced this picture.
+        """
+        return self.crop.within(self._current().host().mean())
+
+    @property
+    def image(self) -> np.ndarray:
+        """Linear light, or the values of another mode; see `film.picture`."""
+        return picture(self.mean, self.view.shading.mode)
+
+    @property
+    def alpha(self) -> np.ndarray:
+        """Fraction of the samples whose camera ray hit, float32 [height, width]."""
+        return np.ascontiguousarray(self.mean[..., 3])
+
+    @cached_property
+    def shown(self) -> np.ndarray:
+        """Developed picture.
+
+        Returns
+        -------
+        ndarray of uint8, shape (height, width, 3)
+            sRGB.
+
+        Raises
+        ------
+        RenderError
+            If a later pass has replaced this picture.
+        """
+        return self.crop.within(self._current().shown(self.view))
+
+    @cached_property
+    def developed(self) -> np.ndarray:
+        """Developed picture in floats.
+
+        Returns
+        -------
+        ndarray of float32, shape (height, width, 3)
+            sRGB in [0, 1].
+
+        Raises
+        ------
+        RenderError
+            If a later pass has replaced this picture.
+        """
+        return self.crop.within(self._current().host().developed(self.view))
+
+    def _current(self) -> Accumulator:
+        """The accumulator, if it still holds this pass."""
+        if self.source.passes != self.number:
+            raise RenderError(
+                f"pass {self.number}: its picture was replaced by that of pass {self.source.passes}"
+            )
+        return self.source
+
 
 TOLERANCE = 0.002
 """Standard error of displayed brightness at which a pixel has converged: half a level of 256."""
@@ -97,12 +345,12 @@ class Renderer:
         crop: tuple[int, int, int, int] | None = None,
     ) -> None:
         pixels = (view.film.width, view.film.height) if size is None else size
-        film = validated("size", pixels, SIZE, RenderError)
+        film = validate_value("size", pixels, SIZE, RenderError)
         self.crop = Crop.of(film, crop)
         _check_memory(self.crop)
         self.width, self.height = self.crop.width, self.crop.height
         self.work = work or Work()
-        self.device = chosen(device if self.work.cluster is None else "cpu")
+        self.device = choose_device(device if self.work.cluster is None else "cpu")
         setup = prepare(root, view, film)
         self.setup = replace(setup, optics=replace(setup.optics, origin=self.crop.origin))
         self.dtype = np.dtype(self.setup.precision)
@@ -111,8 +359,6 @@ class Renderer:
         self.tracer = tracer(self._frame, self.dtype, *self.crop.size)
         self.tracer.samples = samples or self.tracer.samples
         if self.work.cluster is not None:
-            from .parts import PoolTracer
-
             self.tracer = PoolTracer(root, view, self.tracer, film, crop)
         self.accumulator = self._placed(self._empty)
         self._prepasses = 0
@@ -212,8 +458,10 @@ class Renderer:
             continues the pass.
         """
         most = self.setup.view.film.samples if samples is None else samples
-        most = validated("samples", most, Film.kinds()["samples"], RenderError)
-        tolerance = validated("tolerance", tolerance, Number(TOLERANCE, "an error", least=0), RenderError)
+        most = validate_value("samples", most, Film.kinds()["samples"], RenderError)
+        tolerance = validate_value(
+            "tolerance", tolerance, Number(TOLERANCE, "an error", least=0), RenderError
+        )
         while (plan := self.accumulator.plan(most, tolerance)).samples:
             yield self._pass(plan)
 
@@ -244,7 +492,7 @@ class Renderer:
 
     def _linked(self) -> Frame:
         setup = self.setup
-        root = clipped(setup.root, setup.camera)
+        root = clip_scene(setup.root, setup.camera)
         return link_frame(root, setup.view, setup.camera, setup.optics, BLOCK)
 
     def seen(self) -> Pass:
@@ -261,3 +509,33 @@ class Renderer:
         view, source = self.setup.view, self.accumulator
         active = traced / (source.width * source.height)
         return Pass(source.passes, samples, error, active, rate, view, source, self.crop)
+
+
+SAMPLES = {"depth": 1, "position": 1, "trap": 1, "normal": 16, "albedo": 16}
+"""Samples per pixel of each layer. A mean of depths or positions across an edge would be of no surface."""
+SINGLE = ("depth", "trap")
+"""Layers of one channel."""
+
+
+def layers(renderer: Renderer) -> dict[str, np.ndarray]:
+    """Render the layers of a picture, from the same camera.
+
+    Returns float32 (height, width, 3), the samples per pixel.
+    """
+    made = {mode: layer(renderer, mode) for mode in SAMPLES}
+    made["samples"] = renderer.crop.within(renderer.accumulator.host().counts).astype(np.float32)
+    return made
+
+
+def layer(renderer: Renderer, mode: str) -> np.ndarray:
+    """Render one layer of a picture, from the same camera.
+
+    Returns float32 (height, width, 3).
+    """
+    setup, part, samples = renderer.setup, renderer.crop, SAMPLES[mode]
+    camera = replace(setup.camera, aperture=0.0) if samples == 1 else setup.camera
+    view = replace(setup.view, camera=camera, shading=replace(setup.view.shading, mode=mode))
+    crop = part.left, part.top, part.width, part.height
+    of = Renderer(setup.root, view, part.film, renderer.work, renderer.device, crop=crop)
+    *_, last = of.passes(samples, tolerance=0.0)
+    return last.image[..., 0] if mode in SINGLE else last.image

@@ -4,29 +4,15 @@ from __future__ import annotations
 
 from ..kernel.linker import Linker
 from . import glow
-from .colours import Look
-from .drawn import Drawn
+from .glow import Drawn
+from .materials import Look
 from .units import glossy, lights, shade, weights
 
 CHANNELS = "rgb"
 
 
-def divided(linker: Linker, look: Look) -> list[str]:
-    """Return the lines that divide a colour into what the surface reflects and what it scatters.
-
-    Parameters
-    ----------
-    linker : Linker
-        Linker of the kernel.
-    look : Look
-        Materials.
-
-    Returns
-    -------
-    list of str
-        Kernel source lines for the reflectance k at normal incidence, the emitted colour e and the scattered
-        colour c, and on paths for the probability of reflection.
-    """
+def division_lines(linker: Linker, look: Look) -> list[str]:
+    """Return the lines that divide a colour into what the surface reflects and what it scatters."""
     for function in (shade.fresnel, glossy.tinted):
         linker.share(function)
     lines = ["facing = -(dx * nx + dy * ny + dz * nz)", *(f"e{c} = c{c}" for c in CHANNELS)]
@@ -44,25 +30,7 @@ def divided(linker: Linker, look: Look) -> list[str]:
 
 
 def onward(linker: Linker, drawn: Drawn, look: Look, weighted: bool) -> list[str]:
-    """Return the lines for the ray that continues.
-
-    Parameters
-    ----------
-    linker : Linker
-        Linker of the kernel.
-    drawn : Drawn
-        Random numbers of a bounce.
-    look : Look
-        Materials.
-    weighted : bool
-        True if the ray carries the density of its direction.
-
-    Returns
-    -------
-    list of str
-        Kernel source lines for the throughput t, the origin o, the direction e, the side es and the density
-        eq.
-    """
+    """Return the lines for the ray that continues."""
     for function in (
         shade.mirrored,
         shade.fresnel,
@@ -75,25 +43,25 @@ def onward(linker: Linker, drawn: Drawn, look: Look, weighted: bool) -> list[str
     (u,) = drawn.names(1) if look.inside else ("t",)
     lines, out = ["eq = 0.0 * t"], ""
     if look.glossy:
-        lines += _reflected(linker, drawn)
+        lines += _reflection_lines(linker, drawn)
     elif not look.inside:
         lines.append("tr, ex, ey, ez = reflects(dx, dy, dz, nx, ny, nz, reflect)")
         lines += ["tg, tb, es = tr, tr, side", *(f"{c} = {c} * (1.0 - t{c})" for c in CHANNELS)]
     if look.paths:
-        lines += _scattered(linker, drawn, bool(look.bodies))
+        lines += _scatter_choice_lines(linker, drawn, bool(look.bodies))
     if weighted and not look.bodies:
         linker.share(weights.density_onward)
         lines.append("eq = density_onward(chosen, nx, ny, nz, dx, dy, dz, ex, ey, ez, roughness, share)")
     if look.coated:
-        lines += _lacquered(linker, drawn)
+        lines += _lacquer_choice_lines(linker, drawn)
     if look.inside:
         out = "out * "
-        lines += _refracted(u, look.glossy)
+        lines += _refraction_lines(u, look.glossy)
         lines += ["eq = where(pane, 0.0, eq)"] * weighted
     return [*lines, *(f"o{a} = {a} + 3.0 * h * {out}n{a}" for a in "xyz")]
 
 
-def _reflected(linker: Linker, drawn: Drawn) -> list[str]:
+def _reflection_lines(linker: Linker, drawn: Drawn) -> list[str]:
     """Lines for reflection by microfacets."""
     for function in (glossy.width, glossy.hidden, lights.frame, glossy.glossy):
         linker.share(function)
@@ -102,21 +70,8 @@ def _reflected(linker: Linker, drawn: Drawn) -> list[str]:
     return lines + [f"t{c} = weight * tinted(half, k{c})" for c in CHANNELS]
 
 
-def lacquered(linker: Linker, colour: list[str]) -> list[str]:
-    """Return the lines for the reflection of a light in a lacquer.
-
-    Parameters
-    ----------
-    linker : Linker
-        Linker of the kernel.
-    colour : list of str
-        Red, green and blue of the light.
-
-    Returns
-    -------
-    list of str
-        Kernel source lines that add to the reflection of the lacquer.
-    """
+def lacquer_lines(linker: Linker, colour: list[str]) -> list[str]:
+    """Return the lines for the reflection of a light in a lacquer."""
     for function in (shade.dielectric, shade.lacquer):
         linker.share(function)
     lines = [f"spark, slope = highlight(nx, ny, nz, dx, dy, dz, lx, ly, lz, {glossy.LACQUER})"]
@@ -126,7 +81,7 @@ def lacquered(linker: Linker, colour: list[str]) -> list[str]:
     ]
 
 
-def _lacquered(linker: Linker, drawn: Drawn) -> list[str]:
+def _lacquer_choice_lines(linker: Linker, drawn: Drawn) -> list[str]:
     """Lines that choose between the reflection of a lacquer and the ray of the material under it."""
     for function in (shade.dielectric, shade.lacquer):
         linker.share(function)
@@ -142,7 +97,7 @@ def _lacquered(linker: Linker, drawn: Drawn) -> list[str]:
     return lines + [f"{c} = {c} * (1.0 - lacquer_)" for c in CHANNELS]
 
 
-def _scattered(linker: Linker, drawn: Drawn, bodies: bool) -> list[str]:
+def _scatter_choice_lines(linker: Linker, drawn: Drawn, bodies: bool) -> list[str]:
     """Lines that choose between the reflected ray and a scattered one, and end some rays.
 
     One sample of both (Veach 1997), and Russian roulette with the probability of the throughput (Arvo and
@@ -153,7 +108,7 @@ def _scattered(linker: Linker, drawn: Drawn, bodies: bool) -> list[str]:
     u, v, choice, life = drawn.names(4)
     lines = [f"wx, wy, wz = upward(nx, ny, nz, {u}, {v})"]
     if bodies:
-        lines += glow.scattered(linker, drawn, u, v, choice)
+        lines += glow.scatter_lines(linker, drawn, u, v, choice)
     else:
         lines += [
             f"chosen = {choice} < share",
@@ -167,7 +122,7 @@ def _scattered(linker: Linker, drawn: Drawn, bodies: bool) -> list[str]:
     return lines + [f"t{c} = where({life} < alive, t{c} / maximum(alive, 1e-6), 0.0)" for c in CHANNELS]
 
 
-def _refracted(u: str, opaque: bool) -> list[str]:
+def _refraction_lines(u: str, opaque: bool) -> list[str]:
     """Lines for transparent materials; opaque ones keep their ray if they have one."""
     ray = f"goes_on(dx, dy, dz, nx, ny, nz, side, reflect, clear, index, {u})"
     if not opaque:

@@ -35,26 +35,16 @@ DIMENSIONS = len(_DIMENSIONS)
 
 @dataclass(frozen=True)
 class SampleRange:
-    """Part of the sequence that a picture takes.
+    """Part of the sequence that a picture takes."""
 
-    Attributes
-    ----------
-    first : int
-        Index of the first point: pictures of other parts add up to one of more samples.
-    seed : int
-        Number of a digital shift (a constant that is added to all points, without carry); 0 for none.
-    """
-
-    first: int = 0
+    first: int = 0  # index of the first point: pictures of other parts add up to one of more samples
+    # number of a digital shift (a constant that is added to all points, without carry); 0 for none
     seed: int = 0
 
     def points(self, count: int, dimensions: int) -> np.ndarray:
         """Return the points of the part; see `points`.
 
-        Returns
-        -------
-        ndarray of int32, shape (count, dimensions)
-            Bit patterns of 32-bit fractions with their bits REVERSED.
+        Returns int32 (count, dimensions), bit patterns of 32-bit fractions with their bits REVERSED.
         """
         drawn = points(count, dimensions, self.first)
         if not self.seed:
@@ -66,19 +56,7 @@ class SampleRange:
 def points(count: int, dimensions: int, first: int = 0) -> np.ndarray:
     """Return consecutive points of the sequence.
 
-    Parameters
-    ----------
-    count : int
-        Number of points.
-    dimensions : int
-        Number of dimensions. Dimensions beyond the sixteenth repeat the first ones, with another scrambling.
-    first : int
-        Index of the first point.
-
-    Returns
-    -------
-    ndarray of int32, shape (count, dimensions)
-        Bit patterns of 32-bit fractions with their bits REVERSED.
+    Returns int32 (count, dimensions), bit patterns of 32-bit fractions with their bits REVERSED.
     """
     index = np.arange(first, first + count, dtype=np.uint32)[:, None]
     result = np.zeros((count, DIMENSIONS), np.uint32)

@@ -1,4 +1,6 @@
-"""Defaults of a view: camera, lights, depth and precision chosen for the scene."""
+"""Defaults of a view: camera, lights, depth and precision chosen for the scene; pixel footprint and hit
+tolerance.
+"""
 
 from __future__ import annotations
 
@@ -11,10 +13,71 @@ from ..errors import SceneError
 from ..formulas.csg import intersection
 from ..formulas.primitives import plane
 from ..formulas.registry import Node
-from ..kernel.cells import possible_cells
+from ..kernel.boxes import possible_cells
 from ..kernel.depth import resolve_depths
 from ..scene.view import Camera, Light, View
-from .optics import Optics, footprint, optics
+
+
+@dataclass(frozen=True)
+class Optics:
+    """Lengths of a render kernel."""
+
+    size: tuple[int, int]  # film width and height, pixels
+    cone: float  # half width of a pixel at distance 1
+    # half width of a pixel at distance 0, scene units: half a pixel of parallel rays, or the rounding of
+    # positions
+    least: float
+    rounding: float  # rounding error of positions, scene units
+    far: float  # distance beyond which the scene is empty, scene units
+    origin: tuple[int, int] = (0, 0)  # upper left pixel of the part of the film that is rendered
+
+
+def footprint(camera: Camera, size: tuple[int, int]) -> tuple[float, float]:
+    """Return the width of a pixel as a function of the distance.
+
+    `size` in pixels. Returns a value in scene units.
+    """
+    width, height = size
+    tangent = 2 * math.tan(math.radians(min(camera.fov, 178.0)) / 2) / height
+    if camera.kind == "orthographic":
+        return 0.0, tangent * math.dist(camera.eye, camera.target)
+    if camera.kind == "fisheye":
+        return math.radians(camera.fov) / height, 0.0
+    if camera.kind == "equirectangular":
+        return math.pi / min(height, width / (4 if camera.stereo else 2)), 0.0
+    return tangent, 0.0
+
+
+ESTIMATE = 0.5
+"""Lipschitz bound of rays, as part of the guaranteed one, for fractals with a potential."""
+
+
+def ray_bound(root: Node) -> float:
+    """Return the Lipschitz bound that rays step by.
+
+    Half of the guaranteed bound of a fractal with a potential is for sets like a needle, by Koebe's theorem.
+    Its field estimates the distance (`formulas.escape`), and rays step by that: a ray that steps too far
+    comes to lie inside the solid and returns. No other field has such a half: not that of folds, of a hybrid
+    with them, or of a fractal beside other shapes.
+    """
+    bounds = root.bounds
+    return bounds.lipschitz * (ESTIMATE if bounds.exterior_only and root.escape_time_only else 1.0)
+
+
+def optics(camera: Camera, size: tuple[int, int], root: Node, least: float) -> Optics:
+    """Compute the optics of a picture.
+
+    `size` in pixels; `least` in scene units.
+    """
+    box = root.bounds.box
+    corners = [c for c in box.corners if all(map(math.isfinite, c))]
+    far = max([math.dist(camera.eye, c) for c in corners] + [4 * math.dist(camera.eye, camera.target)])
+    far = far if box.finite else 25 * far
+    growth, base = footprint(camera, size)
+    if base:  # parallel rays start at the whole film
+        far += base * math.hypot(*size) / 2
+    return Optics(size, growth / 2, max(least, base / 2), least, far + camera.stereo)
+
 
 SUN = Light(kind="sun", position=(-0.6, -1.0, 1.4), colour=(1.0, 0.95, 0.86), strength=1.6, size=2.0)
 SKY = Light(
@@ -34,51 +97,19 @@ ROUNDING = {"float32": 2.0**-21, "float64": 2.0**-49}
 
 @dataclass(frozen=True)
 class RenderSetup:
-    """Scene and view with all defaults resolved.
+    """Scene and view with all defaults resolved."""
 
-    Attributes
-    ----------
-    root : Node
-        Tree with resolved depths.
-    view : View
-        View with lights.
-    camera : Camera
-        The camera.
-    optics : Optics
-        Lengths of the kernel.
-    precision : str
-        "float32" or "float64".
-    """
-
-    root: Node
-    view: View
-    camera: Camera
-    optics: Optics
-    precision: str
+    root: Node  # tree with resolved depths
+    view: View  # view with lights
+    camera: Camera  # the camera
+    optics: Optics  # lengths of the kernel
+    precision: str  # "float32" or "float64"
 
 
 def prepare(root: Node, view: View, size: tuple[int, int]) -> RenderSetup:
     """Resolve the defaults of a view.
 
-    Parameters
-    ----------
-    root : Node
-        Root of the formula tree; depths may be "auto".
-    view : View
-        The view.
-    size : tuple of int
-        Picture width and height, pixels.
-
-    Returns
-    -------
-    RenderSetup
-        The resolved scene and view.
-
-    Raises
-    ------
-    SceneError
-        If the view is invalid: the eye is inside the solid, there are two skies, or an unbounded scene has no
-        camera.
+    `size` in pixels.
     """
     camera = view.camera or _whole(root, size[0] / size[1])
     lights = view.lights or default_lights(root)
@@ -93,21 +124,8 @@ def prepare(root: Node, view: View, size: tuple[int, int]) -> RenderSetup:
     return RenderSetup(resolved, replace(view, lights=lights), camera, seen, precision)
 
 
-def clipped(root: Node, camera: Camera) -> Node:
-    """Return what the clip plane of a camera leaves of a scene.
-
-    Parameters
-    ----------
-    root : Node
-        Root of the formula tree.
-    camera : Camera
-        The camera.
-
-    Returns
-    -------
-    Node
-        The tree itself without a clip plane.
-    """
+def clip_scene(root: Node, camera: Camera) -> Node:
+    """Return what the clip plane of a camera leaves of a scene."""
     if not camera.clip:
         return root
     towards = camera.forward
@@ -117,18 +135,7 @@ def clipped(root: Node, camera: Camera) -> Node:
 
 
 def default_lights(root: Node) -> tuple[Light, ...]:
-    """Return the lights of a view without any.
-
-    Parameters
-    ----------
-    root : Node
-        Root of the formula tree.
-
-    Returns
-    -------
-    tuple of Light
-        A sun and a sky; a light at the camera if the scene has no end on any side, since it shadows both.
-    """
+    """Return the lights of a view without any."""
     box = root.bounds.box
     return (SUN, SKY) if any(map(math.isfinite, box.lo + box.hi)) else (AT_CAMERA,)
 
@@ -139,24 +146,7 @@ def surroundings(root: Node, camera: Camera, pixel: float) -> float:
     The distance depends on the depth, and the depth on the size of a pixel at that distance. The search
     starts at the target's distance and refines until a pixel at the surface is no smaller than the detail.
 
-    Parameters
-    ----------
-    root : Node
-        Root of the formula tree; depths may be "auto".
-    camera : Camera
-        The camera.
-    pixel : float
-        Size of a pixel at distance 1.
-
-    Returns
-    -------
-    float
-        Distance, scene units.
-
-    Raises
-    ------
-    SceneError
-        If the eye is inside the solid at every depth.
+    `pixel`: size of a pixel at distance 1. Returns a value in scene units.
     """
     detail = pixel * math.dist(camera.eye, camera.target)
     known, near = _around_eye(root, camera, detail)
@@ -196,24 +186,9 @@ def _whole(root: Node, aspect: float) -> Camera:
 def clearance(root: Node, camera: Camera) -> float:
     """Return a lower bound of the distance from the eye to the surface.
 
-    Parameters
-    ----------
-    root : Node
-        Tree with resolved depths.
-    camera : Camera
-        The camera.
-
-    Returns
-    -------
-    float
-        Distance, scene units.
-
-    Raises
-    ------
-    SceneError
-        If the eye is inside the solid.
+    Returns a value in scene units.
     """
-    root = clipped(root, camera)
+    root = clip_scene(root, camera)
     f = float(root.kernel("cpu", "float64").points(*(np.array([c]) for c in camera.eye))[0])
     if not f > 0:
         raise camera.fail("eye: expected a place outside the solid")

@@ -22,43 +22,13 @@ INVALID = "expected a picture in progress, complete, as it was saved"
 
 
 def save_state(file: BinaryIO, key: str, picture: HostAccumulator) -> None:
-    """Write the sums as an .npz file.
-
-    Parameters
-    ----------
-    file : BinaryIO
-        Writable binary file.
-    key : str
-        Key of the picture; see `Renderer.key`.
-    picture : HostAccumulator
-        The picture.
-    """
+    """Write the sums as an .npz file."""
     shape = np.array([picture.width, picture.height, picture.passes])
     np.savez(file, sums=picture.sums, shape=shape, key=np.array(key))
 
 
 def load_state(path: str | Path, key: str, like: HostAccumulator) -> HostAccumulator:
-    """Read a file written by `save_state`. Its contents are validated before native code sees them.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-    key : str
-        Expected key of the picture.
-    like : HostAccumulator
-        Picture of the expected size and float type.
-
-    Returns
-    -------
-    HostAccumulator
-        The saved picture.
-
-    Raises
-    ------
-    RenderError
-        If the file is missing, damaged or of another picture.
-    """
+    """Read a file written by `save_state`. Its contents are validated before native code sees them."""
     try:
         with open(path, "rb") as file, NpzFile(file) as stored:
             if str(_array(stored, "key")) != key:

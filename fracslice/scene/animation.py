@@ -7,9 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from ..formulas.conversion import finite
-from ..formulas.parameters import REQUIRED, Choice, Count, Number, Parameter
-from ..formulas.records import attribute
+from ..formulas.parameters import REQUIRED, Choice, Count, Number, Parameter, attribute, finite
 from .element import Part
 from .lengths import NUMBER
 

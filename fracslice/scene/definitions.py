@@ -14,25 +14,7 @@ from .layout import DEFINE, PARAMETER, SECTIONS, Element
 
 
 def parameter(values: Mapping[str, Any], fail: Callable[[str], SceneError]) -> tuple[str, Parameter]:
-    """Make the kind of a declared parameter.
-
-    Parameters
-    ----------
-    values : mapping
-        Attributes of the `<parameter>`.
-    fail : callable
-        Makes the error about the element from a message.
-
-    Returns
-    -------
-    (str, Parameter)
-        Name and kind.
-
-    Raises
-    ------
-    SceneError
-        If the default is beyond the limits.
-    """
+    """Make the kind of a declared parameter."""
     default = values["default"]
     limits = {name: values[name] for name in ("least", "most") if values.get(name) is not None}
     kind = Vector(default, "", **limits) if len(default) == 3 else Number(default[0], "", **limits)
@@ -43,27 +25,10 @@ def parameter(values: Mapping[str, Any], fail: Callable[[str], SceneError]) -> t
     return values["name"], kind
 
 
-def defined(
+def make_definition(
     values: Mapping[str, Any], parameters: list[tuple[str, Parameter]], lines: Mapping[int, str], source: str
 ) -> Defined:
-    """Make the formula of a `<define>`.
-
-    Parameters
-    ----------
-    values : mapping
-        Attributes of the element.
-    parameters : list of (str, Parameter)
-        Declared parameters.
-    lines : mapping of int to str
-        Lines of the file that hold its text, by number.
-    source : str
-        Name of the file.
-
-    Raises
-    ------
-    SceneError
-        If the text is not allowed, with its line.
-    """
+    """Make the formula of a `<define>`."""
     used = [number for number, line in lines.items() if line.strip()]
     first, last = (min(used), max(used)) if used else (min(lines, default=1), 0)
     text = "\n".join(lines.get(number, "").rstrip() for number in range(first, last + 1))
@@ -75,14 +40,8 @@ def defined(
     return formula(definition)
 
 
-def written(definition: Definition) -> Iterator[str]:
-    """Write a definition.
-
-    Yields
-    ------
-    str
-        Lines of XML, indented by two spaces.
-    """
+def write_definition(definition: Definition) -> Iterator[str]:
+    """Write a definition."""
     values = {name: getattr(definition, name) for name in DEFINE.parameters}
     yield f"  <{DEFINE.name}{attributes(DEFINE, values)}>"
     for name, kind in definition.parameters:

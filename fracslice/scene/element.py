@@ -1,4 +1,4 @@
-"""Records behind the elements of a scene file.
+"""Records behind the elements of a scene file, and their names.
 
 Every field carries a parameter kind that reads, validates, writes and documents it, as in formulas.
 """
@@ -10,8 +10,9 @@ from inspect import cleandoc
 from typing import Any, ClassVar
 
 from ..errors import SceneError
-from ..formulas.records import kinds_of, validate
-from ..formulas.signatures import parameter_lines
+from ..formulas.definitions import is_name
+from ..formulas.node import parameter_lines
+from ..formulas.parameters import Parameter, kinds_of, validate
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,3 +81,17 @@ class Part:
             The error.
         """
         return SceneError(f"{self.place + ': ' if self.place else ''}<{self.element}> {message}")
+
+
+@dataclass(frozen=True)
+class Identifier(Parameter):
+    """A name of lower-case letters, digits and underscores that begins with a letter."""
+
+    @property
+    def expects(self) -> str:
+        return "a name of at most 40 lower-case letters, digits and _, not one of a function"
+
+    def check(self, value: Any) -> Any:
+        if not isinstance(value, str) or not is_name(value):
+            raise ValueError(self.expects)
+        return value

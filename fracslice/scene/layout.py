@@ -11,8 +11,7 @@ from ..formulas.parameters import REQUIRED, Choice, Number, Parameter, Vector
 from ..formulas.plugins import load_installed
 from ..formulas.registry import Formula
 from .animation import Animation, Track
-from .element import Part
-from .identifier import Identifier
+from .element import Identifier, Part
 from .lengths import Length
 from .printing import Print
 from .view import PARTS
@@ -20,30 +19,14 @@ from .view import PARTS
 
 @dataclass(frozen=True)
 class TopElement:
-    """`<scene>` or an element directly under it, with the interface of `Formula`.
+    """`<scene>` or an element directly under it, with the interface of `Formula`."""
 
-    Attributes
-    ----------
-    name : str
-        Element name.
-    doc : str
-        Documentation.
-    parameters : mapping of str to Parameter
-        Attributes of the element.
-    children : tuple
-        Minimum and maximum number of children; None for no maximum.
-    part : type of Part, optional
-        Record that the element becomes, for views and printing.
-    many : bool
-        True if the element may be repeated.
-    """
-
-    name: str
-    doc: str
-    parameters: Mapping[str, Parameter]
-    children: tuple[int, int | None] = (0, 0)
-    part: type[Part] | None = None
-    many: bool = False
+    name: str  # element name
+    doc: str  # documentation
+    parameters: Mapping[str, Parameter]  # attributes of the element
+    children: tuple[int, int | None] = (0, 0)  # minimum and maximum number of children; None for no maximum
+    part: type[Part] | None = None  # record that the element becomes, for views and printing
+    many: bool = False  # true if the element may be repeated
 
 
 Element = Formula | TopElement
@@ -115,7 +98,7 @@ FILM = [_section(part) for part in (Animation, Track)]
 SECTIONS = {section.name: section for section in (DEFINE, SOLID, PRINT, *PICTURE, *FILM)}
 
 
-def registered() -> dict[str, Formula]:
+def registered_formulas() -> dict[str, Formula]:
     """Return every registered formula by name, without a look at installed packages."""
     return {name: get(name) for name in names()}
 
@@ -129,4 +112,4 @@ def formulas() -> list[Formula]:
         Sorted by name.
     """
     load_installed()
-    return list(registered().values())
+    return list(registered_formulas().values())

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from ..errors import SceneError
-from ..formulas.conversion import finite, shown
-from ..formulas.parameters import Parameter
+from ..formulas.parameters import Parameter, finite, short_repr
 
 AnyLength: TypeAlias = float | str
 """A number in mm, or text with a unit, such as "0.5mm"."""
@@ -56,20 +55,14 @@ def parse_length(value: str | float, what: str = "length") -> float:
     try:
         return Length(None, "").check(value)
     except ValueError as error:
-        raise SceneError(f"{what} {shown(value)}: expected {error}") from None
+        raise SceneError(f"{what} {short_repr(value)}: expected {error}") from None
 
 
 @dataclass(frozen=True)
 class Length(Parameter):
-    """Parameter kind of a length: text with a unit, or a number of mm. Its value is in mm.
+    """Parameter kind of a length: text with a unit, or a number of mm. Its value is in mm."""
 
-    Attributes
-    ----------
-    zero : bool
-        True if 0 is allowed, for none.
-    """
-
-    zero: bool = False
+    zero: bool = False  # true if 0 is allowed, for none
 
     @property
     def expects(self) -> str:

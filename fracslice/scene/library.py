@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from ..common.suggestions import hint
+from ..common.messages import hint
 from ..errors import SceneError
 
 _COMMENT = re.compile(r"<!--\s*(.*?)\s*-->", re.DOTALL)
@@ -30,30 +30,13 @@ def names() -> list[str]:
 
 
 def path(name: str) -> Path:
-    """Return the file of a shipped scene.
-
-    Raises
-    ------
-    SceneError
-        If there is no such scene; the message suggests the nearest name.
-    """
+    """Return the file of a shipped scene."""
     if name not in names():
         raise SceneError(f"{name}: no such scene; {hint(name, names())}")
     return folder() / f"{name}.xml"
 
 
 def about(name: str) -> str:
-    """Return the description of a shipped scene: its first comment, on one line.
-
-    Returns
-    -------
-    str
-        The description, or "".
-
-    Raises
-    ------
-    SceneError
-        If there is no such scene.
-    """
+    """Return the description of a shipped scene: its first comment, on one line."""
     comment = _COMMENT.search(path(name).read_text(encoding="utf-8"))
     return " ".join(comment[1].split()) if comment else ""

@@ -1,16 +1,22 @@
-"""Documentation of every element, generated from the registry."""
+"""Documentation of every element, and stub files of formulas as functions, generated from the registry."""
 
 from __future__ import annotations
 
+import ast
 import inspect
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
-from ..common.suggestions import hint
+from .. import formulas as formula_package
+from ..common.messages import hint
 from ..errors import SceneError
+from ..formulas import vocabulary
+from ..formulas.node import docstring, signature
 from ..formulas.parameters import REQUIRED
 from ..formulas.plugins import origin
-from ..formulas.registry import Formula
+from ..formulas.registry import Formula, Node, get, names
 from .layout import LISTED, PARAMETER, SCENE, SECTIONS, Element, formulas
 
 _GROUPS = {
@@ -61,31 +67,14 @@ def _code(text: str) -> str:
 
 
 def default(kind: Any) -> str:
-    """Return the default of a parameter as text.
-
-    Parameters
-    ----------
-    kind : Parameter
-        Parameter kind.
-
-    Returns
-    -------
-    str
-        "required" without a default; "" if omission is a choice of its own.
-    """
+    """Return the default of a parameter as text."""
     if kind.default is REQUIRED:
         return "required"
     return "" if kind.default is None else str(kind.text(kind.default))
 
 
 def prose(doc: str) -> str:
-    """Return a docstring without its indentation.
-
-    Returns
-    -------
-    str
-        The text.
-    """
+    """Return a docstring without its indentation."""
     return inspect.cleandoc(doc)
 
 
@@ -95,13 +84,7 @@ def summary(doc: str) -> str:
 
 
 def overview() -> str:
-    """Return every formula with its summary, as plain text.
-
-    Returns
-    -------
-    str
-        The list, grouped by kind.
-    """
+    """Return every formula with its summary, as plain text."""
     lines = []
     for kind, (title, _) in _GROUPS.items():
         members = [formula for formula in formulas() if formula.kind == kind]
@@ -116,13 +99,7 @@ def _source(formula: Formula) -> str:
 
 
 def page(name: str) -> str:
-    """Return the documentation of one element, as plain text.
-
-    Raises
-    ------
-    SceneError
-        If there is no such element; the message suggests the nearest name.
-    """
+    """Return the documentation of one element, as plain text."""
     elements: list[Element] = [SCENE, PARAMETER, *SECTIONS.values(), *formulas()]
     known = {element.name: element for element in elements}
     if name not in known:
@@ -134,3 +111,45 @@ def page(name: str) -> str:
         value = usual if usual == "required" else f"default {usual}" if usual else "optional"
         lines += ["", f"{attribute}  ({value})", f"    {kind.doc}", f"    expected: {kind.expects}"]
     return "\n".join(lines)
+
+
+def stub() -> str:
+    """Text of the stub file of `fracslice.formulas`: formulas as functions, all other names re-exported."""
+    package = Path(formula_package.__file__)
+    imports = [
+        n for n in ast.parse(package.read_text(encoding="utf-8")).body if isinstance(n, ast.ImportFrom)
+    ]
+    lines = [_HEAD]
+    for node in imports:
+        exported = sorted(vocabulary.NAMES) if node.module == "vocabulary" else [a.name for a in node.names]
+        lines += [f"from .{node.module} import {name} as {name}" for name in exported if node.level]
+    imported = {alias.name for node in imports for alias in node.names}
+    made = [name for name in _shipped_formulas() if name not in imported]
+    return "\n".join([*lines, *(f"\n{_function(get(name))}" for name in made)]) + "\n"
+
+
+def _shipped_formulas() -> list[str]:
+    """Names of the formulas of this package."""
+    return [name for name in names() if get(name).function.__module__.startswith(formula_package.__name__)]
+
+
+def package_stub(modules: Mapping[str, str]) -> str:
+    """Text of the stub file of `fracslice`: its public names, and every formula."""
+    exported = {**modules, **dict.fromkeys(_shipped_formulas(), "formulas")}
+    lines = sorted(f"from .{module} import {name} as {name}" for name, module in exported.items())
+    return "\n".join([_MADE, *lines, ""])
+
+
+_MADE = "# Made from the registry of formulas by `python docs/generate.py`; do not edit."
+_HEAD = f"""\
+{_MADE}
+from collections.abc import Sequence
+from typing import Literal, Union
+"""
+
+
+def _function(formula: Formula) -> str:
+    """Function of a formula in the stub file."""
+    text = re.sub(r"\b(?:fracslice\.formulas\.\w+|collections\.abc)\.", "", str(signature(formula, Node)))
+    body = docstring(formula).replace("\n", "\n    ").replace("\n    \n", "\n\n")
+    return f'def {formula.name}{text}:\n    """{body}\n    """'

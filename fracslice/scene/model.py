@@ -112,9 +112,9 @@ class Scene:
         SceneError
             If the scene has no such element or attribute, or the value is invalid.
         """
-        from .overrides import changed
+        from .overrides import apply_settings
 
-        return changed(self, settings)
+        return apply_settings(self, settings)
 
 
 def scene(
@@ -179,18 +179,7 @@ def _refuse_impossible(root: Node) -> None:
 
 @contextmanager
 def computing(fail: Callable[[str], SceneError]) -> Iterator[None]:
-    """Convert numeric errors in a block, such as overflow or division by zero, to `SceneError`.
-
-    Parameters
-    ----------
-    fail : callable
-        Makes the error from a message.
-
-    Raises
-    ------
-    SceneError
-        If a computation overflows, divides by zero or is invalid.
-    """
+    """Convert numeric errors in a block, such as overflow or division by zero, to `SceneError`."""
     import numpy as np
 
     try:

@@ -1,16 +1,21 @@
-"""Settings that change single values of a scene, as with ``--set``."""
+"""Other values of a scene: settings of single numbers, as with ``--set``, and random variations."""
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from ..common.suggestions import hint
-from ..errors import SceneError
+import numpy as np
+
+from ..common.messages import hint
+from ..errors import FracsliceError, SceneError
 from ..formulas import Node
+from ..formulas.parameters import Count, Number, Vector
 from .element import Part
 from .layout import PICTURE, PRINT, SECTIONS, SOLID, Element
 from .view import View
@@ -24,45 +29,20 @@ _FORM = re.compile(r"\s*(\w+)\s*(?:\[\s*(\d+)\s*\])?\s*\.\s*(\w+)\s*=(.*)", re.D
 
 @dataclass(frozen=True)
 class Override:
-    """One parsed setting.
+    """One parsed setting."""
 
-    Attributes
-    ----------
-    source : str
-        Text of the setting, for error messages.
-    element : str
-        Element name.
-    number : int or None
-        Number of the element, from 1; None for all elements of the name.
-    attribute : str
-        Attribute name.
-    text : str
-        New value.
-    """
-
-    source: str
-    element: str
-    number: int | None
-    attribute: str
-    text: str
+    source: str  # text of the setting, for error messages
+    element: str  # element name
+    number: int | None  # number of the element, from 1; None for all elements of the name
+    attribute: str  # attribute name
+    text: str  # new value
 
     def fail(self, message: str) -> SceneError:
         """Return the error to raise about this setting."""
         return SceneError(f"{self.source}: {message}")
 
     def value(self, element: Element) -> Any:
-        """Parse the value for an element.
-
-        Parameters
-        ----------
-        element : Element
-            Element with the attribute.
-
-        Raises
-        ------
-        SceneError
-            If the element has no such attribute, or the value is invalid.
-        """
+        """Parse the value for an element."""
         kind = element.parameters.get(self.attribute)
         if kind is None:
             near = hint(self.attribute, element.parameters)
@@ -73,49 +53,19 @@ class Override:
             raise self.fail(f"expected {error}") from None
 
 
-def changed(scene: Scene, settings: Iterable[str]) -> Scene:
-    """Apply settings to a scene, in order.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    settings : iterable of str
-        Settings, "ELEMENT.ATTRIBUTE=VALUE".
-
-    Raises
-    ------
-    SceneError
-        If a setting is malformed, its element is missing or its value is invalid.
-    """
+def apply_settings(scene: Scene, settings: Iterable[str]) -> Scene:
+    """Apply settings to a scene, in order."""
     for source in settings:
-        scene = _changed(scene, _parsed(source))
+        scene = _apply_setting(scene, _parse_setting(source))
     return scene
 
 
 def kind_of(scene: Scene, of: str, fail: Callable[[str], SceneError]) -> Any:
     """Return the parameter kind of an attribute, "ELEMENT.ATTRIBUTE".
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    of : str
-        Name of the attribute, as in a setting.
-    fail : callable
-        Makes the error to raise from a message.
-
-    Returns
-    -------
-    Parameter
-        The kind.
-
-    Raises
-    ------
-    SceneError
-        If the scene has no such element, or the element no such attribute.
+    `of`: name of the attribute, as in a setting.
     """
-    override = _parsed(f"{of}=")
+    override = _parse_setting(f"{of}=")
     elements: dict[str, Element] = {node.formula.name: node.formula for node in scene.root.walk()}
     elements |= {section.name: section for section in (SOLID, PRINT, *PICTURE)}
     if override.element not in elements:
@@ -128,7 +78,7 @@ def kind_of(scene: Scene, of: str, fail: Callable[[str], SceneError]) -> Any:
     return kinds[override.attribute]
 
 
-def _parsed(source: str) -> Override:
+def _parse_setting(source: str) -> Override:
     match = _FORM.fullmatch(source)
     if not match:
         raise SceneError(f"{source!r}: expected {FORM}")
@@ -136,7 +86,7 @@ def _parsed(source: str) -> Override:
     return Override(source, element, int(number) if number else None, attribute, text)
 
 
-def _changed(scene: Scene, override: Override) -> Scene:
+def _apply_setting(scene: Scene, override: Override) -> Scene:
     if override.element == SOLID.name:
         sizes = {"size_mm": None, "unit_mm": None, f"{override.attribute}_mm": override.value(SOLID)}
         return replace(scene, **sizes)
@@ -181,3 +131,69 @@ def _rebuilt(node: Node, override: Override, seen: Counter[str]) -> Node:
     values: Mapping[str, Any] = {override.attribute: override.value(node.formula)} if meant else {}
     children = tuple(_rebuilt(child, override, seen) for child in node.children)
     return node.changed(children, **values)
+
+
+KEPT = {"material", "transform", "bounds"}
+"""Elements that say how a solid looks and where it is, not what it is."""
+
+OF_A_HYBRID, OF_A_STEP = {"iterations", "bailout"}, {"repeat"}
+"""Parameters that a hybrid has for all of its steps, and those that a step alone has."""
+
+TRIES, POINTS = 100, 4096
+
+
+def varied(scene: Scene, seed: tuple[int, ...], spread: float) -> Scene:
+    """Vary the numbers of a scene's elements."""
+    rng = np.random.default_rng(seed)
+    for _ in range(TRIES):
+        with suppress(FracsliceError, ArithmeticError):  # values that are valid alone but not together
+            root = _node(scene.root, rng, spread)
+            if root != scene.root and _holds_a_solid(root):
+                return replace(scene, root=root)
+    raise SceneError(f"{scene.name}: none of {TRIES} variations is valid: expected a smaller spread")
+
+
+def _node(node: Node, rng: np.random.Generator, spread: float, step: bool = False) -> Node:
+    """Varied node; `step` is True inside a hybrid."""
+    hybrid = step or node.formula.name == "orbit"
+    children = tuple(_node(child, rng, spread, hybrid) for child in node.children)
+    if node.formula.name in KEPT:
+        return node.changed(children)
+    fixed = OF_A_HYBRID if step else OF_A_STEP
+    kinds = {name: kind for name, kind in node.formula.parameters.items() if name not in fixed}
+    return node.changed(
+        children, **{name: _value(name, kind, node[name], rng, spread) for name, kind in kinds.items()}
+    )
+
+
+def _value(name: str, kind: Any, value: Any, rng: np.random.Generator, spread: float) -> Any:
+    """Varied value of a parameter; words, automatic depths and values left out stay."""
+    if value is None or isinstance(value, str):
+        return value
+    if isinstance(kind, Count):
+        step = round(rng.normal() * spread * max(1.0, value / 4))
+        return min(max(value + step, kind.least), kind.most)
+    if isinstance(kind, Number):
+        number = _number(kind, value, rng, spread)
+        return float(round(number)) if name == "power" and value == round(value) else number
+    if isinstance(kind, Vector) and not kind.whole:
+        return tuple(_number(kind, v, rng, spread) for v in value)
+    return value
+
+
+def _number(kind: Number | Vector, value: float, rng: np.random.Generator, spread: float) -> float:
+    """Number times a random power of two; near zero, moved. It stays within its range."""
+    draw = float(rng.normal()) * spread
+    moved = value * 2**draw if abs(value) > 1e-3 else value + 0.2 * draw
+    low = kind.least if kind.least > kind.above else math.nextafter(kind.above, math.inf)
+    high = kind.most if kind.most < kind.below else math.nextafter(kind.below, -math.inf)
+    return float(f"{min(max(moved, low), high):.4g}")
+
+
+def _holds_a_solid(root: Node) -> bool:
+    """True if one of some random points in the box is inside."""
+    box = root.bounds.box
+    if not box.finite or box.empty:
+        return False
+    points = np.random.default_rng(0).uniform(box.lo, box.hi, (POINTS, 3))
+    return bool((root.distance(points) < 0).any())

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-from ..formulas.parameters import Choice, Count
-from ..formulas.records import attribute
+from ..formulas.parameters import Choice, Count, attribute
 from .element import Part
 from .lengths import AnyLength, Length
 

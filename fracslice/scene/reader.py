@@ -13,14 +13,13 @@ from pathlib import Path
 from typing import Any
 from xml.parsers import expat
 
-from ..common.suggestions import hint
+from ..common.messages import hint
 from ..errors import SceneError
 from ..formulas import Node
-from ..formulas.conversion import printable
-from ..formulas.parameters import REQUIRED, File, Parameter
+from ..formulas.parameters import REQUIRED, File, Parameter, printable
 from ..formulas.registry import DEEPEST, TOO_DEEP
 from .animation import Animation, Track
-from .definitions import defined, parameter
+from .definitions import make_definition, parameter
 from .element import Part
 from .layout import (
     DEFINE,
@@ -32,7 +31,7 @@ from .layout import (
     Element,
     TopElement,
     formulas,
-    registered,
+    registered_formulas,
 )
 from .model import Scene, computing, scene
 from .printing import Print
@@ -142,7 +141,7 @@ class _Builder:
         self.open: list[_Open] = []
         self.done: dict[str, _Open] = {}
         self.parts: list[Part] = []
-        self.formulas: dict[str, Element] = {**registered()}
+        self.formulas: dict[str, Element] = {**registered_formulas()}
         self.parser = expat.ParserCreate()
         self.parser.buffer_text = True
         self.parser.StartDoctypeDeclHandler = self.doctype
@@ -212,7 +211,7 @@ class _Builder:
     def all_formulas(self) -> Mapping[str, Element]:
         """Formulas by name, those of installed packages too, which take long to find."""
         formulas()
-        self.formulas = {**registered(), **self.formulas}
+        self.formulas = {**registered_formulas(), **self.formulas}
         return self.formulas
 
     def end(self, name: str) -> None:
@@ -249,9 +248,9 @@ class _Builder:
 
     def define(self, closed: _Open) -> None:
         """Add the formula of a definition."""
-        made = defined(closed.values, closed.declared, closed.lines, self.source)
+        made = make_definition(closed.values, closed.declared, closed.lines, self.source)
         if made.name in self.formulas:
-            raise closed.fail(f"name={_quoted(made.name)}: expected one definition of this name")
+            raise closed.fail(f"name={_quote(made.name)}: expected one definition of this name")
         self.formulas[made.name] = made
 
     def text(self, text: str) -> None:
@@ -270,14 +269,14 @@ def _value(opened: _Open, attribute: str, text: str) -> Any:
     kind = opened.element.parameters.get(attribute)
     if kind is None:
         near = hint(attribute, opened.element.parameters)
-        raise opened.fail(f"{attribute}={_quoted(text)}: is not an attribute of it; {near}")
+        raise opened.fail(f"{attribute}={_quote(text)}: is not an attribute of it; {near}")
     try:
         return kind.read(text)
     except ValueError as error:
-        raise opened.fail(f"{attribute}={_quoted(text)}: expected {error}") from None
+        raise opened.fail(f"{attribute}={_quote(text)}: expected {error}") from None
 
 
-def _quoted(text: str) -> str:
+def _quote(text: str) -> str:
     """A value as one short quoted line."""
     line = printable(text)
     return f'"{line if len(line) <= 60 else line[:57] + "..."}"'

@@ -14,7 +14,7 @@ from xml.etree import ElementTree as Tree
 
 from ..formulas.parameters import REQUIRED, Axis, Choice, Count, File, Number, Vector
 from .animation import AttributePath, Keys, Seconds
-from .identifier import Identifier
+from .element import Identifier
 from .layout import DEFINE, PARAMETER, SCENE, SECTIONS, Element, formulas
 from .lengths import MILLIMETRES, Length
 
@@ -52,13 +52,7 @@ def relaxng() -> str:
 
 
 def open_relaxng() -> str:
-    """Return the schema of scenes that define formulas: elements of other names may hold any attributes.
-
-    Returns
-    -------
-    str
-        XML that includes the schema of `relaxng`.
-    """
+    """Return the schema of scenes that define formulas: elements of other names may hold any attributes."""
     grammar = Tree.Element("grammar", {"xmlns": "http://relaxng.org/ns/structure/1.0"})
     Tree.SubElement(grammar, "include", href=PATH.name)
     body = Tree.SubElement(Tree.SubElement(grammar, "define", name="formula", combine="choice"), "element")

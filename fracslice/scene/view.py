@@ -2,15 +2,249 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
-from ..formulas.parameters import Choice, Count, File, Number, Vector
-from ..formulas.records import attribute
-from .camera import Camera as Camera
-from .camera import Triple
+from ..formulas.box import Box
+from ..formulas.parameters import Choice, Count, File, Number, Vector, attribute, validate_value
 from .element import Part
+
+if TYPE_CHECKING:
+    import numpy as np
+
+Triple = tuple[float, float, float]
+FILLED = 0.95
+"""Fraction of the picture that the object fills with an automatic camera."""
+SHIFT = Vector((0.0, 0.0, 0.0), "distances forwards, to the right and up")
+TURN = Vector((0.0, 0.0), "degrees to the right and up", sizes=(2,))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Camera(Part):
+    """Position, direction and lens of the camera; without one, the whole object is in view.
+
+    The projection is a perspective; orthographic, by parallel rays, with the plane of the target as in
+    perspective; a fisheye, whose equal angles are equal lengths from the middle; or equirectangular, all
+    around, 360 by 180 degrees. With two eyes, the left eye's picture is in the left half, the right eye's in
+    the right half.
+    """
+
+    element = "camera"
+    kind: str = attribute(
+        Choice,
+        "perspective",
+        "projection of the scene to the picture",
+        ("perspective", "orthographic", "fisheye", "equirectangular"),
+    )
+    eye: Triple = attribute(Vector, (2.2, -2.0, 1.4), "where the camera is, in scene units")
+    target: Triple = attribute(Vector, (0.0, 0.0, 0.0), "the point in the middle of the picture")
+    up: Triple = attribute(Vector, (0.0, 0.0, 1.0), "the direction that is up in the picture", nonzero=True)
+    fov: float = attribute(
+        Number,
+        40.0,
+        "the angle between the picture's upper and lower edge, in degrees: below 179, or up to 360 of a "
+        "fisheye",
+        above=0,
+        most=360,
+    )
+    aperture: float = attribute(
+        Number, 0.0, "radius of the lens, in scene units: a larger one blurs more; 0: all is sharp", least=0
+    )
+    focus: float | None = attribute(
+        Number, None, "distance that is in focus; without it, that of the target", above=0
+    )
+    stereo: float = attribute(Number, 0.0, "distance between two eyes, in scene units; 0: one eye", least=0)
+
+    clip: float = attribute(
+        Number,
+        0.0,
+        "distance from the eye of a plane in front of which all is cut away, in scene units; 0: none",
+        least=0,
+    )
+
+    def validate(self) -> None:
+        """Raise `SceneError` if `eye`, `target` and `up` do not define a view, or an effect is not of the
+        kind.
+        """
+        if self.kind in ("perspective", "orthographic") and self.fov >= 179:
+            raise self.fail(f"fov={self.fov:g}: expected a number < 179; a fisheye sees more")
+        if self.aperture and self.kind != "perspective":
+            raise self.fail(f"aperture={self.aperture:g}: expected kind='perspective'")
+        if self.stereo and (self.aperture or self.kind not in ("perspective", "equirectangular")):
+            kinds = "kind='perspective' without an aperture, or 'equirectangular'"
+            raise self.fail(f"stereo={self.stereo:g}: expected {kinds}")
+        if not 0 < math.dist(self.eye, self.target) < math.inf:
+            raise self.fail("eye and target: expected two different points")
+        if math.hypot(*_cross(self.forward, _unit(self.up))) < 1e-6:
+            raise self.fail("up: expected a direction other than the one the camera looks in")
+
+    @classmethod
+    def around(cls, box: Box, points: np.ndarray | None = None, aspect: float = 1.0) -> Camera:
+        """Return a camera with a box or points in view.
+
+        Parameters
+        ----------
+        box : Box
+            Finite box; the camera looks at its centre.
+        points : ndarray of float64, shape (3, n), optional
+            Points to have in view, scene units; the corners of the box by default.
+        aspect : float
+            Width of the picture divided by its height.
+
+        Returns
+        -------
+        Camera
+            The camera.
+        """
+        import numpy as np  # not needed for help texts
+
+        away = _unit((2.2, -2.0, 1.4))
+        draft = cls(eye=_along(box.centre, away, max(box.size)), target=box.centre)
+        x, y, z = np.array(box.corners).T if points is None else points
+        x, y, z = (a - c for a, c in zip((x, y, z), box.centre, strict=True))
+        near, across, up = (x * a + y * b + z * c for a, b, c in (away, draft.right, draft.above))
+        reach = np.maximum(abs(across) / aspect, abs(up)) / (FILLED * math.tan(math.radians(draft.fov / 2)))
+        return replace(draft, eye=_along(box.centre, away, float((near + reach).max())))
+
+    @property
+    def forward(self) -> Triple:
+        """Unit viewing direction."""
+        return _unit(_minus(self.target, self.eye))
+
+    @property
+    def right(self) -> Triple:
+        """Unit direction to the right of the picture."""
+        return _unit(_cross(self.forward, self.up))
+
+    @property
+    def above(self) -> Triple:
+        """Unit direction to the top of the picture, orthogonal to `forward`."""
+        return _cross(self.right, self.forward)
+
+    def moved(self, forward: float = 0.0, right: float = 0.0, up: float = 0.0) -> Camera:
+        """Return the camera translated along its own axes.
+
+        Parameters
+        ----------
+        forward, right, up : float
+            Distances, scene units.
+
+        Returns
+        -------
+        Camera
+            The moved camera, with the same viewing direction.
+
+        Raises
+        ------
+        SceneError
+            If a distance is invalid.
+        """
+        by = validate_value("moved", (forward, right, up), SHIFT, self.fail)
+        shift = tuple(_dot(by, axes) for axes in zip(self.forward, self.right, self.above, strict=True))
+        return replace(self, eye=_plus(self.eye, shift), target=_plus(self.target, shift))
+
+    def turned(self, yaw: float = 0.0, pitch: float = 0.0) -> Camera:
+        """Return the camera turned in place; it never turns over the zenith.
+
+        Parameters
+        ----------
+        yaw, pitch : float
+            Angles to the right and up, degrees.
+
+        Returns
+        -------
+        Camera
+            The turned camera.
+
+        Raises
+        ------
+        SceneError
+            If an angle is invalid.
+        """
+        yaw, pitch = validate_value("turned", (yaw, pitch), TURN, self.fail)
+        ahead = math.asin(max(-1.0, min(1.0, _dot(self.forward, _unit(self.up)))))
+        rise = max(-1.55, min(1.55, ahead + math.radians(pitch))) - ahead
+        level = _turn(self.forward, self.right, rise)
+        turned = _turn(level, _unit(self.up), -math.radians(yaw))
+        return replace(self, target=_along(self.eye, turned, math.dist(self.eye, self.target)))
+
+    def rolled(self, degrees: float) -> Camera:
+        """Return the camera rolled about its viewing direction; `up` becomes orthogonal to it.
+
+        Parameters
+        ----------
+        degrees : float
+            Angle, degrees; positive clockwise, so that the picture turns counter-clockwise.
+
+        Returns
+        -------
+        Camera
+            The rolled camera.
+
+        Raises
+        ------
+        SceneError
+            If the angle is invalid.
+        """
+        degrees = validate_value("degrees", degrees, Number(0.0, "an angle"), self.fail)
+        return replace(self, up=_turn(self.above, self.forward, math.radians(degrees)))
+
+    def orbited(self, degrees: float) -> Camera:
+        """Return the camera rotated around the target, about `up`.
+
+        Parameters
+        ----------
+        degrees : float
+            Angle, degrees.
+
+        Returns
+        -------
+        Camera
+            The rotated camera.
+
+        Raises
+        ------
+        SceneError
+            If the angle is invalid.
+        """
+        degrees = validate_value("degrees", degrees, Number(0.0, "an angle"), self.fail)
+        arm = _turn(_minus(self.eye, self.target), _unit(self.up), math.radians(degrees))
+        return replace(self, eye=_plus(self.target, arm))
+
+
+def _minus(a: Triple, b: Triple) -> Triple:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def _plus(a: Triple, b: tuple[float, ...]) -> Triple:
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+def _along(a: Triple, direction: Triple, by: float) -> Triple:
+    return a[0] + by * direction[0], a[1] + by * direction[1], a[2] + by * direction[2]
+
+
+def _dot(a: Triple, b: Triple) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a: Triple, b: Triple) -> Triple:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def _unit(a: Triple) -> Triple:
+    length = math.hypot(*a)
+    return a[0] / length, a[1] / length, a[2] / length
+
+
+def _turn(a: Triple, axis: Triple, angle: float) -> Triple:
+    """Rodrigues' rotation about a unit axis."""
+    c, s, cross, along = math.cos(angle), math.sin(angle), _cross(axis, a), _dot(axis, a)
+    x, y, z = (c * p + s * q + (1 - c) * along * r for p, q, r in zip(a, cross, axis, strict=True))
+    return x, y, z
+
 
 WHITE = (1.0, 1.0, 1.0)
 
@@ -146,42 +380,17 @@ class Shading(Part):
 
 @dataclass(frozen=True)
 class View:
-    """Complete view of a scene. Omitted parts are None or empty, and chosen for the scene.
+    """Complete view of a scene. Omitted parts are None or empty, and chosen for the scene."""
 
-    Attributes
-    ----------
-    camera : Camera or None
-        The camera.
-    film : Film
-        Size, sampling and tone mapping.
-    lights : tuple of Light
-        Light sources.
-    fog : Fog or None
-        Fog.
-    shading : Shading
-        Display mode and surface effects.
-    """
-
-    camera: Camera | None = None
-    film: Film = Film()
-    lights: tuple[Light, ...] = ()
-    fog: Fog | None = None
-    shading: Shading = Shading()
+    camera: Camera | None = None  # the camera
+    film: Film = Film()  # size, sampling and tone mapping
+    lights: tuple[Light, ...] = ()  # light sources
+    fog: Fog | None = None  # fog
+    shading: Shading = Shading()  # display mode and surface effects
 
     @classmethod
     def of(cls, parts: Iterable[Part]) -> View:
-        """Build a view from its elements.
-
-        Parameters
-        ----------
-        parts : iterable of Part
-            Elements of a scene file.
-
-        Raises
-        ------
-        SceneError
-            If an element that is not repeatable occurs twice.
-        """
+        """Build a view from its elements."""
         elements: dict[str, Any] = {}
         for part in parts:
             name = "lights" if isinstance(part, Light) else part.element

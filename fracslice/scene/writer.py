@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from ..errors import SceneError
 from ..formulas import Node
-from ..formulas.conversion import shown
 from ..formulas.definitions import definitions
-from .definitions import attributes, written
+from ..formulas.parameters import short_repr
+from .definitions import attributes, write_definition
 from .element import Part
 from .layout import SCENE, SECTIONS, SOLID, VERSION
 from .printing import Print
@@ -37,23 +37,12 @@ def to_xml(scene: Scene) -> str:
         For a shape, which has no size.
     """
     if isinstance(scene, Node):
-        raise SceneError(f"{shown(scene)}: expected a scene, such as Scene(sphere(), 40)")
+        raise SceneError(f"{short_repr(scene)}: expected a scene, such as Scene(sphere(), 40)")
     return "\n".join(_lines(scene)) + "\n"
 
 
 def part_to_xml(part: Part | Print) -> str:
-    """Return a record of a scene as an XML element.
-
-    Parameters
-    ----------
-    part : Part
-        A camera, a light, print settings, ...
-
-    Returns
-    -------
-    str
-        One line of XML.
-    """
+    """Return a record of a scene as an XML element."""
     section = SECTIONS[part.element]
     values = {name: getattr(part, name) for name in section.parameters}
     return f"<{section.name}{attributes(section, values)}/>"
@@ -62,7 +51,7 @@ def part_to_xml(part: Part | Print) -> str:
 def _lines(scene: Scene) -> Iterator[str]:
     yield f"<{SCENE.name}{attributes(SCENE, {'version': VERSION})}>"
     for definition in definitions(scene.root):
-        yield from written(definition)
+        yield from write_definition(definition)
     yield f"  <{SOLID.name}{attributes(SOLID, {'size': scene.size_mm, 'unit': scene.unit_mm})}>"
     yield from _element(scene.root, "    ")
     yield f"  </{SOLID.name}>"

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..common.quantiles import quantile
+from ..common.arrays import quantile
 from ..errors import SliceError
-from ..formulas.records import validated
+from ..formulas.parameters import validate_value
 from ..scene.lengths import Length
 from ..work import Work
 from .layers import Layer, Slicer
@@ -49,7 +49,7 @@ def adapted(stack: Stack, most: float, work: Work | None = None) -> Stack:
     Cancelled
         When the work is cancelled.
     """
-    least, most = float(stack.heights[0]), validated("layer", most, Length(None, ""), SliceError)
+    least, most = float(stack.heights[0]), validate_value("layer", most, Length(None, ""), SliceError)
     if most < least:
         raise SliceError(
             f"layers of {least:g} to {most:g} mm: expected a range from the lowest to the highest"

@@ -9,25 +9,13 @@ import numpy as np
 from ..common.compiled import compiled
 
 
-def compensated(image: np.ndarray, by: float, pixel: tuple[float, float]) -> np.ndarray:
+def compensate(image: np.ndarray, by: float, pixel: tuple[float, float]) -> np.ndarray:
     """Move the outlines of a coverage image outwards.
 
     A pixel's coverage is taken as its distance to the outline, in pixels, and grows with that distance: grey
     dilation with a cone. Exact for outlines along an axis, within a fifth of a pixel for all others.
 
-    Parameters
-    ----------
-    image : uint8 [ny, nx]
-        Coverage, 255 for full.
-    by : float
-        Distance, mm; negative moves inwards.
-    pixel : tuple of float
-        Width and height of a pixel, mm.
-
-    Returns
-    -------
-    uint8 [ny, nx]
-        Compensated coverage.
+    `image`: uint8 [ny, nx]; `by` in mm; `pixel`: width and height of a pixel, mm. Returns uint8 [ny, nx].
     """
     unit = math.sqrt(pixel[0] * pixel[1])
     amount, reach = abs(by) / unit, math.ceil(abs(by) / min(pixel)) + 1

@@ -1,9 +1,15 @@
-"""Islands, bodies, cups, traps and cavities: components of all layers and their overlaps, by union-find.
+"""Components of all layers and their overlaps: islands, bodies, cups, traps, cavities, necks and
+overhangs.
 
 On a masked printer the object hangs from the plate, its first layer uppermost, and grows downwards into the
 resin. A hollow without a way out through the layers printed so far is a suction cup, which sucks at the film.
 One without a way out through the layers that follow is a resin trap, which keeps its resin when it is lifted.
 One without any way out is a cavity.
+
+A layer is peeled from the film of the resin by a force that grows with its area; every layer below has to
+bear it. All parts of an object above a layer hang on those components of the layer that they touch, so each
+connected component of the layers above is compared with its contact, from the top layer down (a merge tree,
+Carr, Snoeyink and Axen 2003).
 """
 
 from __future__ import annotations
@@ -13,62 +19,33 @@ from functools import cached_property
 
 import numpy as np
 
-from ..common.compiled import compiled
-from ..common.disjoint import find, grouped, unite
-from .runs import LayerComponents, Nodes, overlaps
+from ..common.compiled import compiled, connected_components, find, unite
+from .runs import LayerComponents, Nodes, Runs, overlaps
+from .thickness import count_pixels
 
 
 @dataclass(frozen=True)
 class Feature:
-    """A feature found by a check.
+    """A feature found by a check."""
 
-    Attributes
-    ----------
-    layers : tuple of int
-        First and last layer.
-    area : float
-        Maximum area in a layer, mm^2.
-    volume : float
-        Volume, mm^3.
-    at : tuple of float
-        Centroid in its first layer, mm from the middle of the object.
-    """
-
-    layers: tuple[int, int]
-    area: float
-    volume: float
-    at: tuple[float, float]
+    layers: tuple[int, int]  # first and last layer
+    area: float  # maximum area in a layer, mm^2
+    volume: float  # volume, mm^3
+    at: tuple[float, float]  # centroid in its first layer, mm from the middle of the object
 
 
 @dataclass(eq=False)
 class Graph:
-    """Components of layers as nodes, overlaps as edges. Layers are added in order.
+    """Components of layers as nodes, overlaps as edges. Layers are added in order."""
 
-    Attributes
-    ----------
-    layers : list of Nodes
-        Nodes of each layer.
-    pairs : list of ndarray
-        Overlapping nodes of successive layers, int64 [n, 2] each.
-    last : LayerComponents or None
-        Components of the last layer.
-    count : int
-        Number of nodes.
-    """
-
-    layers: list[Nodes] = field(default_factory=list)
+    layers: list[Nodes] = field(default_factory=list)  # nodes of each layer
+    # overlapping nodes of successive layers, int64 [n, 2] each
     pairs: list[np.ndarray] = field(default_factory=list)
-    last: LayerComponents | None = None
-    count: int = 0
+    last: LayerComponents | None = None  # components of the last layer
+    count: int = 0  # number of nodes
 
     def add(self, components: LayerComponents) -> None:
-        """Add the components of the next layer.
-
-        Parameters
-        ----------
-        components : LayerComponents
-            Solid or empty components.
-        """
+        """Add the components of the next layer."""
         if self.last is not None:
             first = np.array([self.count - len(self.last), self.count])
             self.pairs.append(overlaps(self.last, components) + first)
@@ -94,10 +71,7 @@ class Graph:
     def islands(self) -> np.ndarray:
         """Nodes with nothing below them. The first layer lies on the plate.
 
-        Returns
-        -------
-        bool [n]
-            True for islands.
+        Returns bool [n].
         """
         held = self.layer == 0
         held[self.edges[:, 1]] = True
@@ -108,31 +82,20 @@ class Graph:
 
         The plate closes the first layer. Looking backwards, nodes that reach the last layer are open.
 
-        Parameters
-        ----------
-        backwards : bool
-            Look at the layers from the node's own on instead.
-
-        Returns
-        -------
-        bool [n]
-            True for shut nodes.
+        Returns bool [n].
         """
         sign = -1 if backwards else 1
         free = self.nodes.open | (backwards & (self.layer == self.layer.max(initial=0)))
         later = np.max(sign * self.layer[self.edges], axis=1)
         order = np.argsort(later, kind="stable")
-        return np.asarray(_shut(self.edges[order], later[order], sign * self.layer, free))
+        return np.asarray(_closed_nodes(self.edges[order], later[order], sign * self.layer, free))
 
     def sealed(self) -> np.ndarray:
         """Empty nodes without any way out, not even to the plate.
 
-        Returns
-        -------
-        bool [n]
-            True for sealed nodes.
+        Returns bool [n].
         """
-        body, count = grouped(self.count, *self.edges.T)
+        body, count = connected_components(self.count, *self.edges.T)
         free = np.zeros(count, bool)
         free[body[self.nodes.open | (self.layer == 0) | (self.layer == self.layer.max(initial=0))]] = True
         return np.asarray(~free[body])
@@ -142,23 +105,9 @@ class Graph:
     ) -> list[Feature]:
         """Group chosen nodes into connected components.
 
-        Parameters
-        ----------
-        chosen : bool [n]
-            Nodes.
-        heights : float64 [l]
-            Heights of the layers, mm.
-        pixel : tuple of float
-            Width and height of a pixel, mm.
-        shape : tuple of int
-            Rows and columns of a layer.
-
-        Returns
-        -------
-        list of Feature
-            The groups, by descending volume.
+        `chosen`: bool [n]; `heights`: float64 [l], mm; `pixel`: width and height of a pixel, mm.
         """
-        number, _ = grouped(self.count, *self.edges[chosen[self.edges].all(1)].T)
+        number, _ = connected_components(self.count, *self.edges[chosen[self.edges].all(1)].T)
         nodes = np.flatnonzero(chosen)
         names, lowest, group = np.unique(number[nodes], return_index=True, return_inverse=True)
         square = pixel[0] * pixel[1]
@@ -181,7 +130,7 @@ class Graph:
 
 
 @compiled
-def _shut(edges, later, layer, free):  # type: ignore[no-untyped-def]
+def _closed_nodes(edges, later, layer, free):  # type: ignore[no-untyped-def]
     """True for nodes that are not connected to an open one once the edges up to their layer are added."""
     count = len(layer)
     root = np.arange(count + 1)
@@ -201,3 +150,252 @@ def _shut(edges, later, layer, free):  # type: ignore[no-untyped-def]
             shut[order[i]] = find(root, order[i]) != outside
             i += 1
     return shut
+
+
+FOOT = 1.0
+"""Cross-section from which a component must stand firmly on the plate, mm^2: else the film peels it off."""
+
+FAINT = 0.5
+"""Area of a node without a whole pixel, such as a tip on the plate, pixels."""
+
+
+@dataclass(frozen=True)
+class Neck:
+    """The weakest cross-section of an object."""
+
+    layer: int  # its layer; 0 is the contact with the plate
+    area: float  # its area, mm^2
+    carried: float  # largest cross-section of one component above it, mm^2
+    at: tuple[float, float]  # centroid of its largest component, mm from the middle of the object
+
+    @property
+    def ratio(self) -> float:
+        """Carried area per area of the neck."""
+        return self.carried / self.area
+
+
+def weakest(
+    graph: Graph, pixel: tuple[float, float], shape: tuple[int, int], least: float, speck: float
+) -> Neck | None:
+    """Find the cross-section that is smallest for the component of the object that it carries.
+
+    Components that begin in the air carry nothing, and are islands; one that begins as a speck is a tip.
+
+    `pixel`: width and height of a pixel, mm; `least`, `speck`: mm^2.
+    """
+    if not graph.count:
+        return None
+    square, nodes = pixel[0] * pixel[1], graph.nodes
+    # The plate holds the first layer that is not empty as a layer with the same components below it would.
+    feet = next(len(layer.area) for layer in graph.layers if len(layer.area))
+    size = np.maximum(nodes.area, FAINT)
+    area = np.concatenate([size[:feet], size])
+    edges = np.concatenate([np.arange(feet)[:, None] + [0, feet], graph.edges + feet])
+    below = np.concatenate([np.zeros(feet, np.int64), 1 + graph.layer[graph.edges[:, 0]]])
+    starts = np.searchsorted(below, np.arange(len(graph.layers) + 1))
+    tips = feet + np.flatnonzero(graph.islands() & (size * square < speck))
+    firm = np.where(_held_nodes(edges, np.append(np.arange(feet), tips), len(area)), area, 0)
+    contact, carried, cut, node = _weakest(
+        area, firm, edges, starts, min(FOOT, least) / square, least / square
+    )
+    if node < 0:
+        return None
+    x, y = (nodes.middle[max(node - feet, 0) if cut else node] - np.array(shape[::-1]) / 2) * pixel
+    return Neck(max(int(cut) - 1, 0), float(contact) * square, float(carried) * square, (float(x), float(y)))
+
+
+@compiled
+def _held_nodes(edges, roots, count):  # type: ignore[no-untyped-def]
+    """True for nodes that grow from some nodes."""
+    held = np.zeros(count, np.bool_)
+    held[roots] = True
+    for below, above in edges:
+        held[above] |= held[below]
+    return held
+
+
+@compiled
+def _weakest(area, firm, edges, starts, foot, least):  # type: ignore[no-untyped-def]
+    """Contact area, carried area, cut and largest node of the weakest cross-section; node -1 if none.
+
+    area, firm: of nodes, and 0 for islands. foot, least: carried areas that count on the plate, and above it.
+    edges: pairs (below, above), those of cut k from `starts[k]` to `starts[k + 1]`.
+    """
+    parent, largest = np.arange(len(area)), area.copy()
+    contact, widest = np.zeros(len(area)), np.full(len(area), -1)
+    ratio, result = 0.0, (0.0, 0.0, 0, -1)
+    for cut in range(len(starts) - 2, -1, -1):
+        cut_edges, seen = edges[starts[cut] : starts[cut + 1]], {(-1, -1)}
+        for node, above in cut_edges:
+            root = find(parent, above)
+            if (node, root) not in seen:  # a node may touch a component several times
+                seen.add((node, root))
+                contact[root] += firm[node]
+                if widest[root] < 0 or firm[node] > firm[widest[root]]:
+                    widest[root] = node
+        for _, above in cut_edges:
+            root = find(parent, above)
+            if (
+                contact[root]
+                and largest[root] >= (least if cut else foot)
+                and largest[root] >= ratio * contact[root]
+            ):
+                ratio = largest[root] / contact[root]
+                result = (contact[root], largest[root], cut, widest[root])
+        for _, above in cut_edges:
+            contact[find(parent, above)], widest[find(parent, above)] = 0, -1
+        for node, above in cut_edges:
+            a, b = find(parent, node), find(parent, above)
+            low, high = min(a, b), max(a, b)
+            largest[low] = max(largest[low], largest[high])
+            parent[high] = low
+    return result
+
+
+COARSE = 8
+"""Coarse pixels along the longest allowed overhang, on which most layers are seen to have none."""
+
+FINEST = 1024
+"""Pixels along the longer side of the picture on which a large overhang is measured."""
+
+DIRECTIONS = ((0, 1), (1, 0), (1, 1), (1, -1))
+"""Steps along rows, columns and both diagonals, pixels."""
+
+
+@dataclass(frozen=True)
+class Overhang:
+    """The farthest overhang of a layer."""
+
+    layer: int  # its layer
+    reach: float  # largest distance from the supported part of the layer, mm
+    area: float  # area of the layer that reaches too far, mm^2
+    at: tuple[float, float]  # its farthest point, mm from the middle of the object
+
+
+def unsupported_pixels(below: Runs, above: Runs, reach: float) -> Runs:
+    """Pixels of a layer that nothing supports.
+
+    `below`, `above`: solid pixels of the layers; `reach`: pixels within this distance of a solid pixel of
+    the layer below are supported, pixels.
+    """
+    rows, count, size = np.zeros(len(above.rows), np.int32), len(above.begin), -1
+    while count > size:  # most layers have fewer unsupported runs than runs
+        size = count
+        begin, end = np.empty((2, size), np.int32)
+        solid = below.rows, below.begin, below.end, above.rows, above.begin, above.end
+        count = _write_unsupported(*solid, reach, above.width, rows, begin, end)
+    return Runs(rows, begin[:count], end[:count], above.width)
+
+
+def farthest(
+    solid: Runs, bare: Runs, layer: int, pixel: tuple[float, float], overhang: float, span: float
+) -> Overhang | None:
+    """Measure how far the unsupported pixels of a layer reach.
+
+    A pixel on a straight line of solid pixels with support at both ends, a bridge, may be as long as `span`;
+    any other, a cantilever, may reach `overhang` far. Components without any support are islands and not
+    measured.
+
+    `solid`, `bare`: solid pixels of the layer; `pixel`: width and height of a pixel, mm; `overhang`, `span`
+    in mm.
+    """
+    coarse = max(int(overhang / COARSE / max(pixel)), 1)
+    fine = max(-(-max(solid.height, solid.width) // FINEST), 1)
+    for times, slack in ((coarse, 2 * coarse * max(pixel)), (fine, 0.0)):
+        far, away = _too_far(solid, bare, times, pixel, overhang - slack, span)
+        if not far.any():
+            return None
+    step = np.array(pixel) * times
+    y, x = np.unravel_index(np.argmax(np.where(far, away, 0)), far.shape)
+    at = (np.array([x, y]) + 0.5) * step - np.array([solid.width, solid.height]) * pixel / 2
+    return Overhang(layer, float(away[y, x]), float(far.sum() * step.prod()), (float(at[0]), float(at[1])))
+
+
+def _too_far(
+    solid: Runs, bare: Runs, times: int, pixel: tuple[float, float], overhang: float, span: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mask of pixels `times` as large that reach too far, and the distance of all from support, mm."""
+    from scipy.ndimage import distance_transform_edt, label
+
+    shape = -(-solid.height // times), -(-solid.width // times)
+    counts = np.zeros((2, *shape), np.int32)
+    for runs, count in zip((solid, bare), counts, strict=True):
+        count_pixels(runs.rows, runs.begin, runs.end, times, count)
+    full, held = counts[0] > 0, counts[0] > counts[1]
+    step = times * pixel[0], times * pixel[1]
+    away = distance_transform_edt(~held, sampling=step[::-1])
+    far = full & (away > overhang)
+    if far.any():
+        components, count = label(full, np.ones((3, 3)))
+        has_support = np.zeros(count + 1, bool)
+        has_support[components[held]] = True
+        far &= has_support[components]
+    for dy, dx in DIRECTIONS if far.any() else ():
+        far &= ~(np.hypot(dy * step[1], dx * step[0]) * _span(full, held, dy, dx) <= span)
+    return far, away
+
+
+@compiled
+def _span(solid, held, dy, dx):  # type: ignore[no-untyped-def]
+    """Steps between the supported pixels on both sides of each pixel along a line of solid ones."""
+    ny, nx = solid.shape
+    span = np.zeros((ny, nx), np.float32)
+    for sign in (1, -1):
+        steps = np.full((ny, nx), np.inf, np.float32)
+        for j in range(ny):
+            y = j if sign > 0 else ny - 1 - j
+            for i in range(nx):
+                x = i if sign * (dx if dx else dy) > 0 else nx - 1 - i
+                v, u = y - sign * dy, x - sign * dx
+                if held[y, x]:
+                    steps[y, x] = 0
+                elif solid[y, x] and 0 <= v < ny and 0 <= u < nx:
+                    steps[y, x] = steps[v, u] + 1
+                span[y, x] += steps[y, x]
+    return span
+
+
+@compiled
+def _write_unsupported(rows_a, begin_a, end_a, rows_b, begin_b, end_b, reach, width, rows, begin, end):  # type: ignore[no-untyped-def]
+    """Write the runs of pixels farther than `reach` from all runs of the layer below; return their number,
+    which may exceed the length of the arrays.
+    """
+    held = np.zeros(width + 1, np.int32)
+    count, far = 0, int(np.floor(reach))
+    for y in range(len(rows_b) - 1):
+        if not _lies_on(rows_a, begin_a, end_a, rows_b, begin_b, end_b, y):
+            held[:] = 0
+            for v in range(max(y - far, 0), min(y + far, len(rows_a) - 2) + 1):
+                side = int(np.floor(np.sqrt(reach * reach - (v - y) ** 2)))
+                for r in range(rows_a[v], rows_a[v + 1]):
+                    held[max(begin_a[r] - side, 0)] += 1
+                    held[min(end_a[r] + side, width)] -= 1
+            level, x = 0, 0
+            for r in range(rows_b[y], rows_b[y + 1]):
+                while x < begin_b[r]:
+                    level += held[x]
+                    x += 1
+                since = -1
+                while x < end_b[r]:
+                    level += held[x]
+                    if level == 0 and since < 0:
+                        since = x
+                    if since >= 0 and (level or x == end_b[r] - 1):
+                        if count < len(begin):
+                            begin[count], end[count] = since, x + (level == 0)
+                        count, since = count + 1, -1
+                    x += 1
+        rows[y + 1] = count
+    return count
+
+
+@compiled
+def _lies_on(rows_a, begin_a, end_a, rows_b, begin_b, end_b, y):  # type: ignore[no-untyped-def]
+    """True if every run of a row lies on a run of the row below."""
+    a = rows_a[y]
+    for b in range(rows_b[y], rows_b[y + 1]):
+        while a < rows_a[y + 1] and end_a[a] < end_b[b]:
+            a += 1
+        if a == rows_a[y + 1] or begin_a[a] > begin_b[b]:
+            return False
+    return True

@@ -1,29 +1,108 @@
-"""Printability checks of layers: islands, overhangs, cups, traps, cavities, bodies, thin walls and gaps, fit,
+"""Printability checks of layers, and the problems that they find.
+
 volume and weight.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 
-from ..printing.limits import Limits
-from ..printing.problems import Problem
-from ..printing.solid_checks import SolidReport, check_object
+from ..common.messages import format_count, significant
+from ..printing.problems import SUPPORTS, Limits, Problem, flat_base
+from ..printing.solid_checks import FILL, SolidReport, check_object, loose
 from ..printing.widths import Widths, widths_of
 from ..work import Work
-from .feature_graph import Feature, Graph
-from .layer_problems import misfit, problems_of
+from .feature_graph import Feature, Graph, Neck, Overhang, farthest, unsupported_pixels, weakest
 from .layers import Layer, Slicer
-from .necks import Neck, weakest
-from .overhangs import Overhang, farthest, unsupported
-from .printers import Printer
+from .printers import PRINTERS, Printer
 from .runs import LayerComponents, layer_components
 from .stack import Stack
 from .thickness import widths
+
+
+def misfit(stack: Stack, printer: Printer | None) -> Problem | None:
+    """Compare the size of a planned stack with a printer, before any layer is sampled."""
+    share = {
+        p: min(most / mine for most, mine in zip(p.build_volume, stack.size, strict=True))
+        for p in ([printer] if printer else PRINTERS.values())
+    }
+    nearest = max(share, key=lambda p: share[p])
+    if share[nearest] >= 1 - 1e-6:
+        return None
+    mine, most = (" x ".join(significant(s, 4) for s in size) for size in (stack.size, nearest.build_volume))
+    which = f"the {nearest.title}" if printer else f"any known printer, not even the {nearest.title}"
+    size = math.floor(10 * share[nearest] * stack.side) / 10
+    text = f"does not fit {which}: {mine} mm, and it has {most} mm"
+    return Problem("fit", text, mend=(("size", f"{size:g}mm"),))
+
+
+def problems_of(report: PrintReport, stack: Stack, limits: Limits) -> list[Problem]:
+    """Problems that a report shows, except for the size."""
+
+    def where(feature: Feature) -> dict[str, Any]:
+        layer = feature.layers[0]
+        return {"layer": layer, "at": (*feature.at, _bottom(stack, layer))}
+
+    problems = []
+    lowest = min(
+        (body.layers[0] for body in report.bodies), default=0
+    )  # several on the plate are as many parts
+    if hanging := [body for body in report.bodies if body.layers[0] > lowest]:
+        problems.append(loose(len(hanging), **where(hanging[0])))
+    if report.islands:
+        largest = max(report.islands, key=lambda i: i.area)
+        first = min(i.layers[0] for i in report.islands)
+        text = f"{format_count(len(report.islands), 'island')} in the air, the first from layer {first} on"
+        text += f", the largest of {significant(largest.area)} mm2"
+        problems.append(
+            Problem("islands", text, advice=SUPPORTS, count=len(report.islands), **where(largest))
+        )
+    if report.overhang:
+        far = report.overhang
+        text = f"a flat overhang reaches {far.reach:.3g} mm, {significant(far.area)} mm2 of it too far"
+        at = (*far.at, _bottom(stack, far.layer))
+        problems.append(Problem("overhangs", text, far.layer, at, advice=f"--up, or {SUPPORTS}"))
+    if report.neck and report.neck.ratio > limits.neck:
+        problems.append(_narrow_neck(report.neck, stack, limits))
+    if report.cavities:
+        sealed = format_count(len(report.cavities), "sealed cavity", "sealed cavities")
+        text = f"{sealed} with {significant(sum(c.volume for c in report.cavities))} mm3 of resin"
+        problems.append(
+            Problem("cavities", text, mend=FILL, count=len(report.cavities), **where(report.cavities[0]))
+        )
+    for kind, noun, hollows in (("cups", "suction cup", report.cups), ("traps", "resin trap", report.traps)):
+        remaining = [hollow for hollow in hollows if hollow not in report.cavities]
+        if remaining:
+            largest = max(remaining, key=lambda h: h.area)
+            volume = significant(sum(h.volume for h in remaining))
+            text = f"{format_count(len(remaining), noun)} with {volume} mm3 of resin"
+            text += f", the largest {significant(largest.area)} mm2"
+            advice, count = "--up, or a drain hole", len(remaining)
+            problems.append(Problem(kind, text, advice=advice, count=count, **where(largest)))
+    return [*problems, *report.solid.thin]
+
+
+def _narrow_neck(neck: Neck, stack: Stack, limits: Limits) -> Problem:
+    """Problem of a cross-section that is too small for what it carries."""
+    at = (*neck.at, _bottom(stack, neck.layer))
+    if neck.layer == 0:
+        text = f"it stands on {significant(neck.area, 2)} mm2 and is {significant(neck.carried)} mm2 wide"
+        base = flat_base(stack.size[2])
+        return Problem("necks", text, 0, at, mend=(("base", base),), advice=f"--raft 1mm, or {SUPPORTS}")
+    text = f"{significant(neck.carried)} mm2 hang on {significant(neck.area, 2)} mm2"
+    width = 1.2 * math.sqrt(4 / math.pi * neck.carried / limits.neck)
+    return Problem("necks", text, neck.layer, at, mend=(("thickness", f"{width:.2g}mm"),), advice=SUPPORTS)
+
+
+def _bottom(stack: Stack, layer: int) -> float:
+    """Lower face of a layer, mm."""
+    return float(stack.tops[layer] - stack.heights[layer])
+
 
 THICKNESS_LAYERS = 24
 """Layers, evenly spaced over the height, in which walls and gaps are measured."""
@@ -37,114 +116,49 @@ WORST = 6
 
 @dataclass(frozen=True)
 class PrintReport:
-    """Report on all layers. Lengths in mm, areas in mm^2, volumes in mm^3; lists have the largest first.
+    """Report on all layers. Lengths in mm, areas in mm^2, volumes in mm^3; lists have the largest first."""
 
-    Attributes
-    ----------
-    layers : int
-        Number of layers.
-    pixels : tuple of int
-        Pixels along x and y.
-    size : tuple of float
-        Size of the object.
-    fits : bool or None
-        True if the object fits the printer; None without a printer.
-    areas : list of float
-        Area of each layer.
-    volume, weight_g : float
-        Volume of the solid, and weight in grams.
-    bodies, islands : list of Feature
-        Connected components, and components with nothing below them, without specks.
-    specks : int
-        Number of islands and bodies below the limit.
-    overhang_area, largest_overhang : float
-        Total over all layers, and maximum in a layer.
-    cups, traps, cavities : list of Feature
-        Suction cups, resin traps and sealed cavities.
-    walls, gaps : Widths or None
-        Widths in layers.
-    overhang : Overhang or None
-        The farthest flat overhang beyond the limits.
-    neck : Neck or None
-        The cross-section that is smallest for what it carries.
-    worst : list of int
-        Layers with the most overhang or the largest islands.
-    solid : SolidReport
-        Report on the solid, measured in space instead of in layers.
-    problems : list of Problem
-        The problems.
-    """
-
-    layers: int
-    pixels: tuple[int, int]
-    size: tuple[float, float, float]
-    fits: bool | None
-    areas: list[float]
-    volume: float
+    layers: int  # number of layers
+    pixels: tuple[int, int]  # pixels along x and y
+    size: tuple[float, float, float]  # size of the object
+    fits: bool | None  # true if the object fits the printer; None without a printer
+    areas: list[float]  # area of each layer
+    volume: float  # volume of the solid, and weight in grams
     weight_g: float
-    bodies: list[Feature]
+    bodies: list[Feature]  # connected components, and components with nothing below them, without specks
     islands: list[Feature]
-    specks: int
-    overhang_area: float
+    specks: int  # number of islands and bodies below the limit
+    overhang_area: float  # total over all layers, and maximum in a layer
     largest_overhang: float
-    cups: list[Feature]
+    cups: list[Feature]  # suction cups, resin traps and sealed cavities
     traps: list[Feature]
     cavities: list[Feature]
-    walls: Widths | None
+    walls: Widths | None  # widths in layers
     gaps: Widths | None
-    overhang: Overhang | None
-    neck: Neck | None
-    worst: list[int]
-    solid: SolidReport
-    problems: list[Problem] = field(default_factory=list)
+    overhang: Overhang | None  # the farthest flat overhang beyond the limits
+    neck: Neck | None  # the cross-section that is smallest for what it carries
+    worst: list[int]  # layers with the most overhang or the largest islands
+    solid: SolidReport  # report on the solid, measured in space instead of in layers
+    problems: list[Problem] = field(default_factory=list)  # the problems
 
     def as_dict(self) -> dict[str, Any]:
-        """The report as plain JSON types.
-
-        Returns
-        -------
-        dict
-            Keyed by attribute name.
-        """
+        """The report as plain JSON types."""
         return asdict(self)
 
 
 @dataclass(frozen=True, eq=False)
 class LayerFindings:
-    """Results of one layer.
+    """Results of one layer."""
 
-    Attributes
-    ----------
-    solid, empty : LayerComponents
-        Components.
-    area : float
-        Area, mm^2.
-    walls, gaps : ndarray or None
-        Widths; None in a layer that is not measured.
-    """
-
-    solid: LayerComponents
+    solid: LayerComponents  # components
     empty: LayerComponents
-    area: float
-    walls: np.ndarray | None
+    area: float  # area, mm^2
+    walls: np.ndarray | None  # widths; None in a layer that is not measured
     gaps: np.ndarray | None
 
 
 def findings_of(slicer: Slicer, layers: range) -> Iterator[LayerFindings]:
-    """Examine some layers, each by itself.
-
-    Parameters
-    ----------
-    slicer : Slicer
-        Slicer of the stack.
-    layers : range
-        Their numbers.
-
-    Returns
-    -------
-    iterator of LayerFindings
-        Results of the layers, in order.
-    """
+    """Examine some layers, each by itself."""
     stack = slicer.stack
     chosen = set(np.linspace(0, len(stack.z) - 1, THICKNESS_LAYERS).astype(int).tolist())
 
@@ -163,30 +177,7 @@ def check_layers(
     work: Work | None = None,
     findings: Iterator[LayerFindings] | None = None,
 ) -> PrintReport:
-    """Check a planned stack, layer by layer, in memory that grows with the number of components only.
-
-    Parameters
-    ----------
-    stack : Stack
-        The planned layers.
-    limits : Limits, optional
-        Limits of the checks.
-    printer : Printer, optional
-        Printer that the object is to fit.
-    work : Work, optional
-        Threads, progress and cancellation.
-    findings : iterator of LayerFindings, optional
-        Results of all layers, in order; they are made here by default.
-
-    Raises
-    ------
-    SliceError
-        If a layer cannot be sampled.
-    VolumeError
-        If the solid cannot be sampled.
-    Cancelled
-        When the work is cancelled.
-    """
+    """Check a planned stack, layer by layer, in memory that grows with the number of components only."""
     limits, work = limits or Limits(), work or Work()
     finest, origin = max(stack.pixel), stack.origin
     solid = check_object(stack.root, stack.outer, stack.scale, limits, work, finest, origin, stack.drains)
@@ -214,7 +205,7 @@ class _Collector:
             below = solid.last
             reach = max(float(stack.heights[k]) / min(stack.pixel), 1.0)
             above = now.solid.runs
-            bare = above.none if below is None else unsupported(below.runs, above, reach)
+            bare = above.none if below is None else unsupported_pixels(below.runs, above, reach)
             overhangs.append(square * float((bare.end - bare.begin).sum()))
             if len(bare.begin):
                 worst = farthest(above, bare, k, stack.pixel, limits.overhang, limits.span)

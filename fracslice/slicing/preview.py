@@ -26,10 +26,7 @@ ALARM = (214, 60, 60)
 def thumbnail(layer: Layer) -> Image:
     """Shrink a layer's coverage by box averaging, in colour.
 
-    Returns
-    -------
-    PIL.Image.Image
-        At most `CELL` pixels along a side, in the proportions of the object.
+    Returns at most `CELL` pixels along a side.
     """
     from PIL import Image
 
@@ -47,7 +44,7 @@ def _square(stack: Stack, most: float = math.inf) -> tuple[int, int]:
     return max(round(width / side), 1), max(round(height / side), 1)
 
 
-def _spread(layers: range, count: int) -> list[int]:
+def _spread_layers(layers: range, count: int) -> list[int]:
     """At most `count` of the layers, evenly spaced, each in the middle of its interval."""
     total = len(layers)
     return sorted(layers[int((i + 0.5) * total / min(count, total))] for i in range(min(count, total)))
@@ -56,14 +53,8 @@ def _spread(layers: range, count: int) -> list[int]:
 def contact_sheet(
     stack: Stack, file: BinaryIO, work: Work | None = None, layers: range | None = None
 ) -> None:
-    """Write a PNG with 24 layers, evenly spaced, each with its height above the bed.
-
-    Parameters
-    ----------
-    layers : range, optional
-        Layers to choose from; all by default.
-    """
-    chosen = _spread(range(len(stack.z)) if layers is None else layers, CELLS)
+    """Write a PNG with 24 layers, evenly spaced, each with its height above the bed."""
+    chosen = _spread_layers(range(len(stack.z)) if layers is None else layers, CELLS)
     images = list(Slicer(stack, work or Work()).map(thumbnail, chosen))
     _sheet(stack, chosen, images, math.ceil(math.sqrt(1.5 * max(len(images), 1)))).save(file, "PNG")
 
@@ -85,19 +76,13 @@ def _sheet(stack: Stack, layers: Sequence[int], images: Sequence[Image], across:
 
 def animation(stack: Stack, file: BinaryIO, work: Work | None = None) -> None:
     """Write an endless animated WebP that climbs through up to 60 layers in three seconds."""
-    chosen = _spread(range(len(stack.z)), FRAMES)
+    chosen = _spread_layers(range(len(stack.z)), FRAMES)
     frames = list(Slicer(stack, work or Work()).map(thumbnail, chosen))
     frames[0].save(file, "WEBP", save_all=True, append_images=frames[1:], duration=50, loop=0, lossless=True)
 
 
 def worst_layers(stack: Stack, layers: Sequence[int], file: BinaryIO, work: Work | None = None) -> None:
-    """Write a PNG of layers at full resolution, pixels with nothing below them in red.
-
-    Parameters
-    ----------
-    layers : sequence of int
-        Numbers of the layers; the lowest one if empty.
-    """
+    """Write a PNG of layers at full resolution, pixels with nothing below them in red."""
     from PIL import Image
 
     layers = layers or [0]

@@ -8,61 +8,37 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..common.tables import read_table
+from ..common.settings import read_table
 from ..errors import SliceError
-from ..formulas.parameters import REQUIRED, Count, Label, Number, Vector
-from ..formulas.records import attribute, from_table, validate
+from ..formulas.parameters import REQUIRED, Count, Label, Number, Vector, attribute, from_table, validate
 
 
 @dataclass(frozen=True)
 class Printer:
-    """A masked resin printer.
+    """A masked resin printer."""
 
-    Attributes
-    ----------
-    name, title : str
-        Name in commands, and name in messages.
-    pixels : tuple of int
-        Pixels of the screen along x and y of the bed.
-    screen : tuple of float
-        Size of the screen, mm.
-    height : float
-        Maximum height of a print, mm.
-    mirror : bool
-        The picture is mirrored along x.
-    portrait : bool
-        Rows of the picture run along x of the bed.
-    file : str
-        Extension of the files that it prints; "encrypted.ctb" for those that are not written.
-    version : int
-        Version of the format.
-    motion : tuple of float
-        Lift, mm, its speed and that of the way back, mm/min, and rest before exposure, s.
-    settings : tuple
-        Names and values of the resin settings of a printer's own file.
-
-    Raises
-    ------
-    SliceError
-        For an invalid value.
-    """
-
-    name: str = attribute(Label, REQUIRED, "name in commands")
+    name: str = attribute(Label, REQUIRED, "name in commands")  # name in commands, and name in messages
     title: str = attribute(Label, REQUIRED, "name in messages")
+    # pixels of the screen along x and y of the bed
     pixels: tuple[int, int] = attribute(
         Vector, REQUIRED, "pixels along x and y", sizes=(2,), least=1, most=65_535, whole=True
     )
+    # size of the screen, mm
     screen: tuple[float, float] = attribute(
         Vector, REQUIRED, "size of the screen, mm", sizes=(2,), above=0, most=10_000
     )
+    # maximum height of a print, mm
     height: float = attribute(Number, REQUIRED, "highest print, mm", above=0, most=10_000)
-    mirror: bool = True
-    portrait: bool = False
+    mirror: bool = True  # the picture is mirrored along x
+    portrait: bool = False  # rows of the picture run along x of the bed
+    # extension of the files that it prints; "encrypted.ctb" for those that are not written
     file: str = attribute(Label, "", "extension of the files that it prints")
-    version: int = attribute(Count, 1, "version of the format", most=65_536)
+    version: int = attribute(Count, 1, "version of the format", most=65_536)  # version of the format
+    # lift, mm, its speed and that of the way back, mm/min, and rest before exposure, s
     motion: tuple[float, float, float, float] = attribute(
         Vector, (5.0, 65.0, 150.0, 0.5), "mm, mm/min, mm/min and s", sizes=(4,), least=0, most=10_000
     )
+    # names and values of the resin settings of a printer's own file
     settings: tuple[tuple[str, Any], ...] = ()
 
     def __post_init__(self) -> None:
@@ -117,20 +93,7 @@ PRINTERS = _Printers(Path(__file__).parent / "printers.csv")
 
 
 def printer(name: str) -> Printer:
-    """Look up a printer.
-
-    Parameters
-    ----------
-    name : str
-        A key of `PRINTERS`, or a .toml file with the attributes of `Printer`; its table `resin` has those of
-        `fracslice.export.resins.Resin`.
-
-    Raises
-    ------
-    SliceError
-        For an unknown name; the message has the nearest known one. For a file that cannot be read or has an
-        invalid value.
-    """
+    """Look up a printer."""
     if name.lower().endswith(".toml"):
         return _own(Path(name))
     if name in PRINTERS:

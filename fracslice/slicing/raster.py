@@ -1,4 +1,4 @@
-"""From coverage to the picture on a printer's screen: compensation, blur, grey levels, place, mirroring."""
+"""From coverage to the picture on a printer's screen: blur, grey levels, place and mirroring."""
 
 from __future__ import annotations
 
@@ -7,52 +7,32 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._slices import Encoding, encoded
 from ..errors import SliceError
-from ..formulas.parameters import Count, Number
-from ..formulas.records import attribute, validate
+from ..formulas.parameters import Count, Number, attribute, validate
 from ..scene.lengths import Shift
-from .layers import Layer
+from .layers import Layer, Pictures, ScreenView
 from .printers import Printer
-from .slab import Pictures, ScreenView
 from .stack import Stack
 
 
 @dataclass(frozen=True, eq=False)
 class Screen:
-    """Turns layers into pictures.
+    """Turns layers into pictures."""
 
-    Attributes
-    ----------
-    stack : Stack
-        The planned layers.
-    printer : Printer or None
-        Its screen is shown; None shows the object alone.
-    compensation : float or str
-        Distance by which outlines move outwards (negative: inwards), for resin that cures beyond its pixels
-        or shrinks; mm, or text such as "50um".
-    gamma : float
-        Exponent of the grey levels.
-    mirror : bool or None
-        Overrides the printer's.
-    levels : int
-        Grey levels above black; 1 for black and white.
-    blur : int
-        Radius of the blur of outlines, pixels.
-
-    Raises
-    ------
-    SliceError
-        For an invalid value, or an object larger than the printer's build volume.
-    """
-
-    stack: Stack
-    printer: Printer | None = None
+    stack: Stack  # the planned layers
+    printer: Printer | None = None  # its screen is shown; None shows the object alone
+    # distance by which outlines move outwards (negative: inwards), for resin that cures beyond its pixels or
+    # shrinks; mm, or text such as "50um"
     compensation: float = attribute(Shift, 0.0, "how far outlines move")
+    # exponent of the grey levels
     gamma: float = attribute(Number, 1.0, "of the grey levels", above=0, most=10)
-    mirror: bool | None = None
+    mirror: bool | None = None  # overrides the printer's
+    # grey levels above black; 1 for black and white
     levels: int = attribute(Count, 255, "grey levels above black", least=1, most=255)
+    # radius of the blur of outlines, pixels
     blur: int = attribute(Count, 0, "radius of the blur, pixels", least=0, most=16)
 
     def __post_init__(self) -> None:
@@ -77,15 +57,7 @@ class Screen:
     def picture(self, layer: Layer) -> np.ndarray:
         """Picture of a layer.
 
-        Parameters
-        ----------
-        layer : Layer
-            A layer of the stack.
-
-        Returns
-        -------
-        uint8 [rows, columns]
-            Grey levels, the first row at the top.
+        Returns uint8 [rows, columns].
         """
         image = np.zeros(self.shape, np.uint8)
         bed, mine = self._bed(image), self._place
@@ -98,13 +70,11 @@ class Screen:
         if any(self._margin):
             coverage = np.pad(coverage, [(n, n) for n in self._margin])
         if self.compensation:
-            from .compensation import compensated
+            from .compensation import compensate
 
-            coverage = compensated(coverage, self.compensation, self.stack.pixel)
+            coverage = compensate(coverage, self.compensation, self.stack.pixel)
         if self.blur:
-            from .blur import blurred
-
-            coverage = blurred(coverage, self.blur)
+            coverage = blur(coverage, self.blur)
         return coverage
 
     def encoded(self, layer: Layer, encoding: Encoding, shown: np.ndarray | None = None) -> bytes:
@@ -113,14 +83,7 @@ class Screen:
         A section without compensation and blur is encoded from its tiles, as runs of equal pixels, and the
         picture is never allocated.
 
-        Parameters
-        ----------
-        layer : Layer
-            A layer of the stack.
-        encoding : Encoding
-            Encoding of the picture.
-        shown : uint8 [256], optional
-            Level for each grey level of the picture, the first 0, the last 255.
+        `shown`: uint8 [256], optional.
         """
         if not self._is_direct or layer.mean is not None:
             image = self.picture(layer)
@@ -206,19 +169,7 @@ class _Window:
 def check_fits(stack: Stack, printer: Printer, grown: float = 0.0) -> None:
     """Check that the object fits a printer.
 
-    Parameters
-    ----------
-    stack : Stack
-        The planned layers.
-    printer : Printer
-        The printer.
-    grown : float
-        Distance by which its outlines move outwards, mm.
-
-    Raises
-    ------
-    SliceError
-        If the object is larger than the build volume.
+    `grown` in mm.
     """
     x, y, z = stack.size
     size = x + 2 * grown, y + 2 * grown, z
@@ -227,3 +178,16 @@ def check_fits(stack: Stack, printer: Printer, grown: float = 0.0) -> None:
             raise SliceError(
                 f"the object is {mine:.6g} mm along {axis}, the {printer.title} has {most:.6g} mm"
             )
+
+
+def blur(image: NDArray[np.uint8], radius: int) -> NDArray[np.uint8]:
+    """Mean over squares of pixels; beyond its borders the picture is black.
+
+    `image`: uint8 [rows, columns]. Returns uint8 [rows, columns].
+    """
+    side = 2 * radius + 1
+    sums = np.pad(image, ((radius + 1, radius), (radius + 1, radius))).astype(np.uint32)
+    for axis in (0, 1):
+        sums = np.cumsum(sums, axis, out=sums)
+    means = sums[side:, side:] - sums[:-side, side:] - sums[side:, :-side] + sums[:-side, :-side]
+    return ((means + side * side // 2) // (side * side)).astype(np.uint8)

@@ -6,29 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..common.compiled import compiled
-from ..common.disjoint import grouped
-from ..common.rows import Rows
+from ..common.arrays import Rows
+from ..common.compiled import compiled, connected_components
 
 
 @dataclass(frozen=True, eq=False)
 class Runs:
-    """Solid pixels of a layer.
+    """Solid pixels of a layer."""
 
-    Attributes
-    ----------
-    rows : int32 [ny + 1]
-        Row y has the runs ``rows[y]:rows[y + 1]``.
-    begin, end : int32 [r]
-        Pixels of each run, end excluded.
-    width : int
-        Pixels in a row.
-    """
-
-    rows: np.ndarray
-    begin: np.ndarray
+    rows: np.ndarray  # row y has the runs ``rows[y]:rows[y + 1]``
+    begin: np.ndarray  # pixels of each run, end excluded
     end: np.ndarray
-    width: int
+    width: int  # pixels in a row
 
     @property
     def height(self) -> int:
@@ -51,40 +40,20 @@ class Runs:
 
 @dataclass(frozen=True, eq=False)
 class Nodes(Rows):
-    """Connected components as nodes of a graph.
+    """Connected components as nodes of a graph."""
 
-    Attributes
-    ----------
-    area : int64 [n]
-        Area, pixels.
-    middle : float64 [n, 2]
-        Centroid (x, y), pixels.
-    open : bool [n]
-        True if it reaches the border of the window.
-    """
-
-    area: np.ndarray
-    middle: np.ndarray
-    open: np.ndarray
+    area: np.ndarray  # area, pixels
+    middle: np.ndarray  # centroid (x, y), pixels
+    open: np.ndarray  # true if it reaches the border of the window
 
 
 @dataclass(frozen=True, eq=False)
 class LayerComponents:
-    """Connected components of one layer, solid or empty.
+    """Connected components of one layer, solid or empty."""
 
-    Attributes
-    ----------
-    runs : Runs
-        Pixels of the layer.
-    label : int64 [r]
-        Component of each run.
-    nodes : Nodes
-        The components.
-    """
-
-    runs: Runs
-    label: np.ndarray
-    nodes: Nodes
+    runs: Runs  # pixels of the layer
+    label: np.ndarray  # component of each run
+    nodes: Nodes  # the components
 
     def __len__(self) -> int:
         return len(self.nodes.area)
@@ -93,24 +62,16 @@ class LayerComponents:
 def layer_components(solid: Runs) -> tuple[LayerComponents, LayerComponents]:
     """Label the components of a layer: solid ones 8-connected, empty ones 4-connected.
 
-    Parameters
-    ----------
-    solid : Runs
-        The solid pixels.
-
-    Returns
-    -------
-    solid, empty : LayerComponents
-        The components.
+    `solid`: the solid pixels.
     """
-    return _labelled(solid, 1), _labelled(solid.gaps, 0)
+    return _label_runs(solid, 1), _label_runs(solid.gaps, 0)
 
 
-def _labelled(runs: Runs, reach: int) -> LayerComponents:
+def _label_runs(runs: Runs, reach: int) -> LayerComponents:
     """Label runs that overlap, or at `reach` 1 touch at a corner."""
     rows, begin, end = runs.rows, runs.begin, runs.end
     pairs = _touching(rows[:-1], begin, end, rows[1:], begin, end, reach)
-    label, count = grouped(len(begin), *pairs)
+    label, count = connected_components(len(begin), *pairs)
     row = np.repeat(np.arange(runs.height), np.diff(rows))
     length = end - begin
     area = np.bincount(label, length, count).astype(np.int64)
@@ -143,10 +104,7 @@ def _gaps(rows, begin, end, nx, gaps, gap_begin, gap_end):  # type: ignore[no-un
 def overlaps(below: LayerComponents, above: LayerComponents) -> np.ndarray:
     """Pairs of components of two layers that share a pixel.
 
-    Returns
-    -------
-    int64 [n, 2]
-        Unique pairs (below, above), sorted.
+    Returns int64 [n, 2].
     """
     a, b = below.runs, above.runs
     some, others = _touching(a.rows, a.begin, a.end, b.rows, b.begin, b.end, 0)

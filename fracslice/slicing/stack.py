@@ -11,14 +11,13 @@ import numpy as np
 
 from ..errors import SceneError, SliceError
 from ..formulas.box import Box, Triple
-from ..formulas.parameters import REQUIRED, Vector
-from ..formulas.records import attribute, validate
+from ..formulas.parameters import REQUIRED, Vector, attribute, validate
 from ..kernel import Field
 from ..printing import printable
 from ..scene import Print
 from ..scene.lengths import AnyLength, AnyScale, Length, Pair, Percent
 from ..volume import Drain, plan
-from ..volume.sizing import SAME, UP, Sizing, oriented
+from ..volume.sizing import SAME, UP, Sizing, orient_field
 from ..work import Work
 
 MOST_LAYERS = 100_000
@@ -184,12 +183,12 @@ def plan_stack(root: Field, job: SliceJob, work: Work | None = None) -> Stack:
     Cancelled
         When the work is cancelled.
     """
-    upright = oriented(root, job.up, job.sizing.stretch, work)
+    upright = orient_field(root, job.up, job.sizing.stretch, work)
     planned = plan(upright, job.sizing.longest / min(job.pixel), work)
     if job.printing.bodies is not None:
-        from ..printing.framing import framed
+        from ..printing.framing import frame_bodies
 
-        planned = framed(planned, job.sizing, job.printing.bodies, work or Work())
+        planned = frame_bodies(planned, job.sizing, job.printing.bodies, work or Work())
     planned, scale = printable(planned, job.sizing, job.printing, work)
     box, outer = planned.box, planned.outer
     mm = tuple(s * scale for s in box.size)
@@ -205,7 +204,7 @@ def plan_stack(root: Field, job: SliceJob, work: Work | None = None) -> Stack:
     _check_precision(outer, scale, min(*job.pixel, job.layer))
     z = box.lo[2] + (tops - np.diff(tops, prepend=0.0) / 2) / scale
     size, at = (mm[0], mm[1], mm[2]), (corner[0], corner[1])
-    pixels, notes = (shape[0], shape[1]), (*planned.notes, *_rounded(mm[2], float(tops[-1])))
+    pixels, notes = (shape[0], shape[1]), (*planned.notes, *_rounding_note(mm[2], float(tops[-1])))
     where = at, job.pixel, pixels, z, tops
     return Stack(planned.root, scale, *where, size, outer, notes, planned.drains, side=job.size)
 
@@ -230,7 +229,7 @@ def _tops(height: float, layer: float) -> np.ndarray:
     return layer * np.arange(1, count + 1)
 
 
-def _rounded(height: float, made: float) -> tuple[str, ...]:
+def _rounding_note(height: float, made: float) -> tuple[str, ...]:
     """A note if whole layers change the height in mm by more than a hundredth."""
     if abs(made - height) <= height / 100:
         return ()

@@ -35,27 +35,20 @@ def widths(solid: Runs, pixel: Pair) -> tuple[np.ndarray, np.ndarray]:
     lies at half coverage, so widths are accurate to one pixel. In large layers, widths above `WIDE` are
     accurate to one coarse pixel: time and memory follow the outline, not the area.
 
-    Parameters
-    ----------
-    solid : Runs
-        Solid pixels of a layer.
-    pixel : tuple of float
-        Width and height of a pixel, mm.
-
-    Returns
-    -------
-    walls, gaps : float64 [n, 2]
-        Widths in mm, and the number of pixels of the medial axis at each.
+    `solid`: solid pixels of a layer; `pixel`: width and height of a pixel, mm. Returns walls, gaps float64
+    [n, 2], widths in mm, and the number of pixels of the medial axis at each.
     """
     if not len(solid.begin):
         return np.empty((0, 2)), np.empty((0, 2))
     times = max(int(min(WIDE / COARSE / max(pixel), max(solid.height, solid.width) / LAYER)), 1)
     count = np.zeros((-(-solid.height // times), -(-solid.width // times)), np.int32)
     count_pixels(solid.rows, solid.begin, solid.end, times, count)
-    return _measured(solid, count, times, pixel, False), _measured(solid, count, times, pixel, True)
+    return _measure_widths(solid, count, times, pixel, False), _measure_widths(
+        solid, count, times, pixel, True
+    )
 
 
-def _measured(solid: Runs, count: np.ndarray, times: int, pixel: Pair, gaps: bool) -> np.ndarray:
+def _measure_widths(solid: Runs, count: np.ndarray, times: int, pixel: Pair, gaps: bool) -> np.ndarray:
     """Widths of walls or gaps. count: solid pixels in each coarse one, which is `times` pixels across."""
     coarse, narrow = (pixel[0] * times, pixel[1] * times), np.zeros(count.shape, np.bool_)
     if times > 1:
@@ -106,14 +99,8 @@ def _across(region: np.ndarray, pixel: Pair) -> tuple[np.ndarray, np.ndarray]:
 def count_pixels(rows, begin, end, times, count):  # type: ignore[no-untyped-def]
     """Count the pixels of runs in each coarse pixel.
 
-    Parameters
-    ----------
-    rows, begin, end
-        As of `Runs`.
-    times : int
-        Pixels along each side of a coarse pixel.
-    count : int32 [-(-height // times), -(-width // times)]
-        Receives the sums.
+    `times`: pixels along each side of a coarse pixel; `count`: int32 [-(-height // times), -(-width //
+    times)].
     """
     for y in range(len(rows) - 1):
         line = count[y // times]

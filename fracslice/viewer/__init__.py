@@ -1,6 +1,6 @@
 """Windows and pictures of meshes and scenes. No other package imports pyvista."""
 
-from .live_preview import previewed
+from .canvas import previewed
 from .picture import need_pyvista, picture
 from .screen import need_screen
 from .viewer import fly

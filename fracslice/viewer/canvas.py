@@ -5,11 +5,15 @@ It is VTK's own window: pyvista's installs an interactor style with keys and ges
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from importlib import import_module
 from typing import Any
 
 import numpy as np
+
+from ..rendering import Pass
+from .screen import need_screen
 
 COLOUR = (0.96, 0.96, 0.96)
 FONT = 15
@@ -19,14 +23,7 @@ FONT = 15
 class Canvas:
     """Window without an interactor style: it does what its handlers do, and nothing else.
 
-    Parameters
-    ----------
-    title : str
-        Title of the window.
-    size : tuple of int
-        Width and height, pixels.
-    help_text : str
-        Text at the lower edge.
+    `size` in pixels.
     """
 
     def __init__(self, title: str, size: tuple[int, int], help_text: str) -> None:
@@ -68,24 +65,13 @@ class Canvas:
         return max(width, 1), max(height, 1)
 
     def on(self, event: str, act: Callable[[], None]) -> None:
-        """Call a function at every event of a name.
-
-        Parameters
-        ----------
-        event : str
-            Name of a VTK event.
-        act : callable
-            Handler.
-        """
+        """Call a function at every event of a name."""
         self.interactor.AddObserver(event, lambda *_: act())
 
     def open(self, tick: int) -> None:
         """Show the window until `close`, with a timer event every `tick` milliseconds.
 
-        Parameters
-        ----------
-        tick : int
-            Interval, milliseconds.
+        `tick`: milliseconds.
         """
         self.interactor.Initialize()
         self.interactor.CreateRepeatingTimer(tick)
@@ -115,12 +101,7 @@ class Canvas:
     def draw(self, pixels: np.ndarray, text: str) -> None:
         """Draw a picture as large as the window allows without stretching it.
 
-        Parameters
-        ----------
-        pixels : ndarray of uint8, shape (height, width, 3)
-            sRGB.
-        text : str
-            Text at the upper edge.
+        `pixels`: uint8 (height, width, 3).
         """
         if self.hidden:
             return
@@ -158,3 +139,54 @@ def _text(over: bool) -> Any:
     place.SetCoordinateSystemToNormalizedViewport()
     place.SetValue(0.01, 0.985 if over else 0.015)
     return actor
+
+
+LARGEST = (1280, 800)
+"""Largest width and height of the window, pixels."""
+TICK = 0.02
+"""Interval between two looks at the events of the window, seconds."""
+
+
+def previewed(passes: Iterator[Pass], title: str, size: tuple[int, int]) -> Iterator[Pass]:
+    """Show every pass in a window until the last one, or until the window is closed.
+
+    Passes are made in another thread, so that the window can be moved and resized meanwhile.
+
+    Parameters
+    ----------
+    passes : iterator of Pass
+        The passes.
+    title : str
+        Title of the window.
+    size : tuple of int
+        Width and height of the picture, pixels.
+
+    Yields
+    ------
+    Pass
+        The same passes.
+
+    Raises
+    ------
+    RenderError
+        If pyvista or a screen is missing.
+    """
+    need_screen()
+    scale = min(1.0, *(most / n for most, n in zip(LARGEST, size, strict=True)))
+    canvas = Canvas(title, (max(int(scale * size[0]), 1), max(int(scale * size[1]), 1)), "")
+    canvas.show()
+    try:
+        with ThreadPoolExecutor(1) as pool:
+            while done := _await_pass(pool.submit(next, passes, None), canvas):
+                text = f"{done.samples:.1f} samples a pixel, error {done.error:.2g}"
+                canvas.draw(done.shown, text)
+                yield done
+    finally:
+        canvas.hide()
+
+
+def _await_pass(made: Future[Pass | None], canvas: Canvas) -> Pass | None:
+    """Result of a pass under way; events of the window are handled meanwhile."""
+    while not wait([made], TICK).done:
+        canvas.handle_events()
+    return made.result()

@@ -11,11 +11,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..common.extras import lacking
+from ..common.messages import lacking
 from ..errors import RenderError
 from ..export import replacing
-from ..formulas.parameters import Choice, Vector
-from ..formulas.records import validated
+from ..formulas.parameters import Choice, Vector, validate_value
 from ..mesh.model import Mesh
 from . import plotter
 
@@ -57,8 +56,8 @@ def picture(
     ExportError
         If the file cannot be written.
     """
-    size = validated("size", size, SIZE, RenderError)
-    validated("background", background, Choice("light", "", tuple(plotter.BACKGROUNDS)), RenderError)
+    size = validate_value("size", size, SIZE, RenderError)
+    validate_value("background", background, Choice("light", "", tuple(plotter.BACKGROUNDS)), RenderError)
     if not len(mesh.triangles):
         raise RenderError("the mesh has no triangles to draw")
     need_pyvista()

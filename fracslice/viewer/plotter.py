@@ -29,19 +29,7 @@ def body(
 ) -> Any:
     """Convert a mesh to a VTK surface, smooth except at sharp edges.
 
-    Parameters
-    ----------
-    vertices : ndarray of float64, shape (n, 3)
-        Vertices.
-    triangles : ndarray of int32, shape (m, 3)
-        Vertex indices.
-    colours : ndarray of uint8, shape (n, 3), optional
-        Colours of the vertices, sRGB.
-
-    Returns
-    -------
-    pyvista.PolyData
-        Surface with vertex normals.
+    `vertices`: float64 (n, 3); `triangles`: int32 (m, 3); `colours`: uint8 (n, 3).
     """
     import pyvista
 
@@ -56,24 +44,7 @@ def body(
 
 
 def set_lighting(plotter: Any, surface: Any, background: str, brightness: float = 1.0) -> Any:
-    """Add a mesh in its colours or in clay, under a key, a fill and a rim light, in a three-quarter view.
-
-    Parameters
-    ----------
-    plotter : pyvista.Plotter
-        The plotter.
-    surface : pyvista.PolyData
-        The mesh.
-    background : {"light", "dark"}
-        Background gradient.
-    brightness : float
-        Factor on the lights: 1 with ambient occlusion, which darkens the picture; less without.
-
-    Returns
-    -------
-    pyvista.Actor
-        Actor of the mesh.
-    """
+    """Add a mesh in its colours or in clay, under a key, a fill and a rim light, in a three-quarter view."""
     import pyvista
 
     below, above = BACKGROUNDS[background]
@@ -99,15 +70,7 @@ def set_lighting(plotter: Any, surface: Any, background: str, brightness: float 
 
 
 def look(plotter: Any, surface: Any) -> None:
-    """Set a three-quarter view from the front, slightly from above, that fills the picture.
-
-    Parameters
-    ----------
-    plotter : pyvista.Plotter
-        The plotter.
-    surface : pyvista.PolyData
-        The mesh.
-    """
+    """Set a three-quarter view from the front, slightly from above, that fills the picture."""
     plotter.view_vector(THREE_QUARTER, viewup=(0, 0, 1))
     camera = plotter.camera
     back = np.array(camera.position) - np.array(camera.focal_point)
@@ -126,16 +89,7 @@ def look(plotter: Any, surface: Any) -> None:
 def draw(source: str, target: str, width: int, height: int, background: str) -> None:
     """Draw a mesh to a PNG file.
 
-    Parameters
-    ----------
-    source : str
-        .npz file with `vertices`, `triangles` and, for a mesh that has them, `colours`.
-    target : str
-        PNG file, written.
-    width, height : int
-        Picture size, pixels.
-    background : {"light", "dark"}
-        Background gradient.
+    `width`, `height` in pixels.
     """
     import pyvista
 

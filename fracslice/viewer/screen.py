@@ -6,7 +6,7 @@ import ctypes
 import ctypes.util
 import sys
 
-from ..common.extras import lacking
+from ..common.messages import lacking
 from ..errors import RenderError
 
 
@@ -29,11 +29,6 @@ def has_screen() -> bool:
 
     On Linux, an X server must answer: VTK ends the process without one. Other systems always count as having
     a screen.
-
-    Returns
-    -------
-    bool
-        True if there is a screen.
     """
     if not sys.platform.startswith("linux"):
         return True

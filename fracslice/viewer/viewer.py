@@ -4,19 +4,99 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from itertools import count
 from pathlib import Path
 
 from ..errors import ExportError
 from ..export import replacing
-from ..rendering.live import Live
+from ..rendering.live import CameraInput, Live
 from ..scene.view import Camera
 from ..scene.writer import to_xml
 from ..work import Work
 from .canvas import Canvas
-from .controls import Controls
 from .screen import need_screen
+
+MOVES = {
+    "w": ("forward", 1.0),
+    "s": ("forward", -1.0),
+    "d": ("right", 1.0),
+    "a": ("right", -1.0),
+    "r": ("up", 1.0),
+    "f": ("up", -1.0),
+    "right": ("yaw", 1.0),
+    "left": ("yaw", -1.0),
+    "up": ("pitch", 1.0),
+    "down": ("pitch", -1.0),
+    "e": ("roll", 1.0),
+    "q": ("roll", -1.0),
+}
+"""Axis and direction of each key that moves or turns the camera while it is held."""
+PACES = {str(digit): 2.0 ** (digit - 5) for digit in range(1, 10)}
+"""Pace of each speed key: 5 is 1, and the next one is twice as fast."""
+SLOWEST = 2.0**-10
+"""Slowest pace; the fastest one is its inverse."""
+RELEASE = 0.05
+"""Delay, in seconds, after which a key release counts: key repeat sends releases and presses continuously."""
+
+
+@dataclass
+class Controls:
+    """Keys that are held, pace, and pointer."""
+
+    pace: float = 1.0  # speed, in distances to the surface per second
+    locked: bool = False  # true if the camera must not move
+    looking: bool = False  # true if the camera follows the pointer without a button
+    # pointer position up to which a drag or a look has been followed, pixels
+    grip: tuple[int, int] | None = None
+    _held: dict[str, float | None] = field(default_factory=dict)
+
+    def press(self, key: str) -> None:
+        """Hold a key of `MOVES`, or choose the pace of a key of `PACES`."""
+        self.pace = PACES.get(key, self.pace)
+        if key in MOVES:
+            self._held[key] = None
+
+    def hurry(self, factor: float) -> None:
+        """Multiply the pace, within `SLOWEST` and its inverse."""
+        self.pace = min(max(self.pace * factor, SLOWEST), 1 / SLOWEST)
+
+    def let_go(self) -> None:
+        """Release all keys at once."""
+        self._held.clear()
+
+    def release(self, key: str) -> None:
+        """Release a key once `RELEASE` seconds pass without a press."""
+        if key in self._held:
+            self._held[key] = time.monotonic()
+
+    @property
+    def input(self) -> CameraInput:
+        """Camera input of the keys that are held."""
+        late = time.monotonic() - RELEASE
+        self._held = {key: since for key, since in self._held.items() if since is None or since > late}
+        axes: dict[str, float] = {}
+        for key in () if self.locked else self._held:
+            axis, direction = MOVES[key]
+            axes[axis] = axes.get(axis, 0.0) + direction
+        return CameraInput(**axes, pace=self.pace)
+
+    def turn(self, to: tuple[int, int], degrees: float) -> tuple[float, float]:
+        """Follow the pointer.
+
+        While a button drags, the picture follows the pointer; while looking, the camera does.
+
+        `to`: pixels from the lower left; `degrees`: angle of a pixel, degrees. Returns yaw, pitch in
+        degrees.
+        """
+        if self.locked or self.grip is None:
+            self.grip = to if self.looking else None
+            return 0.0, 0.0
+        x, y = (b - a for a, b in zip(self.grip, to, strict=True))
+        self.grip = to
+        factor = degrees if self.looking else -degrees
+        return factor * x, factor * y
+
 
 FASTER = 1.25
 """Factor of the wheel on the pace."""
@@ -89,14 +169,7 @@ def fly(
 class Viewer:
     """Window of a live picture, with its controls.
 
-    Parameters
-    ----------
-    live : Live
-        The live picture.
-    size : tuple of int
-        Window width and height, pixels.
-    stopped : callable
-        Returns True when the window must close.
+    `size` in pixels.
     """
 
     def __init__(self, live: Live, size: tuple[int, int], stopped: Callable[[], bool]) -> None:
@@ -157,13 +230,7 @@ class Viewer:
         return "\n".join(filter(None, lines))
 
     def press(self, key: str) -> None:
-        """Handle a key press, including key repeat.
-
-        Parameters
-        ----------
-        key : str
-            Key symbol, lower case.
-        """
+        """Handle a key press, including key repeat."""
         self.controls.press(key)
         if act := self.actions.get(key):
             act()
@@ -175,10 +242,7 @@ class Viewer:
     def grasp(self, at: tuple[int, int] | None) -> None:
         """Begin or end a drag; mouse look ends by its key only.
 
-        Parameters
-        ----------
-        at : tuple of int or None
-            Pointer position, pixels; None ends the drag.
+        `at` in pixels.
         """
         if not self.controls.looking:
             self.controls.grip = at
@@ -186,10 +250,7 @@ class Viewer:
     def move(self, to: tuple[int, int]) -> None:
         """Follow the pointer; in mouse look, put it back to the middle before it leaves the window.
 
-        Parameters
-        ----------
-        to : tuple of int
-            Pointer position, pixels.
+        `to` in pixels.
         """
         size = self.canvas.size
         yaw, pitch = self.controls.turn(to, self.live.camera.fov / size[1])

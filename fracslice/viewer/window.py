@@ -41,10 +41,7 @@ def show(mesh: Mesh | str | Path) -> None:
 def caption(mesh: Mesh) -> str:
     """Return size and triangle count of a mesh as text.
 
-    Parameters
-    ----------
-    mesh : Mesh
-        The mesh, mm.
+    `mesh` in mm.
     """
     x, y, z = mesh.size
     return f"{x:.1f} x {y:.1f} x {z:.1f} mm, {len(mesh.triangles):,} triangles"
@@ -57,15 +54,7 @@ def _plotter(title: str) -> Any:
 
 
 class ViewerWindow:
-    """A pyvista window with its key bindings.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The mesh.
-    name : str
-        Start of the title.
-    """
+    """A pyvista window with its key bindings."""
 
     def __init__(self, mesh: Mesh, name: str) -> None:
         self.surface = body(mesh.vertices, mesh.triangles, mesh.colours)
@@ -81,15 +70,7 @@ class ViewerWindow:
         self.bind("v", self.reset)
 
     def bind(self, key: str, action: Callable[[], None]) -> None:
-        """Bind a key and remove pyvista's own bindings of it.
-
-        Parameters
-        ----------
-        key : str
-            Key symbol.
-        action : callable
-            Called on a press.
-        """
+        """Bind a key and remove pyvista's own bindings of it."""
         self.plotter.clear_events_for_key(key, raise_on_missing=False)
         self.plotter.add_key_event(key, action)
 
@@ -103,15 +84,7 @@ class ViewerWindow:
         self.plotter.render()
 
     def cut(self, normal: tuple[float, float, float], origin: tuple[float, float, float]) -> None:
-        """Clip the mesh at a plane, on the GPU, so that large models stay interactive.
-
-        Parameters
-        ----------
-        normal : tuple of float
-            Normal of the plane.
-        origin : tuple of float
-            Point of the plane.
-        """
+        """Clip the mesh at a plane, on the GPU, so that large models stay interactive."""
         from vtkmodules.vtkCommonDataModel import vtkPlane
 
         plane = vtkPlane()

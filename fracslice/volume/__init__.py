@@ -12,7 +12,7 @@ from ..errors import VolumeError
 from ..formulas.box import Box, Triple
 from ..formulas.registry import Node
 from ..kernel import Field
-from ..kernel.depth import advised, depth_notes, resolve_depths, visible
+from ..kernel.depth import depth_notes, resolve_depths, visible, with_depth_advice
 from ..meshjob import RESOLUTION
 from ..work import Work
 from .extent import Extent, extent, reached
@@ -20,8 +20,7 @@ from .lattice import Lattice
 
 if TYPE_CHECKING:
     from .bricks import Bricks, SignBricks
-    from .sampler import sample, sample_signs
-    from .scene_samples import sample_scene, sample_scene_signs
+    from .sampler import sample, sample_scene, sample_scene_signs, sample_signs
 
 __all__ = [
     "Bricks",
@@ -45,8 +44,8 @@ _SAMPLING = {
     "Bricks": "bricks",
     "SignBricks": "bricks",
     "sample": "sampler",
-    "sample_scene": "scene_samples",
-    "sample_scene_signs": "scene_samples",
+    "sample_scene": "sampler",
+    "sample_scene_signs": "sampler",
     "sample_signs": "sampler",
 }
 """Modules of what samples, by name: layers and pictures need a plan alone."""
@@ -153,7 +152,7 @@ def plan(root: Field, resolution: float, work: Work | None = None) -> Plan:
     """
     tree = root.tree
     known = with_depths(tree, work) if tree else None
-    with advised(known or root.tree, max(root.bounds.box.size) / resolution):
+    with with_depth_advice(known or root.tree, max(root.bounds.box.size) / resolution):
         extents = extent(known or root, work)
     voxel = max(extents.box.size) / resolution
     planned = Plan(known or root, extents.box, extents.outer, extents.tips, voxel)

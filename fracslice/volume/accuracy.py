@@ -37,28 +37,7 @@ def surface_points(root: Field, box: Box, voxel: float, count: int, work: Work |
     starting points are outside. A part of the surface is reached from the starting points closest to it, so
     thin wires are found too.
 
-    Parameters
-    ----------
-    root
-        Field.
-    box
-        Box of the starting points, scene units.
-    voxel
-        Voxel size, scene units.
-    count
-        Largest number of points.
-    work
-        Execution settings.
-
-    Returns
-    -------
-    ndarray
-        Points, float64 [n, 3], scene units; n <= `count`.
-
-    Raises
-    ------
-    Cancelled
-        If the job was cancelled.
+    `box`, `voxel` in scene units. Returns float64 [n, 3], scene units.
     """
     kernel, work = root.kernel("cpu", "float64"), work or Work()
     rng = np.random.default_rng(0)
@@ -93,29 +72,8 @@ def surface_error(
     Where two solids touch in an edge the axes lie in the surface: where they are flat, the steepest of all
     directions counts, diagonals included.
 
-    Parameters
-    ----------
-    root
-        Field.
-    points
-        Placed points, float [n, 3].
-    voxel
-        Voxel size, scene units.
-    work
-        Execution settings.
-    scale, offset
-        Placement of the points: scale * p + offset for a point p in scene units.
-
-    Returns
-    -------
-    ndarray
-        Distances, float64 [n], scene units, limited to one voxel; where the gradient vanishes the estimate
-        says no more.
-
-    Raises
-    ------
-    Cancelled
-        If the job was cancelled.
+    `points`: float [n, 3]; `voxel` in scene units; `scale`, `offset`: placement of the points: scale * p +
+    offset for a point p in scene units. Returns float64 [n], scene units, limited to one voxel.
     """
     work, step = work or Work(), REACH * voxel
     points, error = np.asarray(points, np.float64), np.empty(len(points))

@@ -11,10 +11,10 @@ from ..formulas import Box, Node
 from ..formulas.algebra import length
 from ..formulas.field import Bounds
 from ..kernel import Field, Kernel
-from ..kernel.cells import possible_cells
+from ..kernel.boxes import possible_cells
 from ..meshjob import DUST
 from ..work import Work, chunks
-from .evaluation import values_at
+from .lattice import values_at
 
 POINTS = 1 << 18
 """Random points in all boxes."""
@@ -57,35 +57,17 @@ there.
 
 @dataclass(frozen=True, eq=False)
 class VolumeEstimate:
-    """Monte Carlo estimate of an object's volume.
+    """Monte Carlo estimate of an object's volume."""
 
-    Attributes
-    ----------
-    volume
-        Volume, scene units^3.
-    error
-        Standard error of the volume, scene units^3.
-    inside
-        Random points inside the object, float64 [3, n], scene units, in cells that are not proven full.
-    """
-
-    volume: float
-    error: float
+    volume: float  # volume, scene units^3
+    error: float  # standard error of the volume, scene units^3
+    # random points inside the object, float64 [3, n], scene units, in cells that are not proven full
     inside: np.ndarray
 
     def off(self, made: float) -> float:
         """Return the relative error of a reproduced volume.
 
-        Parameters
-        ----------
-        made
-            Volume of the mesh or layers, scene units^3.
-
-        Returns
-        -------
-        float
-            Excess as a fraction of the volume, negative if volume is missing; 0 if within the tolerance or
-            not significant.
+        `made`: scene units^3.
         """
         sure = abs(made - self.volume) > max(SURE * self.error, TOLERANCE * self.volume)
         return made / self.volume - 1 if sure and self.volume else 0.0
@@ -101,24 +83,7 @@ def amount(root: Field, boxes: list[Box], work: Work | None = None) -> VolumeEst
     Cells that are proven empty are skipped. Cells that are proven full are counted whole, where the field
     bounds distances inside too (Cochran 1977, "Sampling Techniques", chapter 5).
 
-    Parameters
-    ----------
-    root
-        Field.
-    boxes
-        Disjoint boxes, scene units.
-    work
-        Execution settings.
-
-    Returns
-    -------
-    VolumeEstimate
-        Volume, standard error and interior points.
-
-    Raises
-    ------
-    Cancelled
-        If the job was cancelled.
+    `boxes` in scene units.
     """
     work, conservative = work or Work(), root.conservative()
     kernel, bound = root.kernel(), conservative.kernel()
@@ -172,23 +137,7 @@ def finer(
     all outside. If that fraction is small, the error comes from faceting and is proportional to the square of
     the spacing.
 
-    Parameters
-    ----------
-    root
-        Field.
-    estimate
-        Volume estimate of the object.
-    off
-        Relative volume error of the samples.
-    origin, spacing
-        First grid point of the samples and their spacing along each axis, scene units.
-    work
-        Execution settings.
-
-    Returns
-    -------
-    int
-        Factor from `FINER`; None if none suffices.
+    `origin`, `spacing` in scene units.
     """
     points = estimate.some()
 
@@ -211,18 +160,7 @@ def lost_share(
 ) -> float:
     """Return the fraction of interior points whose eight surrounding samples are all outside.
 
-    Parameters
-    ----------
-    root
-        Field.
-    points
-        Interior points, float64 [3, n], scene units.
-    origin, spacing
-        As for `finer`.
-    times
-        Refinement of the samples.
-    work
-        Execution settings.
+    `points`: float64 [3, n], scene units.
     """
     step = np.array(spacing)[:, None, None] / times
     start = np.array(origin)[:, None, None]
@@ -241,22 +179,7 @@ def scattered(
 ) -> list[tuple[Node, np.ndarray, float]]:
     """Find the elements of a scene of several that samples miss: at most of their points.
 
-    Parameters
-    ----------
-    root
-        Field.
-    estimate
-        Volume estimate of the object.
-    origin, spacing
-        As for `finer`.
-    work
-        Execution settings.
-
-    Returns
-    -------
-    list of tuple
-        Each such element larger than dust, interior points of it, float64 [3, n], scene units, and the
-        fraction of them that samples miss.
+    Returns float64 [3, n], scene units.
     """
     found = []
     for part in parts(root.tree) if root.tree else ():

@@ -24,11 +24,9 @@ from ..errors import EmptyError, VolumeError
 from ..kernel import Kernel
 from ..work import chunks
 from .bricks import SignBricks
-from .crossed import crossed
-from .faces import FACES, SignFaces
 from .lattice import BRICK, Lattice
 from .pruning import Pruning
-from .states import BORDER, CANDIDATE, EMPTY, FULL, QUEUED, States, distinct
+from .states import BORDER, CANDIDATE, EMPTY, FACES, FULL, QUEUED, SignFaces, States, crossed_bricks, distinct
 
 Evaluate = Callable[[np.ndarray], np.ndarray]
 """Sign bits of bricks, uint8 [n, 64], from their corners, int32 [n, 3]; see `brick_signs`."""
@@ -54,21 +52,7 @@ FAR_AUDITS = 1 << 15
 def brick_signs(kernel: Kernel, corners: np.ndarray, lattice: Lattice, values: np.ndarray) -> np.ndarray:
     """Sample some bricks.
 
-    Parameters
-    ----------
-    kernel
-        Float32 kernel.
-    corners
-        Grid indices of their first samples, int32 [n, 3].
-    lattice
-        Sampling grid.
-    values
-        Output: the samples, float32 [n, 512]; NaN where the field is.
-
-    Returns
-    -------
-    ndarray
-        Sign bits, uint8 [n, 64], set inside.
+    `corners`: int32 [n, 3]; `values`: float32 [n, 512]. Returns sign bits, uint8 [n, 64].
     """
     from .._native import signs
 
@@ -79,30 +63,16 @@ def brick_signs(kernel: Kernel, corners: np.ndarray, lattice: Lattice, values: n
 
 @dataclass
 class Exploration:
-    """State of one sampling.
+    """State of one sampling."""
 
-    Attributes
-    ----------
-    pruning
-        Evaluations that discard cells.
-    keep
-        Receives the samples of each set of bricks, float32 [n, 512]; None: only signs are kept.
-    evaluate
-        Evaluates large sets of bricks instead of the threads of the work.
-    repaired, audited
-        As in `SignBricks`.
-    left
-        Candidates that are not sampled.
-    numbers, bits
-        Flat indices and sign bits of the sampled bricks.
-    """
-
-    pruning: Pruning
+    pruning: Pruning  # evaluations that discard cells
+    # receives the samples of each set of bricks, float32 [n, 512]; None: only signs are kept
     keep: Callable[[np.ndarray], None] | None
-    evaluate: Evaluate | None = None
-    repaired: int = 0
+    evaluate: Evaluate | None = None  # evaluates large sets of bricks instead of the threads of the work
+    repaired: int = 0  # as in `SignBricks`
     audited: int = 0
-    left: int = 0
+    left: int = 0  # candidates that are not sampled
+    # flat indices and sign bits of the sampled bricks
     numbers: list[np.ndarray] = field(default_factory=list)
     bits: list[np.ndarray] = field(default_factory=list)
 
@@ -111,22 +81,7 @@ class Exploration:
         self.lattice, self.work = self.pruning.lattice, self.pruning.work
 
     def signs(self) -> tuple[SignBricks, np.ndarray]:
-        """Sample.
-
-        Returns
-        -------
-        SignBricks
-            Bricks that the surface needs.
-        ndarray
-            Their rows among all sampled bricks.
-
-        Raises
-        ------
-        VolumeError
-            If there is no surface or it leaves the lattice.
-        Cancelled
-            If the job was cancelled.
-        """
+        """Sample."""
         states, outside = self.pruning.probe()
         front = self.seeds(states, outside)
         for turn in range(AUDITS):
@@ -241,7 +196,7 @@ class Exploration:
         """Bricks touched by an edge with a sign change, in order, and their rows."""
         numbers = np.concatenate([np.empty(0, np.intp), *self.numbers])
         signs = np.concatenate([np.empty((0, 8, 8), np.uint8), *self.bits])
-        order, index = crossed(states, numbers, signs, self.work)
+        order, index = crossed_bricks(states, numbers, signs, self.work)
         if not len(order):
             raise EmptyError(
                 "there is no surface: the scene is empty, or all of it is thinner than a voxel of "

@@ -1,4 +1,4 @@
-"""Bounds of an object: six proven sides, and the outermost points found."""
+"""Bounds of an object: six proved sides, and the outermost points found by pattern search."""
 
 from __future__ import annotations
 
@@ -8,14 +8,33 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._native import Sides
+from .._native import climb as climbed
 from ..errors import EmptyError, VolumeError
 from ..formulas import Node
 from ..formulas.box import Box
-from ..kernel import Field
-from ..kernel.cells import possible_cells
+from ..kernel import Field, Kernel
+from ..kernel.boxes import possible_cells
 from ..work import Work
-from .climbing import SLANTS, climb
-from .evaluation import values_at
+from .lattice import values_at
+
+SLANTS = np.stack(np.meshgrid((-1, 0, 1), (-1, 0, 1), 0.1 ** np.arange(0, 3.5, 0.5))).reshape(3, -1)
+"""Steps straight along the last axis or slanted, [3, w]."""
+
+
+def climb(
+    kernel: Kernel, starts: np.ndarray, steps: np.ndarray, first: float, exact: float, work: Work
+) -> np.ndarray:
+    """Move interior points outwards as far as possible.
+
+    Pattern search (Hooke and Jeeves 1961): a step is taken if it ends inside; if none does, the step length
+    is halved.
+
+    `starts`: float64 [3, n, k]; `steps`: [3, n, w]. Returns float64 [3, n, k].
+    """
+    work.check()
+    starts, steps = np.ascontiguousarray(starts), np.ascontiguousarray(steps)
+    return climbed(kernel.entry, starts, steps, SLANTS[2], first, exact, work.threads)
+
 
 TURNS = 8
 """Attempts to enlarge the searched box because the object leaves it, or to shrink it."""
@@ -187,15 +206,7 @@ def _endless(node: Node) -> Node:
 
 
 class _Search:
-    """Search for the sides of a field's object.
-
-    Parameters
-    ----------
-    root
-        Field.
-    work
-        Execution settings.
-    """
+    """Search for the sides of a field's object."""
 
     def __init__(self, root: Field, work: Work) -> None:
         conservative = root.conservative()

@@ -22,21 +22,6 @@ def to_grid(bricks: Bricks) -> Grid:
     """Convert bricks to an OpenVDB level set: sampled voxels are active, the interior is filled with tiles.
 
     The background value is the largest sample.
-
-    Parameters
-    ----------
-    bricks
-        Samples around a surface.
-
-    Returns
-    -------
-    Grid
-        OpenVDB grid named `NAME`.
-
-    Raises
-    ------
-    VolumeError
-        If the arrays contradict each other.
     """
     from .._vdb import Grid
 
@@ -50,23 +35,7 @@ def to_grid(bricks: Bricks) -> Grid:
 
 
 def from_grid(grid: Grid) -> Bricks:
-    """Convert an OpenVDB grid to bricks, one per leaf node.
-
-    Parameters
-    ----------
-    grid
-        OpenVDB grid of floats.
-
-    Returns
-    -------
-    Bricks
-        Samples around the surface.
-
-    Raises
-    ------
-    VolumeError
-        If the voxels are not axis-aligned cubes, or a sample is NaN.
-    """
+    """Convert an OpenVDB grid to bricks, one per leaf node."""
     try:
         origin, voxel, ijk, values, index = grid.to_bricks()
     except ValueError as error:
@@ -80,22 +49,7 @@ def from_grid(grid: Grid) -> Bricks:
 def write_vdb(
     bricks: Bricks, path: str | os.PathLike[str], metadata: Mapping[str, str] | None = None
 ) -> None:
-    """Write bricks to a .vdb file with one grid named `NAME`.
-
-    Parameters
-    ----------
-    bricks
-        Samples around a surface.
-    path
-        File to write.
-    metadata
-        Text stored in the file.
-
-    Raises
-    ------
-    VolumeError
-        If the file could not be written completely.
-    """
+    """Write bricks to a .vdb file with one grid named `NAME`."""
     grid = to_grid(bricks)
     try:
         grid.write(os.fspath(path), dict(metadata or {}))
@@ -104,25 +58,7 @@ def write_vdb(
 
 
 def read_vdb(path: str | os.PathLike[str], name: str = "") -> Bricks:
-    """Read bricks from a .vdb file.
-
-    Parameters
-    ----------
-    path
-        File to read.
-    name
-        Name of a float grid; default: the first one.
-
-    Returns
-    -------
-    Bricks
-        Samples around the surface.
-
-    Raises
-    ------
-    VolumeError
-        If the file or the grid cannot be read.
-    """
+    """Read bricks from a .vdb file."""
     from .._vdb import Grid
 
     try:

@@ -1,14 +1,18 @@
-"""Sampling grid of a scene."""
+"""Sampling grid of a scene, and parallel evaluation of a field."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
-from ..common.digits import significant
+import numpy as np
+
 from ..common.memory import available_bytes
+from ..common.messages import significant
 from ..errors import GridError, TooLargeError, VolumeError
 from ..formulas.box import Box, Triple
+from ..kernel import Kernel
+from ..work import Work, chunks
 
 BRICK = 8
 """Grid points along the side of a brick."""
@@ -110,3 +114,17 @@ def _aside(half: float) -> float:
 
 def _shape(counts: list[int]) -> str:
     return " x ".join(str(c) for c in counts)
+
+
+def values_at(kernel: Kernel, points: np.ndarray, work: Work) -> np.ndarray:
+    """Evaluate a field at many points on all threads.
+
+    `points`: [3, n], scene units. Returns [n].
+    """
+    f = np.empty(points.shape[1], kernel.dtype)
+
+    def task(part: slice) -> None:
+        f[part] = kernel.points(*points[:, part])
+
+    work.map(task, chunks(len(f), kernel.batch // 8))
+    return f

@@ -33,49 +33,24 @@ LOOKED_AT = 1 << 12
 
 @dataclass(frozen=True)
 class Proofs:
-    """Proofs of cells by enclosures.
+    """Proofs of cells by enclosures."""
 
-    Attributes
-    ----------
-    cells
-        Proofs; None: there are none.
-    only
-        True if a measured bound discards nothing.
-    """
-
-    cells: Cells | None
-    only: bool = False
+    cells: Cells | None  # proofs; None: there are none
+    only: bool = False  # true if a measured bound discards nothing
 
 
 @dataclass
 class Pruning:
-    """Evaluations that discard cells.
+    """Evaluations that discard cells."""
 
-    Attributes
-    ----------
-    kernel
-        Kernel of the scene.
-    conservative
-        Kernel to prune by.
-    bounds
-        Bounds of the field to prune by.
-    lattice
-        Sampling grid.
-    work
-        Execution settings.
-    proofs
-        Proofs of the cells that a proved bound does not discard; None: none are tried.
-    evaluations
-        Points evaluated.
-    """
-
-    kernel: Kernel
-    conservative: Kernel
-    bounds: Bounds
-    lattice: Lattice
-    work: Work
+    kernel: Kernel  # kernel of the scene
+    conservative: Kernel  # kernel to prune by
+    bounds: Bounds  # bounds of the field to prune by
+    lattice: Lattice  # sampling grid
+    work: Work  # execution settings
+    # proofs of the cells that a proved bound does not discard; None: none are tried
     proofs: Proofs | None = None
-    evaluations: int = 0
+    evaluations: int = 0  # points evaluated
 
     @property
     def everywhere(self) -> bool:
@@ -116,12 +91,7 @@ class Pruning:
     def probe(self) -> tuple[States, np.ndarray]:
         """Discard cells from the coarsest level down.
 
-        Returns
-        -------
-        States
-            State of every brick.
-        ndarray
-            For each candidate, in order, whether its centre is outside, bool [n].
+        Returns bool [n].
         """
         size = COARSEST
         grid = np.full([-(-n // size) for n in self.lattice.bricks], CANDIDATE, np.uint8)
@@ -207,19 +177,7 @@ class Pruning:
     def inside(self, states: States, bricks: np.ndarray, offsets: np.ndarray) -> np.ndarray:
         """Test whether grid points are inside.
 
-        Parameters
-        ----------
-        states
-            States of all bricks.
-        bricks
-            Flat indices of their bricks, int [n].
-        offsets
-            Positions in their bricks, int [3, n].
-
-        Returns
-        -------
-        ndarray
-            Mask, bool [n].
+        `bricks`: int [n]; `offsets`: int [3, n]. Returns bool [n].
         """
         result = np.empty(len(bricks), bool)
 
@@ -234,17 +192,7 @@ class Pruning:
     def emptied(self, states: States, bricks: np.ndarray) -> np.ndarray:
         """Prove bricks empty by their eight subcells: few evaluations to save 512.
 
-        Parameters
-        ----------
-        states
-            States of all bricks.
-        bricks
-            Flat indices of bricks, int [n].
-
-        Returns
-        -------
-        ndarray
-            Mask of the empty ones, bool [n].
+        `bricks`: int [n]. Returns bool [n].
         """
         size, result = BRICK // 2, np.empty(len(bricks), bool)
         middle = np.indices((2, 2, 2)).reshape(3, 8, 1) * size + (size - 1) / 2

@@ -16,8 +16,8 @@ from ..formulas.transforms import affine
 from ..kernel import Field
 from ..scene import Scene
 from ..work import Work
-from . import with_depths
-from .extent import extent
+from . import Plan, with_depths
+from .extent import extent, reached
 
 SAME: Triple = (1.0, 1.0, 1.0)
 UP: Triple = (0.0, 0.0, 1.0)
@@ -25,21 +25,11 @@ UP: Triple = (0.0, 0.0, 1.0)
 
 @dataclass(frozen=True)
 class Sizing:
-    """Size of an object.
+    """Size of an object."""
 
-    Attributes
-    ----------
-    side : float
-        Longest side before compensation, mm; approximate if `unit` is given.
-    unit : float or None
-        mm per scene unit before compensation; None if `side` determines it.
-    factors : tuple of float
-        Compensation of shrinkage along x, y and z of the print.
-    """
-
-    side: float
-    unit: float | None = None
-    factors: Triple = SAME
+    side: float  # longest side before compensation, mm; approximate if `unit` is given
+    unit: float | None = None  # mm per scene unit before compensation; None if `side` determines it
+    factors: Triple = SAME  # compensation of shrinkage along x, y and z of the print
 
     @property
     def longest(self) -> float:
@@ -55,15 +45,7 @@ class Sizing:
     def scale(self, box: Box) -> float:
         """Scale of the stretched field.
 
-        Parameters
-        ----------
-        box : Box
-            Bounds of the stretched object, scene units.
-
-        Returns
-        -------
-        float
-            mm per scene unit.
+        `box` in scene units. Returns mm per scene unit.
         """
         most = max(self.factors)
         if self.unit is not None:
@@ -76,23 +58,7 @@ def sizing(
 ) -> Sizing:
     """Size of the object of a scene. A scene with a unit is measured.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    size_mm : float, optional
-        Longest side, mm; by default the size or unit of the scene.
-    factors : tuple of float, optional
-        Compensation of shrinkage along x, y and z.
-    work : Work, optional
-        Threads and cancellation.
-
-    Raises
-    ------
-    VolumeError
-        If the scene is empty or unbounded.
-    Cancelled
-        When the work is cancelled.
+    `size_mm` in mm.
     """
     side, unit = size_mm or scene.size_mm, None if size_mm else scene.unit_mm
     if side is None or unit is not None:
@@ -101,29 +67,10 @@ def sizing(
     return Sizing(side, unit, factors)
 
 
-def oriented(root: Field, up: Triple, stretch: Triple = SAME, work: Work | None = None) -> Field:
+def orient_field(root: Field, up: Triple, stretch: Triple = SAME, work: Work | None = None) -> Field:
     """Rotate a field by the shortest way so that a direction points along z, then stretch it.
 
-    Parameters
-    ----------
-    root : Field
-        The field.
-    up : tuple of float
-        Direction.
-    stretch : tuple of float, optional
-        Factors along x, y and z.
-    work : Work, optional
-        Threads and cancellation.
-
-    Returns
-    -------
-    Field
-        The changed field, with the depths of the unchanged one; `root` itself if nothing changes.
-
-    Raises
-    ------
-    SliceError
-        If a field without a scene tree must be changed.
+    `up`: direction.
     """
     turn = _turn(up)
     if turn[3] == 0 and stretch == SAME:
@@ -137,19 +84,9 @@ def oriented(root: Field, up: Triple, stretch: Triple = SAME, work: Work | None 
 
 
 def orientation(up: Triple, factors: Triple = SAME) -> NDArray[np.float64]:
-    """Linear map of `oriented`, for points.
+    """Linear map of `orient_field`, for points.
 
-    Parameters
-    ----------
-    up : tuple of float
-        Direction.
-    factors : tuple of float, optional
-        Factors along x, y and z after the rotation.
-
-    Returns
-    -------
-    ndarray of float64, shape (3, 3)
-        Matrix by which rows of points are multiplied on the right.
+    `up`: direction. Returns float64 (3, 3).
     """
     linear, _ = affine(transform(sphere(), rotate=_turn(up)))
     matrix: NDArray[np.float64] = (linear * np.array(factors)[:, None]).T
@@ -163,3 +100,17 @@ def _turn(up: Triple) -> tuple[float, float, float, float]:
     angle = math.degrees(math.atan2(length(axis), float(direction[2])))
     x, y, z = axis.tolist() if length(axis) > 0 else (1.0, 0.0, 0.0)
     return x, y, z, angle
+
+
+def box_of_the_rest(planned: Plan, whole: np.ndarray, rest: np.ndarray, tips: np.ndarray, work: Work) -> Box:
+    """Return the bounds of the remaining components, from the field: a mesh does not contain all tips.
+
+    `planned`: bounds and voxel size; `whole`, `rest`: [2, 3], scene units; `tips`: [n, 3], scene units.
+    Returns `Box` in scene units.
+    """
+    if (rest == whole).all():
+        return planned.box
+    result = reached(planned.root, tips.T, planned.voxel, work)
+    own = np.array([planned.box.lo, planned.box.hi])
+    lo, hi = np.where(rest == whole, own, [result.lo, result.hi]).tolist()
+    return Box((lo[0], lo[1], lo[2]), (hi[0], hi[1], hi[2]))

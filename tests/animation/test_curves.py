@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fracslice.animation.motion_curves import CURVES, eased
+from fracslice.animation.timeline import CURVES, ease_time
 
 TIMES = np.array([0.0, 1.0, 1.5, 4.0])
 FINE = np.linspace(0, 4, 2001)
@@ -70,9 +70,9 @@ def test_a_zoom_turns_and_approaches_by_the_logarithm() -> None:
 @pytest.mark.parametrize("times", [(0.0, 4.0), (0.0, 1.0, 1.5, 4.0)])
 def test_easing_rests_at_its_ends_and_keeps_the_keyframes(ease: str, times: tuple[float, ...]) -> None:
     for time in times:
-        assert eased(times, ease, time) == time
-    assert (eased(times, ease, -1), eased(times, ease, 9)) == (0, 4)
-    values = np.array([eased(times, ease, time) for time in FINE])
+        assert ease_time(times, ease, time) == time
+    assert (ease_time(times, ease, -1), ease_time(times, ease, 9)) == (0, 4)
+    values = np.array([ease_time(times, ease, time) for time in FINE])
     pace = np.diff(values) / np.diff(FINE)
     assert (pace >= 0).all() and abs(np.diff(pace)).max() < 0.02, "no jump of the pace"
     assert (pace[0] < 0.01) == (ease in ("in", "both")) and (pace[-1] < 0.01) == (ease in ("out", "both"))

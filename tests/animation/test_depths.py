@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from fracslice.animation import FilmJob, Timeline
-from fracslice.animation.depths import gradual_depths
+from fracslice.animation.film import gradual_depths
 from fracslice.formulas import mandelbulb
 from fracslice.rendering import Renderer, develop
-from fracslice.scene.camera import Camera
 from fracslice.scene.reader import reads
+from fracslice.scene.view import Camera
 from fracslice.work import Work
 
 SIZE, COUNT = (48, 32), 8

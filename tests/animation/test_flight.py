@@ -10,13 +10,12 @@ import pytest
 from fracslice.cli.main import run
 
 from fracslice import read
-from fracslice.animation import Timeline, flown
+from fracslice.animation import Timeline, with_flight
 from fracslice.animation.flight import flight
 from fracslice.errors import SceneError
 from fracslice.formulas import mandelbulb, sphere
 from fracslice.scene import scene
-from fracslice.scene.camera import Camera
-from fracslice.scene.view import View
+from fracslice.scene.view import Camera, View
 
 LEAST = 0.05
 
@@ -34,7 +33,7 @@ def test_a_path_keeps_its_clearance_and_stays_near_the_surface() -> None:
 
 def test_every_frame_of_a_flight_keeps_the_clearance() -> None:
     view = View(camera=Camera(eye=(0.0, -2.2, 0.6)))
-    made = flown(replace(scene(mandelbulb(iterations=5), size="20mm"), view=view), 6.0, (32, 18))
+    made = with_flight(replace(scene(mandelbulb(iterations=5), size="20mm"), view=view), 6.0, (32, 18))
     known, timeline = made.root, Timeline(made)
     least = made.animation.clearance
     eyes = np.array([timeline.at(time).view.camera.eye for time in np.linspace(0.0, 6.0, 49)])

@@ -13,9 +13,9 @@ import fracslice
 from fracslice import capsule, formulas, sphere, torus
 from fracslice.errors import SceneError
 from fracslice.formulas import get, names
+from fracslice.formulas.node import python_name
 from fracslice.formulas.parameters import REQUIRED
-from fracslice.formulas.signatures import python_name
-from fracslice.scene.stubs import package_stub, stub
+from fracslice.scene.manual import package_stub, stub
 
 SHIPPED = [name for name in names() if get(name).function.__module__.startswith("fracslice.")]
 

@@ -11,10 +11,9 @@ import pytest
 from fracslice.cli.main import run
 
 from fracslice.bench import measurements
-from fracslice.bench.measure import errors, spread
-from fracslice.bench.measurements import BenchmarkTask, measure
-from fracslice.bench.peers import Peer
-from fracslice.bench.workloads import WORKLOADS
+from fracslice.bench.measure import errors, surface_points
+from fracslice.bench.measurements import BenchmarkTask, Peer, measure
+from fracslice.bench.methods import WORKLOADS
 from fracslice.cluster import ResultFolder, Shard
 from fracslice.errors import BenchError, Cancelled, SharedError
 from fracslice.export import write
@@ -36,7 +35,7 @@ def peer(tmp_path: Path) -> str:
 
 def test_memory_of_a_peer_is_not_that_of_this_process() -> None:
     held = b"x" * (300 << 20)
-    used = measurements._run([sys.executable, "-c", "import time; time.sleep(0.2)"], "", Work(1))[1]
+    used = measurements._run_command([sys.executable, "-c", "import time; time.sleep(0.2)"], "", Work(1))[1]
     assert held and used["peak_mb"] < 100
 
 
@@ -47,7 +46,7 @@ def test_errors_are_those_of_the_mesh():
 
 
 def test_samples_lie_evenly_on_the_mesh():
-    points = spread(shapes.cube(2, (-1, -1, -1)), 6000)
+    points = surface_points(shapes.cube(2, (-1, -1, -1)), 6000)
     assert np.abs(points).max(axis=1) == pytest.approx(1)
     counts = [(points[:, k] == side).sum() for k in range(3) for side in (-1, 1)]
     assert min(counts) > 800

@@ -6,8 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from fracslice.cli.closing import Closing, duration
 from fracslice.cli.main import run
+from fracslice.cli.summary import Closing, duration
 
 SHELL = """<scene version="1"><solid unit="1mm"><difference>
 <box size="20 20 20"/><sphere radius="6"/></difference></solid></scene>"""

@@ -17,8 +17,8 @@ import click
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from fracslice.cli.cluster import ClusterOptions
 from fracslice.cli.main import NAMES, commands, run
+from fracslice.cli.options import ClusterOptions
 
 from fracslice.scene import library
 from fracslice.volume.grid import read_vdb
@@ -312,7 +312,7 @@ def test_a_signal_while_workers_end_does_not_stop_what_is_done(tmp_path, monkeyp
         yield SimpleNamespace(pieces=SimpleNamespace(tidy=lambda: None))
         os.kill(os.getpid(), signal.SIGINT)
 
-    monkeypatch.setattr("fracslice.cluster.connected", connected)
+    monkeypatch.setattr("fracslice.cluster.connect", connected)
     given = {"output": str(tmp_path / "a.stl"), "cluster": "local:1", "shard": None, "store": None}
     with ClusterOptions(**given, threads=1, quiet=True).working() as work:
         assert work.cluster is not None

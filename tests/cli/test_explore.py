@@ -21,7 +21,7 @@ from fracslice.formulas import (
     union,
 )
 from fracslice.scene import Scene, read
-from fracslice.scene.variation import varied
+from fracslice.scene.overrides import varied
 
 SOURCE = '<scene version="1"><solid size="40mm"><superquadric exponent="3"/></solid></scene>'
 

@@ -11,7 +11,7 @@ from xml.etree import ElementTree as Tree
 import numpy as np
 import pytest
 import trimesh
-from fracslice.cli.check import placed
+from fracslice.cli.check import place
 from fracslice.cli.main import run
 from PIL import Image
 
@@ -152,8 +152,8 @@ def test_a_page_holds_figures_problems_pictures_and_the_cross_section(
 def test_a_model_is_turned_and_scaled_before_it_is_examined() -> None:
     part = box((10, 20, 5))
     model = Mesh(np.asarray(part.vertices, np.float64), np.asarray(part.faces, np.int32))
-    assert placed(model, (1.0, 0.0, 0.0), (1.02, 1.0, 1.1)).size.tolist() == pytest.approx([5.1, 20, 11])
-    assert placed(model, (0.0, 0.0, 1.0), (1.0, 1.0, 1.0)) is model
+    assert place(model, (1.0, 0.0, 0.0), (1.02, 1.0, 1.1)).size.tolist() == pytest.approx([5.1, 20, 11])
+    assert place(model, (0.0, 0.0, 1.0), (1.0, 1.0, 1.0)) is model
 
 
 def test_a_model_smaller_than_a_layer_is_in_another_unit(

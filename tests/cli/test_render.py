@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from fracslice.cli.main import run
-from fracslice.cli.render import reached
+from fracslice.cli.render import describe_pass
 from PIL import Image
 
 from fracslice.rendering import Pass, Renderer, bands, cpu
@@ -266,5 +266,8 @@ def test_noise_is_removed_from_a_picture_of_light(
 
 
 def test_the_error_of_less_than_a_sample_is_unknown():
-    assert reached(SimpleNamespace(samples=0.25, error=float("inf"))) == "0.2 samples a pixel, error unknown"
-    assert reached(SimpleNamespace(samples=4.0, error=0.0123)) == "4.0 samples a pixel, error 0.012"
+    assert (
+        describe_pass(SimpleNamespace(samples=0.25, error=float("inf")))
+        == "0.2 samples a pixel, error unknown"
+    )
+    assert describe_pass(SimpleNamespace(samples=4.0, error=0.0123)) == "4.0 samples a pixel, error 0.012"

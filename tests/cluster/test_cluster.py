@@ -16,18 +16,18 @@ import pytest
 from fracslice.cli.main import run as command
 
 from fracslice.animation import FilmJob, Timeline, write_frames
-from fracslice.cluster import ResultFolder, Workers, connected, connection, workers
-from fracslice.cluster.identity import Identity
+from fracslice.cluster import ResultFolder, Workers, connect, connection, workers
+from fracslice.cluster.workers import Identity
 from fracslice.errors import Cancelled, ClusterError, FracsliceWarning
 from fracslice.export.layer_files import write_slices
 from fracslice.formulas import mandelbulb, sphere
-from fracslice.jobs import mesh_sampling as meshsampling
-from fracslice.jobs import mesh_tasks as meshtasks
+from fracslice.jobs import shared_mesh as meshsampling
+from fracslice.jobs import shared_mesh as meshtasks
 from fracslice.jobs.mesh import make_mesh
-from fracslice.jobs.slice_recipe import SliceRecipe
-from fracslice.mesh import survey
+from fracslice.jobs.slices import SliceRecipe
+from fracslice.mesh import shells
 from fracslice.meshjob import MeshJob
-from fracslice.rendering import Renderer, parts
+from fracslice.rendering import Renderer, progressive
 from fracslice.scene import Scene, scene
 from fracslice.scene.reader import reads
 from fracslice.scene.view import Camera, View
@@ -105,9 +105,9 @@ def no_workers_of_other_tests(cluster: Cluster) -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def small_parts(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(parts, "PIXELS", 1024)
+    monkeypatch.setattr(progressive, "PIXELS", 1024)
     monkeypatch.setattr(meshtasks, "LEAST", 1)
-    monkeypatch.setattr(survey, "FAN", 2)
+    monkeypatch.setattr(shells, "FAN", 2)
     monkeypatch.setattr(exploration, "MANY", 1)
     monkeypatch.setattr(meshsampling, "BRICKS", 32)
     monkeypatch.setattr(workers, "CONNECT", SECONDS)  # the machine may be busy
@@ -132,7 +132,7 @@ def test_a_killed_worker_and_a_late_one(cluster: Cluster, expected: dict[str, by
                 made.append(len(list(pieces.glob("*/*-*"))))
                 late.append(cluster.worker())
 
-        with connected(cluster.address, str(pieces)) as pool:
+        with connect(cluster.address, str(pieces)) as pool:
             result = job(Work(1, progress=progress, cluster=pool), folder)
         (worker,) = late
         assert made[0] < 25, name
@@ -153,7 +153,7 @@ def test_a_worker_that_hangs(
     def progress(_: str, share: float) -> None:
         hung.send_signal(signal.SIGSTOP)
 
-    with connected(cluster.address, str(tmp_path / "pieces")) as pool:
+    with connect(cluster.address, str(tmp_path / "pieces")) as pool:
         pool.client.wait_for_workers(2, timeout=SECONDS)
         quick = Workers(pool.client, pool.pieces, patience=0.5)
         assert sliced(Work(1, progress=progress, cluster=quick), tmp_path) == expected["slice"]
@@ -168,7 +168,7 @@ SHARED = {
 """Options, pieces and file of a command."""
 PASSES = 4
 """Passes of the rendered command."""
-STARTED = """from fracslice.jobs import mesh_tasks
+STARTED = """from fracslice.jobs import shared_mesh as mesh_tasks
 from fracslice.rendering import parts
 mesh_tasks.LEAST = 1
 parts.PIXELS = 1024
@@ -231,8 +231,8 @@ def test_a_worker_of_another_version_is_not_used(
     cluster: Cluster, expected: dict[str, bytes], tmp_path: Path
 ) -> None:
     old = tmp_path / "old.py"
-    lacking = "import sys\nsys.modules['fracslice.jobs.slice_recipe'] = None\n"
-    old.write_text(f'{lacking}from fracslice.cluster import identity\nidentity.__version__ = "0.0.9"\n')
+    lacking = "import sys\nsys.modules['fracslice.jobs.slices'] = None\n"
+    old.write_text(f'{lacking}from fracslice.cluster import workers\nworkers.__version__ = "0.0.9"\n')
     bare = tmp_path / "bare.py"
     bare.write_text("import sys\nsys.modules['fracslice'] = None\n")
     for preload in (old, bare):
@@ -240,12 +240,12 @@ def test_a_worker_of_another_version_is_not_used(
     good = cluster.worker()
     with warnings.catch_warnings(record=True) as lines:
         warnings.simplefilter("always")
-        with connected(cluster.address, str(tmp_path / "pieces")) as pool:
+        with connect(cluster.address, str(tmp_path / "pieces")) as pool:
             pool.client.wait_for_workers(3, timeout=SECONDS)
             assert sliced(Work(1, cluster=pool), tmp_path) == expected["slice"]
         good.kill()
         good.wait()
-        with connected(cluster.address, str(tmp_path / "pieces")) as pool:
+        with connect(cluster.address, str(tmp_path / "pieces")) as pool:
             wait_until(lambda: len(pool.client.scheduler_info()["workers"]) == 2)
             with pytest.raises(ClusterError, match="no worker fits"):
                 sliced(Work(1, cluster=pool), tmp_path)
@@ -294,7 +294,7 @@ def test_time_limits_and_cancellation(
     cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """No worker; no scheduler; Ctrl-C."""
-    with connected(cluster.address, str(tmp_path / "pieces")) as pool:
+    with connect(cluster.address, str(tmp_path / "pieces")) as pool:
         wait_until(lambda: not pool.client.scheduler_info()["workers"])
         alone = Workers(pool.client, pool.pieces, patience=0.2, limit=0.6)
         with pytest.raises(ClusterError, match=r"no task ended within 0\.6 s; 0 workers"):
@@ -304,7 +304,7 @@ def test_time_limits_and_cancellation(
         with pytest.raises(Cancelled):
             sliced(work, tmp_path)
     monkeypatch.setattr(workers, "CONNECT", 0.3)
-    with pytest.raises(ClusterError, match="no scheduler answers"), connected("tcp://127.0.0.1:9", "x"):
+    with pytest.raises(ClusterError, match="no scheduler answers"), connect("tcp://127.0.0.1:9", "x"):
         pass
 
 
@@ -322,7 +322,7 @@ def test_a_scheduler_that_hangs_or_ends(
 ) -> None:
     """One line each: that nobody works, and that the scheduler is silent; nothing hangs."""
     monkeypatch.setattr(workers, "CONNECT", 3.0)
-    with connected(own.address, str(tmp_path / "pieces")) as pool:
+    with connect(own.address, str(tmp_path / "pieces")) as pool:
         quick = Workers(pool.client, pool.pieces, patience=1.0)
 
         def after_submission() -> None:
@@ -351,7 +351,7 @@ def test_a_task_whose_workers_end(
             first.wait()
             own.worker()
 
-    with connected(own.address, str(tmp_path / "pieces")) as pool:
+    with connect(own.address, str(tmp_path / "pieces")) as pool:
         pool.client.wait_for_workers(1, timeout=SECONDS)
         with pytest.warns(FracsliceWarning, match="layers-.*: its workers ended, one by one"):
             assert sliced(Work(1, progress=progress, cluster=pool), tmp_path) == expected["slice"]
@@ -376,7 +376,7 @@ def test_an_object_store_keeps_the_first_of_two_results(tmp_path: Path) -> None:
 
 
 def test_local_workers_are_processes(tmp_path: Path) -> None:
-    with connected("local:2", str(tmp_path / "pieces"), 2) as pool:
+    with connect("local:2", str(tmp_path / "pieces"), 2) as pool:
         result = pool.client.scheduler_info(n_workers=-1)["workers"].values()
         arenas = pool.client.run(os.getenv, "MALLOC_ARENA_MAX").values()
         blocked = pool.client.run(signal.pthread_sigmask, signal.SIG_BLOCK, [])
@@ -389,11 +389,11 @@ def test_local_workers_that_do_not_start(tmp_path: Path, monkeypatch: pytest.Mon
     from dask import config
 
     failing = pytest.raises(ClusterError, match="local:1: no worker started: No module named 'nobodys'")
-    with config.set({"distributed.worker.preload": ["nobodys"]}), failing, connected("local:1", "x"):
+    with config.set({"distributed.worker.preload": ["nobodys"]}), failing, connect("local:1", "x"):
         pass
     monkeypatch.setattr(connection, "START", 0.1)
     late = pytest.raises(ClusterError, match=r"local:1: no worker started within 0\.1 s")
-    with late, connected("local:1", "x"):
+    with late, connect("local:1", "x"):
         pass
 
 

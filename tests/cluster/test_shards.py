@@ -14,16 +14,16 @@ from fracslice.cli.main import run as command
 from fracslice.cluster import ResultFolder, Shard
 from fracslice.common import files
 from fracslice.errors import ClusterError, SharedError
-from fracslice.export import text
+from fracslice.export import packages
 from fracslice.export.layer_files import write_slices
 from fracslice.formulas import box, cone, flake, sphere
-from fracslice.jobs import mesh_sampling as meshsampling
-from fracslice.jobs import mesh_tasks as meshtasks
-from fracslice.jobs import shared_packing, shared_writing
+from fracslice.jobs import shared_files
+from fracslice.jobs import shared_mesh as meshsampling
+from fracslice.jobs import shared_mesh as meshtasks
 from fracslice.jobs.mesh import MeshResult, make_mesh
-from fracslice.mesh import survey
+from fracslice.mesh import shells
 from fracslice.meshjob import MeshJob
-from fracslice.rendering import parts
+from fracslice.rendering import progressive
 from fracslice.scene import scene
 from fracslice.volume import exploration
 from fracslice.work import Work
@@ -93,14 +93,14 @@ def test_shards_of_a_mesh_make_one_file(tmp_path: Path, monkeypatch: pytest.Monk
     Tasks write the triangles to their places: the file is the one that they wrote, under another name.
     """
     monkeypatch.setattr(meshtasks, "LEAST", 1)
-    monkeypatch.setattr(shared_writing, "FIRST", 7)
-    monkeypatch.setattr(shared_writing, "ROWS", 1000)
+    monkeypatch.setattr(shared_files, "FIRST", 7)
+    monkeypatch.setattr(shared_files, "ROWS", 1000)
     monkeypatch.setattr(files, "appended", None)
-    places, make = list[str](), shared_writing.PlaceTask.make
+    places, make = list[str](), shared_files.PlaceTask.make
     monkeypatch.setattr(
-        shared_writing.PlaceTask, "make", lambda of, work: (places.append(of.name), make(of, work))[1]
+        shared_files.PlaceTask, "make", lambda of, work: (places.append(of.name), make(of, work))[1]
     )
-    monkeypatch.setattr(survey, "FAN", 2)
+    monkeypatch.setattr(shells, "FAN", 2)
     joins, join = list[str](), meshtasks.JoinTask.make
     monkeypatch.setattr(
         meshtasks.JoinTask, "make", lambda of, work: (joins.append(of.name), join(of, work))[1]
@@ -152,15 +152,15 @@ def test_other_formats_are_joined(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 def test_a_3mf_file_is_concatenated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """By two shards; vertices at seams and at a tip's triangles, which come last, are numbered once."""
     monkeypatch.setattr(meshtasks, "LEAST", 1)
-    monkeypatch.setattr(text, "ROWS", 256)
-    monkeypatch.setattr(shared_packing, "BLOCKS", 2)
-    monkeypatch.setattr(shared_writing, "joined_pieces", None)
+    monkeypatch.setattr(packages, "ROWS", 256)
+    monkeypatch.setattr(shared_files, "BLOCKS", 2)
+    monkeypatch.setattr(shared_files, "joined_pieces", None)
     turned = scene(cone(radius=0.5, height=2.0).rotate(70.0, (0.0, 1.0, 0.2)), size="20mm")
     shards = [Shard(ResultFolder(str(tmp_path / "pieces")), number, 2, patience=600) for number in (1, 2)]
     files, made = {number: tmp_path / f"{number}.3mf" for number in (0, 1, 2)}, list[str]()
-    make = shared_packing.EncodeTask.make
+    make = shared_files.EncodeTask.make
     monkeypatch.setattr(
-        shared_packing.EncodeTask, "make", lambda of, work: (made.append(of.name), make(of, work))[1]
+        shared_files.EncodeTask, "make", lambda of, work: (made.append(of.name), make(of, work))[1]
     )
 
     def shared(shard: Shard) -> str:
@@ -203,7 +203,7 @@ def test_what_needs_the_whole_mesh_is_sampled_by_all(tmp_path: Path, monkeypatch
 
 
 def test_shards_of_a_frame_work_at_the_same_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(parts, "PIXELS", 1024)
+    monkeypatch.setattr(progressive, "PIXELS", 1024)
     shards = [Shard(ResultFolder(str(tmp_path / "pieces")), number, 2) for number in (1, 2)]
     with ThreadPoolExecutor(2) as pool:
         sums = list(pool.map(lambda shard: rendered(Work(1, cluster=shard), tmp_path), shards))

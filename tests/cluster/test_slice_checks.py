@@ -10,10 +10,10 @@ from fracslice.cli.main import run as command
 
 from fracslice.cluster import ResultFolder, Shard
 from fracslice.errors import SharedError
-from fracslice.export.ranges import range_size
+from fracslice.export.layer_tasks import range_size
 from fracslice.formulas import box, cylinder, sphere
 from fracslice.jobs.slice_checks import CheckTask, check_run
-from fracslice.jobs.slice_recipe import SliceRecipe
+from fracslice.jobs.slices import SliceRecipe
 from fracslice.scene import scene
 from fracslice.scene.writer import to_xml
 from fracslice.slicing import SliceJob

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from fracslice.common.files import linked, put
+from fracslice.common.files import link_or_copy, write_small_file
 from fracslice.errors import ExportError
 from fracslice.export import check_target, flushing, replacing, write
 from tests.mesh.shapes import cube
@@ -24,7 +24,7 @@ def test_a_file_that_has_the_name_already_leaves_no_other(tmp_path: Path) -> Non
     piece, path = tmp_path / "piece", tmp_path / "cube.stl"
     piece.write_bytes(b"whole")
     for _ in range(2):
-        linked(str(piece), path)
+        link_or_copy(str(piece), path)
         assert path.read_bytes() == b"whole"
         assert sorted(tmp_path.iterdir()) == [path, piece]
 
@@ -208,5 +208,5 @@ def test_a_file_is_put_however_little_the_system_takes_at_once(
     path.write_text("longer than what comes")
     real = os.write
     monkeypatch.setattr(os, "write", lambda handle, data: real(handle, data[:3]))
-    put(f"{path}", b"a picture")
+    write_small_file(f"{path}", b"a picture")
     assert path.read_bytes() == b"a picture"

@@ -17,9 +17,9 @@ import pytest
 from fracslice.errors import ExportError, MeshError
 from fracslice.export import FORMATS, application, packages, write
 from fracslice.mesh import Mesh
-from fracslice.mesh.check import check_mesh
-from fracslice.mesh.model import joined
-from fracslice.mesh.quantisation import quantised
+from fracslice.mesh.checks import check_mesh
+from fracslice.mesh.model import concatenate
+from fracslice.mesh.quantisation import quantise_mesh
 from fracslice.mesh.reading import read_mesh
 from tests.mesh.shapes import cube, inverted, sphere
 
@@ -29,7 +29,9 @@ METADATA = {"Title": 'A <sphere> & "more" é', "scene_hash": "ab12"}
 @pytest.fixture
 def mesh() -> Mesh:
     """A hollow sphere with coordinates that need all their digits."""
-    return quantised(joined([sphere(10, at=(0.1, 1 / 3, 7)), inverted(sphere(4, at=(0.1, 1 / 3, 7)))]))
+    return quantise_mesh(
+        concatenate([sphere(10, at=(0.1, 1 / 3, 7)), inverted(sphere(4, at=(0.1, 1 / 3, 7)))])
+    )
 
 
 @pytest.mark.parametrize("ending", FORMATS)
@@ -93,7 +95,7 @@ def test_blocks_of_a_3mf_model_are_joined(is_large: bool) -> None:
     """Deflated by themselves, as tasks of a cluster do; also with the header of one of more than 2 GiB."""
     texts = [b"<model>", b"", bytes(range(256)) * 999, b"</model>"]
     file = io.BytesIO()
-    packages.join(file, (partial(packages.append, packages.deflated(text)) for text in texts), is_large)
+    packages.join(file, (partial(packages.append, packages.deflate(text)) for text in texts), is_large)
     with zipfile.ZipFile(file) as archive:
         assert archive.testzip() is None
         assert archive.read("3D/3dmodel.model") == b"".join(texts)

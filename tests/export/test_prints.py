@@ -18,11 +18,11 @@ import pytest
 
 from fracslice.errors import ExportError
 from fracslice.export import archives
-from fracslice.export.jobs import SliceRun
 from fracslice.export.layer_files import ENDINGS, FORMATS, PRINTS, printers_file, slice_format, write_slices
 from fracslice.export.resins import Resin
+from fracslice.export.slice_run import SliceRun
 from fracslice.formulas import difference, menger, sphere
-from fracslice.jobs.stack_model import StackModel
+from fracslice.jobs.slices import StackModel
 from fracslice.scene import scene
 from fracslice.slicing import SliceJob, Slicer, adapted, plan_stack
 from fracslice.slicing.printers import PRINTERS, Printer

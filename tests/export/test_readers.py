@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from fracslice.export.jobs import SliceRun
 from fracslice.export.layer_files import write_slices
+from fracslice.export.slice_run import SliceRun
 from fracslice.formulas import difference, menger, sphere
-from fracslice.jobs.stack_model import StackModel
+from fracslice.jobs.slices import StackModel
 from fracslice.scene import scene
 from fracslice.slicing import SliceJob, Slicer, plan_stack
 from fracslice.slicing.raster import Screen

@@ -12,9 +12,9 @@ from fracslice._slices import Encoding, Slab, encoded
 from fracslice.errors import Cancelled, SliceError
 from fracslice.formulas import difference, menger, sphere
 from fracslice.slicing import Layer, SliceJob, Slicer, plan_stack
+from fracslice.slicing.layers import Pictures, Sampler
 from fracslice.slicing.printers import Printer
 from fracslice.slicing.raster import Screen
-from fracslice.slicing.slab import Pictures, Sampler
 from fracslice.work import Work
 from tests.export import decoders
 

@@ -22,13 +22,13 @@ import pytest
 from PIL import Image
 
 from fracslice.errors import Cancelled, ExportError, FracsliceWarning
-from fracslice.export import layerformats, png, resuming
-from fracslice.export.jobs import SliceRun
+from fracslice.export import layer_formats, png, resuming
 from fracslice.export.layer_files import FORMATS, slice_format, write_slices
 from fracslice.export.resins import Resin
 from fracslice.export.resuming import Journal, journal, resumable_folder
+from fracslice.export.slice_run import SliceRun
 from fracslice.formulas import Node, difference, menger, sphere
-from fracslice.jobs.stack_model import StackModel
+from fracslice.jobs.slices import StackModel
 from fracslice.scene import scene
 from fracslice.slicing import SliceJob, Slicer, plan_stack
 from fracslice.slicing.printers import Printer
@@ -279,13 +279,13 @@ def test_layers_of_a_folder_are_written_by_their_threads(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In any order, so that an interrupted job may lack one before the last; the bytes are the same."""
-    put, threads = layerformats.put, set()
+    put, threads = layer_formats.write_small_file, set()
 
     def watched(path: str, data: bytes) -> None:
         threads.add(threading.current_thread())
         put(path, data)
 
-    monkeypatch.setattr(layerformats, "put", watched)
+    monkeypatch.setattr(layer_formats, "write_small_file", watched)
     with pytest.raises(Cancelled):
         write_slices(run(cancelled_after(16)), tmp_path / "part")
     (tmp_path / "part" / "00003.png").unlink()

@@ -18,7 +18,7 @@ from fracslice.formulas import (
     sphere,
     transform,
 )
-from fracslice.formulas.orbits import grown
+from fracslice.formulas.orbits import growth_of
 from fracslice.kernel import compile_scene, link, reference
 from fracslice.scene import reads, scene, to_xml
 from tests.stability.bounds import verdict
@@ -79,7 +79,7 @@ def test_rounds_take_every_step_in_turn() -> None:
         r, theta, phi = np.sqrt((w**2).sum(0)), np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
         s = r * r * np.sin(2 * theta)
         x, y, z = s * np.cos(2 * phi) + 0.1, s * np.sin(2 * phi) + 0.2, r * r * np.cos(2 * theta)
-    result = np.sqrt(x * x + y * y + z * z) <= grown(root).escape
+    result = np.sqrt(x * x + y * y + z * z) <= growth_of(root).escape
     assert result.sum() > 50
     assert (result == inside(root, points)).all()
 

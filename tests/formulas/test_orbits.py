@@ -7,15 +7,14 @@ import pytest
 
 from fracslice import formulas
 from fracslice.errors import KernelError, SceneError
-from fracslice.formulas import Number, Vector, bristorbrot, julia, mandelbox, quaternion_mandelbrot, verbs
-from fracslice.formulas.catalogue import FORMULAS
-from fracslice.formulas.orbits import grown, orbit
-from fracslice.formulas.rounds import steps
-from fracslice.formulas.verbs import ball, fold, positive, power, turn
+from fracslice.formulas import Number, Vector, bristorbrot, julia, mandelbox, quaternion_mandelbrot
+from fracslice.formulas import orbits as verbs
+from fracslice.formulas.node import FORMULAS
+from fracslice.formulas.orbits import ball, fold, growth_of, orbit, positive, power, steps, turn
 from fracslice.kernel import compile_scene, link, orbits, reference
 from fracslice.kernel.depth import resolve_depths
-from fracslice.kernel.orbit_samples import image
-from fracslice.kernel.steps import traced
+from fracslice.kernel.growth import image
+from fracslice.kernel.steps import trace
 from tests.benchmarks.formulas.steps import SCENES
 from tests.budgets.instructions import assembly, sizes
 
@@ -63,7 +62,7 @@ def scope_of(step, sizes: dict[str, int]):  # type: ignore[no-untyped-def]
     """Code of a step, and a function of points and constants that returns its images and stretches."""
     from fracslice.formulas import vocabulary
 
-    made = traced(step, sizes, {})
+    made = trace(step, sizes, {})
     names = "".join(f", v0_{name}" for name in sizes)
     text = "\n    ".join(
         [
@@ -182,16 +181,16 @@ def test_the_stretch_over_a_ball_bounds_its_image(verb, e: float) -> None:  # ty
 
 
 def test_growth_is_found() -> None:
-    assert not grown(mandelbox()).by_power
-    assert grown(bristorbrot()).power == pytest.approx(2, abs=0.01)
-    assert grown(bristorbrot()).escape < 4
+    assert not growth_of(mandelbox()).by_power
+    assert growth_of(bristorbrot()).power == pytest.approx(2, abs=0.01)
+    assert growth_of(bristorbrot()).escape < 4
 
 
 @pytest.mark.parametrize(
     "root", [mandelbox(iterations=9), mandelbox(scale=-1.5, iterations=9), bristorbrot(iterations=9)]
 )
 def test_orbits_do_not_come_back(root) -> None:  # type: ignore[no-untyped-def]
-    result, p = grown(root), RNG.uniform(-0.57, 0.57, (3, 20000)) * root.bounds.box.hi[0]
+    result, p = growth_of(root), RNG.uniform(-0.57, 0.57, (3, 20000)) * root.bounds.box.hi[0]
     taken, values = steps(root)
     step = image(taken, 0, values)
     w, gone = p, np.zeros(20000, bool)
@@ -214,7 +213,7 @@ def test_the_quaternion_set_is_that_of_the_complex_numbers_turned() -> None:
     w = c.copy()
     for _ in range(12):
         w = np.where(abs(w) < 1e6, w * w + c, w)
-    inside = abs(w) <= grown(root).escape
+    inside = abs(w) <= growth_of(root).escape
     assert ((compile_scene(root, "float64").points(x, y, z) < 0) == inside).mean() > 0.9995
 
 
@@ -284,6 +283,6 @@ def test_the_code_of_a_step_is_cached(monkeypatch: pytest.MonkeyPatch) -> None:
     bulbs = [steps(formulas.mandelbulb(power=power), alone=False)[0][0] for power in (5, 6)]
     texts = [code.traced(0) for code in bulbs]
     assert texts[0] != texts[1]
-    orbits._traced.cache_clear()
+    orbits._trace_step.cache_clear()
     monkeypatch.setattr(orbits, "traced", None)
     assert [code.traced(0) for code in bulbs] == texts

@@ -9,11 +9,11 @@ from fracslice.cli.main import run
 
 from fracslice.errors import FracsliceWarning
 from fracslice.formulas import plugins
-from fracslice.formulas.catalogue import FORMULAS
+from fracslice.formulas.node import FORMULAS
 
 OWN = '''
 from fracslice.formulas import Number, orbit, shape
-from fracslice.formulas.verbs import ball, fold
+from fracslice.formulas.orbits import ball, fold
 
 @orbit(scale=Number(-1.7, "enlarges"))
 def own_box(w, c, scale):

@@ -7,11 +7,10 @@ import pytest
 
 from fracslice.formulas import Node, abox, burning_ship, lambda_bulb, mandelbox, mandelbulb, orbit, power_maps
 from fracslice.formulas.escape import sure_distance
-from fracslice.formulas.orbits import grown
+from fracslice.formulas.orbits import growth_of, steps
 from fracslice.formulas.powers import by_angles, triplex
-from fracslice.formulas.rounds import steps
-from fracslice.kernel.orbit_samples import image
-from fracslice.kernel.orbits import written
+from fracslice.kernel.growth import image
+from fracslice.kernel.orbits import function_of_text
 from fracslice.scene.layout import formulas
 from tests.stability.bounds import verdict
 
@@ -40,7 +39,7 @@ def test_what_follows_from_a_power_is_true(formula, power: float) -> None:  # ty
     w = start
     for _ in range(3):
         w = step(w, start)
-    inside = start[:, np.linalg.norm(w, axis=0) <= grown(root).escape]
+    inside = start[:, np.linalg.norm(w, axis=0) <= growth_of(root).escape]
     assert inside.shape[1] > 20 and abs(inside).max() <= root.bounds.box.hi[0]
 
 
@@ -76,7 +75,7 @@ def test_a_majorant_bounds_the_step(root: Node) -> None:
     bend, tear = made.majorant
     names, wanted = code[0].arguments(0), [made.stretch[0], bend, tear or "1e30"]
     body = [*code[0].before(0, ("x", "y", "z")), *made.lines, *made.bending, f"return {', '.join(wanted)}"]
-    function = written(code, ["x", "y", "z", *names], body)
+    function = function_of_text(code, ["x", "y", "z", *names], body)
     w = RNG.uniform(-1.4, 1.4, (3, 4000))
     w = w[:, np.linalg.norm(w, axis=0) > 0.75]  # nearer to 0 the stretch of a power has a minimum, CORE
     a, b, t = (np.broadcast_to(v, w.shape[1]) for v in function(*w, *(values[name] for name in names)))

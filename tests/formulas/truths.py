@@ -11,7 +11,7 @@ import numpy as np
 from fracslice import formulas as f
 from fracslice.formulas import Node
 from fracslice.formulas.bulbs import DIAGONAL, DIAGONAL_AXIS
-from fracslice.formulas.orbits import grown
+from fracslice.formulas.orbits import growth_of
 from fracslice.kernel import reference
 
 Field = Callable[..., np.ndarray]
@@ -98,13 +98,13 @@ def periodic(root: Node, *periods: tuple[float, float, float]) -> list[Truth]:
 
 def ball(root: Node, power: int) -> Truth:
     """With the constant 0, |w| becomes |w|^n in every step: a ball."""
-    radius = grown(root).escape ** (1 / power ** root["iterations"])
+    radius = growth_of(root).escape ** (1 / power ** root["iterations"])
     return Equal(root, f.sphere(radius=radius), sign=True)
 
 
 def of_squares(root: Node, constant: complex | None = None) -> Truth:
     """In the plane z = 0, the Mandelbrot set, or a Julia set, of z^2 + c."""
-    iterations, escape = root["iterations"], grown(root).escape
+    iterations, escape = root["iterations"], growth_of(root).escape
 
     def plane(x: np.ndarray, y: np.ndarray, _: np.ndarray) -> np.ndarray:
         w, gone = x + 1j * y, np.zeros(len(x), bool)

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from fracslice.formulas import sphere
-from fracslice.kernel import cuda, cuda_code, cuda_driver, cuda_memory
+from fracslice.kernel import cuda, cuda_driver, cuda_launching, cuda_memory
 
 H200 = (9, 0)
 
@@ -81,8 +81,8 @@ def driven(patch: pytest.MonkeyPatch) -> HostDriver:
     host = HostDriver()
     patch.delenv("NUMBA_ENABLE_CUDASIM", raising=False)
     patch.setattr(cuda_memory, "call", host)
-    patch.setattr(cuda_code, "call", host)
-    patch.setattr(cuda_code, "capability", lambda: H200)
+    patch.setattr(cuda_launching, "call", host)
+    patch.setattr(cuda_launching, "capability", lambda: H200)
     patch.setattr(cuda_driver, "present", lambda: True)
     return host
 
@@ -107,7 +107,7 @@ def words(kinds: str, *values: float) -> bytes:
 
 def parameters(text: str, name: str) -> list[int]:
     """Widths in bits of the parameters of a compiled loop."""
-    (kernel,) = getattr(cuda_code.executed(text), name).overloads.values()
+    (kernel,) = getattr(cuda_launching.execute_module(text), name).overloads.values()
     (entry,) = re.findall(r"\.entry [^)]*", kernel.library.get_asm_str())
     return [int(bits) for bits in re.findall(r"\.param \.[a-z](\d+)", entry)]
 
@@ -115,7 +115,7 @@ def parameters(text: str, name: str) -> list[int]:
 def main() -> None:
     """Evaluate a field; print the number of loops that Numba compiled for that, and whether it was there."""
     made: list[list[int]] = []
-    compiled = cuda_code.compiled
+    compiled = cuda_launching.compiled
 
     def checked(text: str, name: str, kinds: tuple[cuda_memory.Kind, ...]) -> bytes:
         code = compiled(text, name, kinds)
@@ -131,7 +131,7 @@ def main() -> None:
     with pytest.MonkeyPatch.context() as patch:
         host = driven(patch)
         patch.setattr(cuda_driver, "_imported", imported)
-        patch.setattr(cuda_code, "compiled", checked)
+        patch.setattr(cuda_launching, "compiled", checked)
         kernel = cuda.compile_scene(sphere())
         kernel.points(*np.zeros((3, 4)))
         kernel.bricks(np.zeros((2, 3), np.int32), (0, 0, 0), 1, np.zeros((2, 512), np.float32))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fracslice.formulas.catalogue import FORMULAS
+from fracslice.formulas.node import FORMULAS
 from fracslice.kernel import cuda, reference
 from fracslice.mesh.roots import LOOPS, Roots
 from tests.examples import DEFINED, EXAMPLES

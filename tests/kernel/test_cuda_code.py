@@ -18,7 +18,8 @@ import numpy as np
 import pytest
 
 from fracslice.errors import KernelError
-from fracslice.kernel import cuda_api, cuda_code, cuda_driver, cuda_memory
+from fracslice.kernel import cuda_driver, cuda_launching, cuda_memory
+from fracslice.kernel import cuda_memory as cuda_api
 from tests.kernel.cuda_host import HostDriver, driven, words
 
 installed = pytest.mark.skipif(
@@ -149,12 +150,12 @@ class TestLaunches:
             made.append(kinds)
             return b"%s\ncode\n%d" % (f"{name} of {text}".encode(), len(made))
 
-        monkeypatch.setattr(cuda_code, "compiled", compiled)
+        monkeypatch.setattr(cuda_launching, "compiled", compiled)
         return made
 
     def test_give_all_parameters(self, host: HostDriver, made: list[object]) -> None:
         array = cuda_memory.device_array(2, np.float32)
-        cuda_code.CudaFunction("text", "loop")[3, 128](array, 5, np.float32(0.5))
+        cuda_launching.CudaFunction("text", "loop")[3, 128](array, 5, np.float32(0.5))
         fields = 0, 0, 2, 4, array.address, 2, 4, 5, 0.5
         assert host.launches == [(b"loop of text", (3, 1, 1, 128, 1, 1), words("q" * 8 + "f", *fields))]
         assert host.images[0] == b"code\n1"
@@ -163,15 +164,15 @@ class TestLaunches:
         self, host: HostDriver, made: list[object], monkeypatch: pytest.MonkeyPatch
     ) -> None:
         def launched(text: str = "text", name: str = "loop", value: object = 1) -> int:
-            cuda_code.CudaFunction(text, name)[1, 32](value)
+            cuda_launching.CudaFunction(text, name)[1, 32](value)
             return len(made)
 
         assert [launched(), launched(), launched(value=2)] == [1, 1, 1]
         assert [launched(value=2.0), launched(value=np.float32(2)), launched(value=1)] == [2, 3, 3]
         assert [launched("other"), launched(name="other")] == [4, 5]
-        monkeypatch.setattr(cuda_code, "capability", lambda: (8, 0))
+        monkeypatch.setattr(cuda_launching, "capability", lambda: (8, 0))
         assert launched() == 6
-        monkeypatch.setattr(cuda_code, "cuda_toolchain", lambda: "another")
+        monkeypatch.setattr(cuda_launching, "cuda_toolchain", lambda: "another")
         assert launched() == 7
 
 

@@ -23,7 +23,7 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.formulas.catalogue import FORMULAS
+from fracslice.formulas.node import FORMULAS
 from fracslice.formulas.parameters import AUTO
 from fracslice.formulas.vocabulary import sqrt
 from fracslice.kernel import depth

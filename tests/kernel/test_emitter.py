@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from fracslice.errors import KernelError
+from fracslice.kernel.cpu import object_code
 from fracslice.kernel.host import lane_count
 from fracslice.kernel.linker import Linked
 from fracslice.kernel.loops import Loop
-from fracslice.kernel.machine import loaded
-from fracslice.kernel.objects import object_code
+from fracslice.kernel.machine import load_object
 
 N = 7
 HEAD = """\
 from fracslice.formulas.vocabulary import any_of, minimum, where
-from fracslice.kernel.intrinsics import WIDTH, load, store
+from fracslice.kernel.loops import WIDTH, load, store
 from fracslice.kernel.loops import loop
 """
 
@@ -43,7 +43,7 @@ def compiled(folder: Path, body: str, extra: str = "") -> dict[str, np.ndarray]:
             loop.function(a, [int(v) for v in j], f, k, N)
         else:
             code = object_code(Linked("", np.zeros(1)), 64, lane_count(64), [loop])
-            loaded(code, [loop], np.dtype(np.float64))["run"](a, j, f, k, N)
+            load_object(code, [loop], np.dtype(np.float64))["run"](a, j, f, k, N)
         rows[way] = np.concatenate([f, k])
     return rows
 

@@ -17,7 +17,7 @@ from fracslice.formulas import (
     transform,
 )
 from fracslice.formulas.registry import Node
-from fracslice.kernel.enclosing_box import proved_half
+from fracslice.kernel.boxes import proved_half
 from fracslice.kernel.intervals import Interval
 from fracslice.kernel.reference import enclosure, reference
 

@@ -26,12 +26,9 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.formulas.orbits import grown, orbit_select
-from fracslice.formulas.rounds import steps
-from fracslice.formulas.verbs import modulo
+from fracslice.formulas.orbits import growth_of, modulo, orbit_select, steps
 from fracslice.kernel.escape_radius import constant_stretch, least_size
-from fracslice.kernel.growth import _proved, arguments
-from fracslice.kernel.orbit_samples import composed, image, norm
+from fracslice.kernel.growth import _prove_growth, arguments, compose_steps, image, norm
 from fracslice.kernel.orbits import Code
 from fracslice.scene.layout import formulas
 from tests.stability.bounds import verdict
@@ -44,7 +41,7 @@ RNG = np.random.default_rng(5)
 
 @pytest.mark.parametrize("formula", ORBITS, ids=lambda f: f.name)
 def test_the_radius_of_every_orbit_is_proved(formula: Any) -> None:
-    assert grown(formula()).proved
+    assert growth_of(formula()).proved
 
 
 @pytest.mark.parametrize(
@@ -59,15 +56,15 @@ def test_the_radius_of_every_orbit_is_proved(formula: Any) -> None:
 def test_a_radius_that_is_too_small_grows(root: Node, radius: float) -> None:
     """Known radii: |w|^n - |w| = |w|, and factor (|w|^n - |w|) = |w|."""
     code, values = steps(root, alone=False)
-    bound = replace(grown(root), escapes=(0.9 * radius,), proved=False)
+    bound = replace(growth_of(root), escapes=(0.9 * radius,), proved=False)
     fixed = code[0].is_fixed(0)
-    result = _proved(code, bound, values, 0.0 if fixed else bound.escape)
+    result = _prove_growth(code, bound, values, 0.0 if fixed else bound.escape)
     assert result.proved and radius < result.escape < 1.5 * radius
 
 
 def test_a_radius_that_cannot_be_proved_is_the_sampled_one() -> None:
     """A constant of the size of the solid leads back: 1.2 |w| - |c| < |w|."""
-    assert not grown(mandelbox(scale=1.2)).proved
+    assert not growth_of(mandelbox(scale=1.2)).proved
 
 
 @pytest.mark.parametrize(
@@ -79,7 +76,7 @@ def test_a_radius_that_cannot_be_proved_is_the_sampled_one() -> None:
 )
 def test_no_orbit_comes_back_between_the_samples(root: Node, radius: float) -> None:
     """Few directions and radii missed the fixed points of high powers: the radius was 0.0129, and the box."""
-    assert radius < grown(root).escape < 1.5 * radius
+    assert radius < growth_of(root).escape < 1.5 * radius
     assert max(root.bounds.box.hi) > 0.95
 
 
@@ -93,16 +90,16 @@ def test_no_orbit_comes_back_between_the_samples(root: Node, radius: float) -> N
 )
 def test_known_lengths_prove_the_radius_of_hybrids(root: Node) -> None:
     """|w^n| is |w|^n: by intervals of products alone, none of these is proved."""
-    assert grown(root).proved
+    assert growth_of(root).proved
 
 
 @pytest.mark.parametrize("seed", [1, 40, 58])
 def test_denser_samples_find_no_orbit_that_comes_back(seed: int) -> None:
     """From beyond the radius at the end of a round, for constants as long as points of the solid."""
     root = random_hybrid(seed)
-    bound, rng = grown(root), np.random.default_rng(seed)
+    bound, rng = growth_of(root), np.random.default_rng(seed)
     code, values = steps(root)
-    whole = composed([image(code, k, values) for k in range(len(code))])
+    whole = compose_steps([image(code, k, values) for k in range(len(code))])
     w, c = rng.normal(size=(2, 3, 1 << 15))
     w *= bound.escape * rng.uniform(1, 3, 1 << 15) / np.linalg.norm(w, axis=0)
     c *= max(root.bounds.box.hi) * rng.uniform(0, 1, 1 << 15) / np.linalg.norm(c, axis=0)
@@ -122,7 +119,7 @@ def test_denser_samples_find_no_orbit_that_comes_back(seed: int) -> None:
 def test_the_least_size_is_a_lower_bound(root: Node) -> None:
     """Of |w| at the end of a round, for points of cells and constants of a size."""
     code, values = steps(root)
-    known = {**values, **arguments(code, grown(root), 1)}
+    known = {**values, **arguments(code, growth_of(root), 1)}
     stops = [known[f"stop{k}"] for k in range(len(code) - 1)]
     half, size, tight = 0.02, 1.5, 0
     centres = RNG.uniform(-2, 2, (3, 300))
@@ -134,9 +131,9 @@ def test_the_least_size_is_a_lower_bound(root: Node) -> None:
         c *= size / np.linalg.norm(c, axis=0)
         stopped = np.zeros(300, bool)
         for k, stop in enumerate(stops):
-            between = composed([image(code, i, known) for i in range(k + 1)])(w, c)
+            between = compose_steps([image(code, i, known) for i in range(k + 1)])(w, c)
             stopped |= (between**2).sum(0) >= stop
-        last = np.linalg.norm(composed([image(code, k, known) for k in range(len(code))])(w, c), axis=0)
+        last = np.linalg.norm(compose_steps([image(code, k, known) for k in range(len(code))])(w, c), axis=0)
         assert (stopped | (last >= bound * (1 - 1e-9))).all()
         tight += int((last < 2 * bound).sum())
     assert tight > 100

@@ -13,12 +13,11 @@ from fracslice.formulas.field import Precision
 from fracslice.kernel import compile_scene
 from fracslice.kernel.cpu import compile_loops
 from fracslice.kernel.depth import resolve_depths
-from fracslice.kernel.enclosures import Enclosures
-from fracslice.kernel.interval_numbers import ARRAYS
-from fracslice.kernel.intervals import Interval
+from fracslice.kernel.intervals import ARRAYS, Interval
 from fracslice.kernel.linker import CALLED, FIELD, link
 from fracslice.kernel.loops import enclosures
 from fracslice.kernel.reference import enclosure
+from fracslice.kernel.tree import Enclosures
 from tests.examples import EXAMPLES
 
 CELLS, POINTS = 96, 12

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from fracslice.kernel import source
-from fracslice.kernel.source import Copy, shared
+from fracslice.kernel.source import Copy, shared_copy
 
 TEXT = """
 SCALE = 2.0
@@ -35,15 +35,15 @@ def module(path: Path, number: float) -> ModuleType:
 
 def copied(function: Callable[..., Any]) -> Copy:
     """Copy as a later process has it."""
-    source._shared.cache_clear()
-    return shared(function, (), frozenset())
+    source._cached_shared_copy.cache_clear()
+    return shared_copy(function, (), frozenset())
 
 
 @pytest.fixture
 def makes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[str]:
     """Cache of its own; names of the functions whose copies are made."""
     monkeypatch.setenv("FRACSLICE_CACHE", str(tmp_path / "cache"))
-    names, make = list[str](), source.copied
+    names, make = list[str](), source.copy_text
 
     def counted(tree: Any, function: Callable[..., Any], *given: Any) -> Copy:
         names.append(function.__name__)

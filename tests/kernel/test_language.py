@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fracslice.errors import FracsliceError, SceneError
-from fracslice.formulas.catalogue import FORMULAS
+from fracslice.formulas.node import FORMULAS
 from fracslice.kernel import compile_scene, cuda_loops, cuda_source, link, reference
 from tests.kernel.idioms import HEAD, SAME, P, X, Y, Z, imported
 

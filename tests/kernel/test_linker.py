@@ -77,7 +77,7 @@ def test_code_that_is_exchanged_in_its_function(cell: ModuleType, tmp_path: Path
 
 @pytest.mark.parametrize("values", [(1, 1.0), (1.0, 1), (0.0, -0.0)])
 def test_fixed_numbers_that_are_equal_and_not_the_same(values: tuple[float, float]) -> None:
-    texts = [source.shared(sphere.function, (("radius", v),), frozenset()).text for v in values]
+    texts = [source.shared_copy(sphere.function, (("radius", v),), frozenset()).text for v in values]
     assert [repr(v) in text for v, text in zip(values, texts, strict=True)] == [True, True]
     assert texts[0] != texts[1]
 
@@ -85,7 +85,7 @@ def test_fixed_numbers_that_are_equal_and_not_the_same(values: tuple[float, floa
 def test_a_scene_that_did_not_change_is_not_written_again() -> None:
     root: Node = sphere()
     link(root)
-    before = source._shared.cache_info()
+    before = source._cached_shared_copy.cache_info()
     link(root)
-    after = source._shared.cache_info()
+    after = source._cached_shared_copy.cache_info()
     assert after.misses == before.misses and after.hits > before.hits

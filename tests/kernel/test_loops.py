@@ -15,16 +15,16 @@ import pytest
 from fracslice.errors import KernelError
 from fracslice.formulas import box
 from fracslice.formulas.field import Kernel, Precision
-from fracslice.kernel import intrinsics, loop_linker
-from fracslice.kernel.arrays import ArrayField
+from fracslice.kernel import loop_linker
+from fracslice.kernel import loops as intrinsics
 from fracslice.kernel.cpu import load_functions
 from fracslice.kernel.host import lane_count
-from fracslice.kernel.intrinsics import load, store
 from fracslice.kernel.linker import Linked
 from fracslice.kernel.loop_linker import loop_source
-from fracslice.kernel.loops import Loop, loop
+from fracslice.kernel.loops import Loop, load, loop, store
+from fracslice.kernel.tree import ArrayField
 from fracslice.mesh import roots
-from fracslice.rendering import lanes
+from fracslice.rendering import packets
 
 STEP = 3
 NOTHING = Linked("", np.zeros(1))
@@ -116,22 +116,22 @@ def to_the_floor(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P):  # t
 def test_packets_followed_by_python_are_those_of_the_machine_code(monkeypatch: pytest.MonkeyPatch) -> None:
     width = lane_count(64)
     n, m = 3 * width - 5, 3 * width
-    rows = np.zeros((len(lanes.Row), m))
-    rows[lanes.Row.oz] = np.random.default_rng(0).uniform(-0.5, 3.0, m)
-    rows[lanes.Row.dz] = np.where(np.arange(m) % 7 == 3, 1.0, -1.0)
-    rows[lanes.Row.end] = np.where(np.arange(m) % 5 == 1, -1.0, 9.0)
-    follow = Loop(lanes.follow, "rrinnnr").fix(step=to_the_floor)
+    rows = np.zeros((len(packets.Row), m))
+    rows[packets.Row.oz] = np.random.default_rng(0).uniform(-0.5, 3.0, m)
+    rows[packets.Row.dz] = np.where(np.arange(m) % 7 == 3, 1.0, -1.0)
+    rows[packets.Row.end] = np.where(np.arange(m) % 5 == 1, -1.0, 9.0)
+    follow = Loop(packets.follow, "rrinnnr").fix(step=to_the_floor)
     compiled = load_functions(NOTHING, 64, width, [follow])["follow"]
-    for module in (intrinsics, lanes):
+    for module in (intrinsics, packets):
         monkeypatch.setattr(module, "WIDTH", width)
     result = []
-    for run, last in ((compiled, ()), (lanes.follow, (to_the_floor,))):
+    for run, last in ((compiled, ()), (packets.follow, (to_the_floor,))):
         own = rows.copy()
-        packet, rays = np.zeros(len(lanes.Lane) * width), np.zeros(width, np.int32)
+        packet, rays = np.zeros(len(packets.Lane) * width), np.zeros(width, np.int32)
         run(own.ravel(), packet, rays, n, m, 20, np.ones(1), *last)
         result.append(own)
     np.testing.assert_allclose(result[0], result[1], rtol=1e-12)
-    assert set(result[0][lanes.Row.status, :n]) == {1.0, 2.0, 3.0}
+    assert set(result[0][packets.Row.status, :n]) == {1.0, 2.0, 3.0}
 
 
 def test_roots_of_a_field_that_is_not_linked_move_as_the_compiled_ones_do() -> None:
@@ -190,7 +190,7 @@ def test_the_text_of_loops_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_identity_of_a_function_is_the_same_in_every_process() -> None:
     """And follows every number that it or a function that it calls uses."""
     code = (
-        "from fracslice.rendering.packets import tile; from fracslice.kernel.identity import identity; "
+        "from fracslice.rendering.packets import tile; from fracslice.kernel.loop_linker import identity; "
         "print(identity(tile.function))"
     )
     one, other = (

@@ -18,9 +18,9 @@ import fracslice
 from fracslice._native import RootLoops
 from fracslice._slices import Memory, ProbeBounds, Slab
 from fracslice.formulas import box, mandelbulb, sphere
-from fracslice.kernel import CpuKernel, elf, link
-from fracslice.kernel.elf import Image, UnsupportedError
+from fracslice.kernel import CpuKernel, link, machine
 from fracslice.kernel.loops import bricks, points
+from fracslice.kernel.machine import Image, UnsupportedError
 from fracslice.mesh.roots import Roots
 
 
@@ -72,8 +72,8 @@ def test_arrays_become_addresses_in_one_place() -> None:
     result = {
         str(path.relative_to(package)) for path in package.rglob("*.py") if address.search(path.read_text())
     }
-    own = {"kernel/elf.py", "viewer/screen.py"}  # of its own memory; names X11's result type
-    driver = {f"kernel/cuda_{part}.py" for part in ("api", "code", "memory")}  # returns when it has copied
+    own = {"viewer/screen.py"}  # names X11 result type
+    driver = {f"kernel/cuda_{part}.py" for part in ("launching", "memory")}  # returns when it has copied
     assert result == {"kernel/machine.py"} | own | driver
 
 
@@ -81,8 +81,8 @@ def test_a_file_that_the_loader_does_not_know_is_left_to_llvm(monkeypatch: pytes
     """Machine code and values are the same."""
     points = np.random.default_rng(0).uniform(-1, 1, (3, 1000))
     linked = link(mandelbulb(power=8, iterations=4))
-    own = CpuKernel(linked)
-    monkeypatch.setattr(elf, "KIND", b"")
+    own = {"viewer/screen.py"}  # names X11 result type
+    monkeypatch.setattr(machine, "KIND", b"")
     other = CpuKernel(linked)
     assert isinstance(own._points._engine, Image)
     assert not isinstance(other._points._engine, Image)
@@ -124,6 +124,6 @@ def test_relocations_of_both_code_models(model: str) -> None:
 
 
 def test_a_damaged_or_foreign_file_is_refused_before_anything_runs() -> None:
-    for code in (b"", b"MZ" * 64, elf.MAGIC + bytes(100)):
+    for code in (b"", b"MZ" * 64, machine.MAGIC + bytes(100)):
         with pytest.raises(UnsupportedError):
             Image(code)

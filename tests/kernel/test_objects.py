@@ -15,10 +15,10 @@ import pytest
 from fracslice.errors import FracsliceWarning
 from fracslice.formulas import sphere
 from fracslice.kernel import compiler
+from fracslice.kernel.cpu import object_code
 from fracslice.kernel.host import toolchain
 from fracslice.kernel.linker import Linked, link
 from fracslice.kernel.loops import Loop, points
-from fracslice.kernel.objects import object_code
 
 LINKED = link(sphere())
 

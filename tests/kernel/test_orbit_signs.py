@@ -17,8 +17,7 @@ from fracslice.formulas import (
 )
 from fracslice.formulas.field import Precision
 from fracslice.kernel import compile_scene
-from fracslice.kernel.interval_numbers import ARRAYS
-from fracslice.kernel.intervals import Interval
+from fracslice.kernel.intervals import ARRAYS, Interval
 from fracslice.kernel.reference import enclosure, reference
 
 RNG = np.random.default_rng(8)

@@ -26,7 +26,7 @@ from fracslice.kernel import compile_scene, compiler, link, reference
 from fracslice.kernel.host import REGISTERS, host
 from fracslice.kernel.loops import points
 from fracslice.rendering.linking import link_frame
-from fracslice.rendering.optics import optics
+from fracslice.rendering.setup import optics
 from fracslice.scene.view import Camera, Light, View
 
 P = np.random.default_rng(2).uniform(-1.5, 1.5, (3, 500))

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from fracslice.mesh import Mesh
-from fracslice.mesh.model import joined
+from fracslice.mesh.model import concatenate
 
 CUBE = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
 CUBE_SIDES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -85,25 +85,25 @@ GOOD: dict[str, Callable[[], Mesh]] = {
     "sphere": sphere,
     "cube": cube,
     "torus": torus,
-    "hollow": lambda: joined([sphere(), inverted(sphere(8))]),
-    "body in a cavity": lambda: joined([sphere(), inverted(sphere(8)), sphere(3)]),
-    "two apart": lambda: joined([sphere(), sphere(at=(30, 0, 0))]),
+    "hollow": lambda: concatenate([sphere(), inverted(sphere(8))]),
+    "body in a cavity": lambda: concatenate([sphere(), inverted(sphere(8)), sphere(3)]),
+    "two apart": lambda: concatenate([sphere(), sphere(at=(30, 0, 0))]),
 }
 
 BAD: dict[str, tuple[Callable[[], Mesh], str]] = {
     "hole": (lambda: without(sphere(), 400), "open edges"),
     "flipped triangle": (lambda: with_flipped(sphere(), 400), "opposite orientation"),
     "inside out": (lambda: inverted(sphere()), "inside out"),
-    "overlapping": (lambda: joined([sphere(), sphere(at=(8, 0, 0))]), "cut or touch"),
+    "overlapping": (lambda: concatenate([sphere(), sphere(at=(8, 0, 0))]), "cut or touch"),
     "spike through": (lambda: with_moved(sphere(), 0, (0, 0, -30)), "cut or touch"),
-    "nested, both outward": (lambda: joined([sphere(), sphere(5)]), "inside another body"),
-    "cavity in nothing": (lambda: joined([sphere(), inverted(sphere(5, at=(30, 0, 0)))]), "inside out"),
-    "shared edge": (lambda: joined([cube(), cube(at=(10, 10, 0))]), "more than two"),
-    "shared vertex": (lambda: joined([cube(), cube(at=(10, 10, 10))]), "touches itself"),
-    "shared wall": (lambda: joined([cube(), cube(at=(10, 0, 0))]), "more than two"),
-    "coplanar overlap": (lambda: joined([cube(), cube(at=(5, 0, 0))]), "cut or touch"),
-    "partly touching walls": (lambda: joined([cube(), cube(at=(10, 5, 5))]), "cut or touch"),
-    "tip on a wall": (lambda: joined([cube(), standing_tip()]), "cut or touch"),
+    "nested, both outward": (lambda: concatenate([sphere(), sphere(5)]), "inside another body"),
+    "cavity in nothing": (lambda: concatenate([sphere(), inverted(sphere(5, at=(30, 0, 0)))]), "inside out"),
+    "shared edge": (lambda: concatenate([cube(), cube(at=(10, 10, 0))]), "more than two"),
+    "shared vertex": (lambda: concatenate([cube(), cube(at=(10, 10, 10))]), "touches itself"),
+    "shared wall": (lambda: concatenate([cube(), cube(at=(10, 0, 0))]), "more than two"),
+    "coplanar overlap": (lambda: concatenate([cube(), cube(at=(5, 0, 0))]), "cut or touch"),
+    "partly touching walls": (lambda: concatenate([cube(), cube(at=(10, 5, 5))]), "cut or touch"),
+    "tip on a wall": (lambda: concatenate([cube(), standing_tip()]), "cut or touch"),
     "fin": (lambda: with_fin(sphere()), "more than two"),
     "repeated triangle": (lambda: with_triangle(cube(), 0, 1, 3), "that repeats another"),
     "needle": (lambda: with_triangle(sphere(), 0, 0, 1), "without area"),

@@ -16,12 +16,11 @@ from hypothesis import strategies as st
 from fracslice._native import connected_components, side_of_line, side_of_plane
 from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
-from fracslice.mesh.check import check_mesh
-from fracslice.mesh.model import joined
-from fracslice.mesh.nesting import nesting
-from fracslice.mesh.self_intersections import self_intersecting_triangles
+from fracslice.mesh.checks import check_mesh
+from fracslice.mesh.model import concatenate
+from fracslice.mesh.shells import nesting
+from fracslice.mesh.spatial import build, self_intersecting_triangles
 from fracslice.mesh.topology import component_sizes, edge_topology
-from fracslice.mesh.tree import build
 
 from .shapes import BAD, GOOD, cube, inverted, sphere, torus, with_moved
 
@@ -68,7 +67,7 @@ def test_numbers_of_a_cube() -> None:
 
 def test_bodies_cavities_and_handles_are_counted() -> None:
     report = check_mesh(
-        joined([sphere(), inverted(sphere(8)), sphere(3), torus(at=(40, 0, 0)), torus(at=(80, 0, 0))])
+        concatenate([sphere(), inverted(sphere(8)), sphere(3), torus(at=(40, 0, 0)), torus(at=(80, 0, 0))])
     )
     assert (report.components, report.cavities, report.genus) == (4, 1, 2)
 
@@ -88,7 +87,7 @@ def test_unwelded_copies_are_seen_as_a_slicer_sees_them() -> None:
 
 
 def test_thread_count_does_not_matter() -> None:
-    crossed = joined([sphere(level=5), sphere(at=(8, 0, 0), level=5)])
+    crossed = concatenate([sphere(level=5), sphere(at=(8, 0, 0), level=5)])
     assert check_mesh(crossed, threads=1) == check_mesh(crossed, threads=4)
 
 

@@ -10,15 +10,14 @@ import pytest
 from fracslice.errors import MeshError
 from fracslice.formulas import sphere as ball
 from fracslice.mesh import Mesh
-from fracslice.mesh import survey as surveys
-from fracslice.mesh.check import check_mesh
-from fracslice.mesh.components import Removed, Shells, choose
+from fracslice.mesh import shells as surveys
+from fracslice.mesh.checks import check_mesh
 from fracslice.mesh.contouring import Piece
 from fracslice.mesh.extract import contour_pieces
-from fracslice.mesh.model import joined
+from fracslice.mesh.model import concatenate
 from fracslice.mesh.pieces import Pieces
-from fracslice.mesh.survey import survey
-from fracslice.mesh.whole_shells import WholeShells
+from fracslice.mesh.shells import WholeShells, survey
+from fracslice.mesh.topology import Removed, Shells, choose
 from fracslice.volume import SignBricks
 
 from .shapes import cube, inverted, sphere
@@ -26,7 +25,7 @@ from .shapes import cube, inverted, sphere
 
 def hollow_and_dust() -> Mesh:
     """A hollow cube of 1000 - 8 mm3, a hollow one of 125 - 1 mm3 in the way of its rays, and two grains."""
-    return joined(
+    return concatenate(
         [
             inverted(cube(2, at=(3, 3, 3))),
             cube(10),
@@ -103,12 +102,12 @@ def test_dust() -> None:
 
 def test_a_shell_inside_out_is_refused() -> None:
     with pytest.raises(MeshError, match="inside out"):
-        shells(joined([cube(), inverted(cube(at=(20, 0, 0)))]))
+        shells(concatenate([cube(), inverted(cube(at=(20, 0, 0)))]))
 
 
 def test_thousands_of_parts_take_no_time() -> None:
     grains = [sphere(0.2, at=(x, y, z), level=1) for x in range(20) for y in range(20) for z in range(10)]
-    mesh = joined(
+    mesh = concatenate(
         [sphere(50, level=6), *[g.translated((-10, -10, 60)) for g in grains], inverted(sphere(40, level=6))]
     )
     shells(hollow_and_dust())  # compiled by now
@@ -128,10 +127,10 @@ def thin_walls(mesh: Mesh, voxel: float) -> str:
 def test_bodies_thinner_than_a_voxel_are_pieces_unless_they_are_dust() -> None:
     """The wall of a cube is a third of its side, by volume and area."""
     thick, thin = cube(10), [cube(1, at=(20 + 2 * k, 0, 0)) for k in range(60)]
-    assert thin_walls(joined([thick, *thin]), 0.33) == ""
-    reported = thin_walls(joined([thick, *thin]), 0.34)
+    assert thin_walls(concatenate([thick, *thin]), 0.33) == ""
+    reported = thin_walls(concatenate([thick, *thin]), 0.34)
     assert reported == "walls thinner than a voxel fell to pieces: 60 of 61 bodies, 6% of the material"
-    assert thin_walls(joined([thick, *thin[:40]]), 0.34) == ""
+    assert thin_walls(concatenate([thick, *thin[:40]]), 0.34) == ""
     assert thin_walls(thin[0], 0.34) == "walls thinner than a voxel have holes, 100% of the material"
 
 

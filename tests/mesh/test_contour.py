@@ -32,12 +32,12 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.formulas.catalogue import FORMULAS
 from fracslice.formulas.field import Bounds, Device, Precision
+from fracslice.formulas.node import FORMULAS
 from fracslice.kernel import Kernel, reference
-from fracslice.kernel.arrays import ArrayField
+from fracslice.kernel.tree import ArrayField
 from fracslice.mesh import Mesh
-from fracslice.mesh.check import check_mesh
+from fracslice.mesh.checks import check_mesh
 from fracslice.mesh.contouring import Piece
 from fracslice.mesh.extract import contour, contour_pieces, extract
 from fracslice.volume import Bricks, plan, sample_scene

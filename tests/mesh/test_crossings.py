@@ -13,7 +13,7 @@ import pytest
 from fracslice._native import Cells
 from fracslice.formulas import box, difference, mandelbulb, sphere, torus, transform, union
 from fracslice.kernel import reference
-from fracslice.mesh.crossings import Refiner
+from fracslice.mesh.contouring import Refiner
 from fracslice.volume import Bricks, plan, sample_scene
 
 

@@ -15,7 +15,7 @@ from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
 from fracslice.mesh.contouring import minimum_edge_parameter
 from fracslice.mesh.extract import extract
-from fracslice.mesh.self_intersections import self_intersecting_triangles
+from fracslice.mesh.spatial import self_intersecting_triangles
 from fracslice.volume.bricks import INSIDE, OUTSIDE, Bricks
 from tests.fields import blobs, bricks_of, grid_points, noise
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fracslice.mesh.gathering import gathered
+from fracslice.mesh.pieces import gather_rows
 
 
 @pytest.mark.parametrize("size", [1, 5, 1 << 17])
 @pytest.mark.parametrize("shape", [(0,), (23,), (7, 6)])
 def test_gathering_is_indexing(size: int, shape: tuple[int, ...], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fracslice.mesh.gathering.ROWS", size)
+    monkeypatch.setattr("fracslice.mesh.pieces.ROWS", size)
     rng = np.random.default_rng(1)
     table, rows = rng.random((9, 3)), rng.integers(9, size=shape).astype(np.int32)
     for values in (table, table[:, 0] > 0.5):
-        np.testing.assert_array_equal(gathered(values, rows, 3), values[rows])
+        np.testing.assert_array_equal(gather_rows(values, rows, 3), values[rows])

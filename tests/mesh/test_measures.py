@@ -8,7 +8,7 @@ import pytest
 from fracslice._native import bounds, turned
 from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
-from fracslice.mesh.quantisation import placed
+from fracslice.mesh.quantisation import place_and_round
 
 RNG = np.random.default_rng(5)
 SOUP = Mesh(RNG.normal(size=(9000, 3)), RNG.integers(0, 9000, (40000, 3)).astype(np.int32))
@@ -39,7 +39,7 @@ def test_turned() -> None:
     frame = 0.5, (2.0**24, 0.0, 1.0), 0.8
     points = 0.5 * SOUP.vertices + frame[1]
     points[points[:, 2] < 0.8, 2] = 0
-    expected = np.flatnonzero((normals(points) * normals(placed(SOUP.vertices, frame))).sum(1) <= 0)
+    expected = np.flatnonzero((normals(points) * normals(place_and_round(SOUP.vertices, frame))).sum(1) <= 0)
     assert 300 < len(expected) < 39000
     assert turned(SOUP.vertices, SOUP.triangles, frame).tolist() == expected.tolist()
 

@@ -22,10 +22,10 @@ from fracslice._native import (
     touching,
 )
 from fracslice.mesh import Mesh
-from fracslice.mesh.model import joined
-from fracslice.mesh.nesting import nesting
-from fracslice.mesh.quantisation import placed, quantise
-from fracslice.mesh.self_intersections import self_intersecting_triangles
+from fracslice.mesh.model import concatenate
+from fracslice.mesh.quantisation import place_and_round, quantise
+from fracslice.mesh.shells import nesting
+from fracslice.mesh.spatial import self_intersecting_triangles
 from fracslice.mesh.topology import component_sizes
 
 from .shapes import cube, inverted
@@ -176,7 +176,7 @@ def test_quantised_are_the_triangles_that_stay_with_their_edits(threads: int) ->
     stay = np.flatnonzero((edited[:, 0] >= 0) & (of % 2 == 0))
     number = np.cumsum(keep) - 1
     assert (result.mesh.triangles == number[edited[stay]]).all()
-    assert (result.mesh.vertices == placed(LOOSE.vertices[keep], (2, (1, 2, 3), 0.5))).all()
+    assert (result.mesh.vertices == place_and_round(LOOSE.vertices[keep], (2, (1, 2, 3), 0.5))).all()
     there = np.flatnonzero(np.isin(rows, stay))
     assert (stay[result.places[there]] == rows[there]).all() and (np.delete(result.places, there) == -1).all()
 
@@ -191,7 +191,7 @@ def test_shells_in_shells() -> None:
             solid = cube(size, at=(x - size / 2 + number / 100, y - size / 2, 20 * number - size / 2))
             parts.append(inverted(solid) if k % 2 else solid)
     order = RNG.permutation(len(parts))
-    mesh = joined([parts[k] for k in order])
+    mesh = concatenate([parts[k] for k in order])
     labels, count = connected_components(mesh.triangles, len(mesh.vertices))
     volumes = component_sizes(mesh.vertices, mesh.triangles, labels, count).volumes
     at = np.empty(count, int)

@@ -8,7 +8,7 @@ import pytest
 from fracslice._native import trust_regions
 from fracslice.formulas import Node, box, mandelbulb, sphere, transform, union
 from fracslice.kernel import compile_scene
-from fracslice.mesh.projection import project
+from fracslice.mesh.contouring import project
 from fracslice.volume.accuracy import surface_error
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from fracslice.errors import MeshError
 from fracslice.export import write
-from fracslice.mesh.check import check_mesh
+from fracslice.mesh.checks import check_mesh
 from fracslice.mesh.reading import read_mesh
 
 from .shapes import cube

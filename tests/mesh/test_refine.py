@@ -23,7 +23,7 @@ from fracslice.formulas import (
 )
 from fracslice.kernel import reference
 from fracslice.mesh import Mesh
-from fracslice.mesh.check import check_mesh
+from fracslice.mesh.checks import check_mesh
 from fracslice.mesh.extract import contour
 from fracslice.mesh.refine import refine
 from fracslice.scene import scene

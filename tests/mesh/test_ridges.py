@@ -10,14 +10,13 @@ from scipy.spatial import HalfspaceIntersection
 
 from fracslice.formulas import Node, difference, intersection, mandelbulb, menger, plane, sphere, transform
 from fracslice.mesh import Mesh
-from fracslice.mesh.check import check_mesh
+from fracslice.mesh.checks import check_mesh
 from fracslice.mesh.extract import contour_whole
-from fracslice.mesh.nearest import Nearest
 from fracslice.mesh.pieces import Pieces
-from fracslice.mesh.pointed_vertices import Pointed
-from fracslice.mesh.quantisation import quantised
+from fracslice.mesh.quantisation import quantise_mesh
 from fracslice.mesh.ridges import with_ridges
-from fracslice.mesh.tips import with_tips
+from fracslice.mesh.spatial import Nearest
+from fracslice.mesh.tips import Pointed, with_tips
 from fracslice.volume import plan, sample_scene
 from fracslice.work import Work
 
@@ -88,7 +87,7 @@ def test_edges_of_solids(sides: np.ndarray, turn: tuple[float, float, float, flo
     away = off(sharp, edges, voxel)
     assert np.quantile(away, 0.99) < 0.05
     assert away.max() < 0.15
-    report = check_mesh(quantised(sharp))
+    report = check_mesh(quantise_mesh(sharp))
     assert report.printable and report.components == 1
 
 
@@ -99,7 +98,7 @@ def test_a_valley_of_60_degrees() -> None:
     before, sharp, voxel = made(root, 48)
     assert off(before, inner, voxel).max() > 0.2
     assert off(sharp, inner, voxel).max() < 0.05
-    assert check_mesh(quantised(sharp)).printable
+    assert check_mesh(quantise_mesh(sharp)).printable
 
 
 def test_the_rim_of_a_lens() -> None:
@@ -109,7 +108,7 @@ def test_the_rim_of_a_lens() -> None:
     before, sharp, voxel = made(transform(intersection(*balls), rotate=TURN), 48)
     assert off(before, turned(rim, TURN), voxel).max() > 0.3
     assert off(sharp, turned(rim, TURN), voxel).max() < 0.03
-    assert check_mesh(quantised(sharp)).printable
+    assert check_mesh(quantise_mesh(sharp)).printable
 
 
 def test_sharp_edges_are_the_same_for_any_number_of_threads() -> None:

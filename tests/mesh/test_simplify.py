@@ -10,13 +10,11 @@ import pytest
 from fracslice.errors import Cancelled, MeshError
 from fracslice.formulas import box, cylinder, difference, mandelbulb, menger, transform, union
 from fracslice.mesh import Mesh
-from fracslice.mesh.check import check_mesh
-from fracslice.mesh.collapse import Collapse
+from fracslice.mesh.checks import check_mesh
 from fracslice.mesh.extract import contour
-from fracslice.mesh.nearest import Nearest
-from fracslice.mesh.quantisation import quantised
-from fracslice.mesh.self_intersections import self_intersecting_triangles
-from fracslice.mesh.simplify import simplify
+from fracslice.mesh.quantisation import quantise_mesh
+from fracslice.mesh.simplify import Collapse, simplify
+from fracslice.mesh.spatial import Nearest, self_intersecting_triangles
 from fracslice.mesh.topology import edge_topology
 from fracslice.volume import plan, sample_scene
 from fracslice.work import Work
@@ -26,7 +24,7 @@ from . import shapes
 
 def fine(root, resolution: float) -> Mesh:
     planned = plan(root, resolution)
-    return quantised(contour(planned.root, sample_scene(planned)).scaled(10))
+    return quantise_mesh(contour(planned.root, sample_scene(planned)).scaled(10))
 
 
 def divided(mesh: Mesh, times: int) -> Mesh:

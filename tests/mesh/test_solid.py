@@ -7,9 +7,9 @@ import pytest
 
 from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
-from fracslice.mesh.check import check_mesh
-from fracslice.mesh.clean import cleaned
-from fracslice.mesh.quantisation import quantised
+from fracslice.mesh.checks import check_mesh
+from fracslice.mesh.cleaning import clean
+from fracslice.mesh.quantisation import quantise_mesh
 from fracslice.mesh.solid import to_manifold
 
 from .shapes import GOOD, cube, sphere, with_flipped, without
@@ -30,8 +30,8 @@ def test_manifold3d_refuses_in_plain_words(spoil) -> None:  # type: ignore[no-un
 
 def test_rounding_is_done_once() -> None:
     mesh = sphere(level=4)
-    once = quantised(mesh.translated((0.1, 0.2, 0.3)))
-    twice = quantised(once)
+    once = quantise_mesh(mesh.translated((0.1, 0.2, 0.3)))
+    twice = quantise_mesh(once)
     assert np.array_equal(once.vertices, once.vertices.astype(np.float32))
     assert np.array_equal(once.vertices, twice.vertices)
     assert np.array_equal(once.triangles, twice.triangles)
@@ -51,20 +51,20 @@ def slivered(mesh: Mesh, seed: int) -> Mesh:
     return Mesh(np.array(vertices), np.array(triangles, np.int32))
 
 
-def clean(mesh: Mesh) -> Mesh:
-    return cleaned(mesh, np.ones(len(mesh.vertices), bool)).mesh
+def cleaned(mesh: Mesh) -> Mesh:
+    return clean(mesh, np.ones(len(mesh.vertices), bool)).mesh
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_cleaning_takes_out_what_rounding_flattens(seed: int) -> None:
     mesh = slivered(sphere(20, at=(50, 50, 50)), seed)
     assert check_mesh(mesh).degenerate_triangles > 20
-    report = check_mesh(clean(mesh))
+    report = check_mesh(cleaned(mesh))
     assert report.problems == ()
     assert report.volume_mm3 == pytest.approx(mesh.volume, rel=1e-3)
     assert report.vertices >= 600
 
 
 def test_cleaning_leaves_good_meshes_alone() -> None:
-    mesh = quantised(cube())
-    assert np.array_equal(clean(mesh).corners, mesh.corners)
+    mesh = quantise_mesh(cube())
+    assert np.array_equal(cleaned(mesh).corners, mesh.corners)

@@ -10,13 +10,10 @@ import pytest
 
 from fracslice.formulas import Node, box, difference, mandelbulb, menger, shell, sphere, transform
 from fracslice.mesh import Mesh
-from fracslice.mesh.check import check_mesh
-from fracslice.mesh.clean import cleaned
+from fracslice.mesh.checks import MeshReport, Tally, check_mesh
+from fracslice.mesh.cleaning import Finished, clean
 from fracslice.mesh.extract import contour
-from fracslice.mesh.halo import Finished
-from fracslice.mesh.mesh_report import MeshReport
 from fracslice.mesh.quantisation import grid_planes
-from fracslice.mesh.tally import Tally
 from fracslice.volume import plan, sample_scene
 
 SOLIDS: dict[str, Node] = {
@@ -42,7 +39,7 @@ def both(
     mesh: Mesh, planes: np.ndarray, fresh: np.ndarray = NOTHING, threads: int = 2
 ) -> tuple[MeshReport, MeshReport]:
     """The report on a cleaned mesh by a search of its suspects, and by a search of all of it."""
-    result = cleaned(mesh, np.ones(len(mesh.vertices), bool), fresh, planes=planes, threads=threads)
+    result = clean(mesh, np.ones(len(mesh.vertices), bool), fresh, planes=planes, threads=threads)
     whole, tally = check_mesh(result.mesh), Tally(threads)
     tally.add(Finished.whole(result.mesh, result.suspects))
     report = tally.report(whole.components, whole.cavities, whole.misplaced_shells)
@@ -108,6 +105,6 @@ def test_what_the_bed_moves_through_a_plane_is_searched() -> None:
         """By the height of the lowest vertices above a plane of the grid that is at z = 0."""
         down = planes[np.searchsorted(planes[:, 2], low) - 1, 2] - low + height
         frame = (1.0, (0.0, 0.0, float(down)), bed)
-        return len(cleaned(mesh, keep, planes=planes + [0, 0, down], frame=frame).suspects)
+        return len(clean(mesh, keep, planes=planes + [0, 0, down], frame=frame).suspects)
 
     assert suspects(0.3 * voxel, -np.inf) <= 12 < suspects(0.3 * voxel, 0.5 * voxel)

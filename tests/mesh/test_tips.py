@@ -9,13 +9,12 @@ from scipy.spatial.transform import Rotation
 from fracslice import MeshJob, make_mesh
 from fracslice.formulas import Node, box, cone, menger, octahedron, sphere, transform, union
 from fracslice.mesh import Mesh
-from fracslice.mesh.check import check_mesh
+from fracslice.mesh.checks import check_mesh
 from fracslice.mesh.contouring import Piece
 from fracslice.mesh.extract import contour
 from fracslice.mesh.pieces import Pieces
-from fracslice.mesh.pointed_vertices import Pointed
-from fracslice.mesh.quantisation import quantised
-from fracslice.mesh.tips import with_tips
+from fracslice.mesh.quantisation import quantise_mesh
+from fracslice.mesh.tips import Pointed, with_tips
 from fracslice.scene import scene
 from fracslice.volume import plan, sample_scene
 from fracslice.work import Work
@@ -50,7 +49,7 @@ def test_all_tips_of_an_octahedron(turn: tuple[float, float, float, float]) -> N
     if turn != TURNS[-1]:  # that one has them all
         assert nearest(mesh, tips).max() > 0.2 * voxel
     assert abs(tipped.volume / (4 / 3) - 1) <= abs(mesh.volume / (4 / 3) - 1)
-    assert check_mesh(quantised(tipped)).printable
+    assert check_mesh(quantise_mesh(tipped)).printable
 
 
 @pytest.mark.parametrize(("radius", "height"), [(0.5, 2.0), (0.1, 2.0)])

@@ -7,7 +7,7 @@ import pytest
 
 from fracslice.formulas import sphere
 from fracslice.kernel import compile_scene
-from fracslice.printing.capsules import capsules
+from fracslice.printing.bridging import capsules
 from fracslice.printing.samples import positions
 from fracslice.volume import Bricks, Lattice, sample
 

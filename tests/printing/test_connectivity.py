@@ -9,12 +9,12 @@ from fracslice import MeshJob, make_mesh
 from fracslice.formulas import Node, box, julia, mandelbulb, shell, sphere, transform, union
 from fracslice.mesh import extract
 from fracslice.mesh.extract import contour_pieces
-from fracslice.printing import connectivity, printable
-from fracslice.printing.connectivity import resolved
+from fracslice.printing import printable
+from fracslice.printing import thin_features as connectivity
+from fracslice.printing.components import SolidComponents, components_of, thin_share
 from fracslice.printing.edits import EditedField
 from fracslice.printing.preparation import COARSE
-from fracslice.printing.solid_components import SolidComponents, components_of, thin_share
-from fracslice.printing.thin_features import thin_features
+from fracslice.printing.thin_features import resolve_connectivity, thin_features
 from fracslice.scene import Print, scene
 from fracslice.volume import Lattice, Plan, plan, sample, sample_scene_signs
 from fracslice.volume.sizing import Sizing
@@ -126,7 +126,7 @@ def test_what_is_thick_is_not_looked_at_again() -> None:
     for root, loose in ((box(), True), (mandelbulb(iterations=4), False)):
         planned = plan(root, 48)
         bricks = sample(planned.root.kernel(), planned.root.bounds, planned.lattice)
-        assert resolved(planned.root, bricks, 1e-3, loose, Work()) is bricks
+        assert resolve_connectivity(planned.root, bricks, 1e-3, loose, Work()) is bricks
 
 
 def test_a_thin_shell_is_kept_and_thickened_in_a_mesh() -> None:

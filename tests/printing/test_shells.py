@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fracslice.formulas import Node, box, difference, julia, shell, sphere, transform, union
-from fracslice.printing.limits import Limits
+from fracslice.printing.problems import Limits
 from fracslice.printing.solid_checks import SolidReport, check_object
 from fracslice.volume import plan
 

@@ -34,12 +34,11 @@ from fracslice.formulas import (
     union,
 )
 from fracslice.printing import printable
-from fracslice.printing.framing import framed
-from fracslice.printing.limits import Limits
-from fracslice.printing.problems import Problem
+from fracslice.printing.components import components_of
+from fracslice.printing.framing import frame_bodies
+from fracslice.printing.problems import Limits, Problem
 from fracslice.printing.samples import Samples
 from fracslice.printing.solid_checks import SolidReport, check_object
-from fracslice.printing.solid_components import components_of
 from fracslice.printing.walls import walls
 from fracslice.printing.widths import Widths
 from fracslice.scene import Print, scene
@@ -65,7 +64,7 @@ def made(root: Node, **printing: float | str) -> tuple[Samples, float]:
     """The distances of a printable object of 20 mm on 0.2 mm samples, and its scale."""
     how, planned = Print(**printing), plan(root, 100)  # type: ignore[arg-type]
     if how.bodies is not None:
-        planned = framed(planned, Sizing(SIZE), how.bodies, Work())
+        planned = frame_bodies(planned, Sizing(SIZE), how.bodies, Work())
     thing, scale = printable(planned, Sizing(SIZE), how)
     return distances(thing), scale
 

@@ -7,8 +7,8 @@ import pytest
 
 from fracslice.formulas import Node, box, cylinder, difference, julia, shell, sphere, transform, union
 from fracslice.printing import printable
+from fracslice.printing.components import SolidComponents, components_of
 from fracslice.printing.samples import Samples, together
-from fracslice.printing.solid_components import SolidComponents, components_of
 from fracslice.printing.walls import walls
 from fracslice.scene import Print
 from fracslice.volume import Plan, plan, sample_scene

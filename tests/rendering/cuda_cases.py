@@ -23,7 +23,7 @@ from fracslice.formulas import (
 )
 from fracslice.rendering.cpu import BLOCK
 from fracslice.rendering.linking import Frame, link_frame
-from fracslice.rendering.optics import optics
+from fracslice.rendering.setup import optics
 from fracslice.scene.view import Camera, Film, Fog, Light, Shading, View
 
 WIDTH, HEIGHT = 11, 9

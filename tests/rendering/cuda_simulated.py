@@ -7,12 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from fracslice.kernel.cuda import require
-from fracslice.rendering.accumulator import CHANNELS, PassPlan
+from fracslice.rendering.accumulator import CHANNELS, PassPlan, tile_order
 from fracslice.rendering.cpu import CpuTracer
 from fracslice.rendering.cuda import CudaTracer
 from fracslice.rendering.cuda_accumulator import CudaAccumulator
 from fracslice.rendering.host_accumulator import HostAccumulator
-from fracslice.rendering.tiles import ordered
 from fracslice.scene.view import Film, Light, Shading, View
 from fracslice.work import Work
 from tests.rendering.cuda_cases import CASES, HEIGHT, WIDTH, frame
@@ -28,7 +27,7 @@ def kernels() -> None:
             picture.channels[..., 5:7] = SAMPLE, SAMPLE + 1
         cpu, gpu = (kind(frame(name), SINGLE, WIDTH, HEIGHT) for kind in (CpuTracer, CudaTracer))
         cpu.look_ahead(Work(1)), gpu.look_ahead(Work(1))
-        plan = PassPlan(ordered(WIDTH, HEIGHT), WIDTH * HEIGHT, SAMPLE + 1)
+        plan = PassPlan(tile_order(WIDTH, HEIGHT), WIDTH * HEIGHT, SAMPLE + 1)
         cpu.add(pictures[0].sums, plan, Work(1))
         placed, pixels = (require().to_device(a) for a in (pictures[1].sums, plan.pixels))
         gpu.add(placed, replace(plan, pixels=pixels, last=SAMPLE + 1), Work(1))

@@ -7,9 +7,18 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fracslice.rendering.accumulator import CHANNELS, COARSE, COUNT, GOAL, SOON, UNIFORM, grids, least_gain
-from fracslice.rendering.host_accumulator import HostAccumulator, filled
-from fracslice.rendering.tiles import ordered
+from fracslice.rendering.accumulator import (
+    CHANNELS,
+    COARSE,
+    COUNT,
+    GOAL,
+    SOON,
+    UNIFORM,
+    grids,
+    least_gain,
+    tile_order,
+)
+from fracslice.rendering.host_accumulator import HostAccumulator, fill_gaps
 from fracslice.rendering.units.pixel import squared_error
 from fracslice.scene.view import View
 from fracslice.work import Work
@@ -38,7 +47,7 @@ def test_pixels_are_chosen_alike_by_any_number_of_threads() -> None:
 
 def test_every_pixel_is_in_the_order_once() -> None:
     for width, height in ((1, 1), (70, 33), (64, 32), (5, 64)):
-        pixels = ordered(width, height)
+        pixels = tile_order(width, height)
         places = (pixels >> 16) * width + (pixels & 65535)
         np.testing.assert_array_equal(np.sort(places), np.arange(width * height))
 
@@ -108,7 +117,7 @@ def test_pixels_without_samples_show_those_around() -> None:
     known = rng.random((HEIGHT, WIDTH)) < 0.05
     known[:16, :16] = False
     mean = np.where(known[..., None], rng.random((HEIGHT, WIDTH, 4)), 0).astype(np.float32)
-    result = filled(mean.copy(), known, Work(2))
+    result = fill_gaps(mean.copy(), known, Work(2))
     np.testing.assert_array_equal(result[known], mean[known])
     for y, x in zip(*np.nonzero(~known), strict=True):
         side = next(s for s in (4, 16, 64) if known[y // s * s :, x // s * s :][:s, :s].any())

@@ -9,9 +9,8 @@ import pytest
 
 from fracslice.errors import SceneError
 from fracslice.formulas import mandelbulb, sphere
-from fracslice.rendering.cameras import camera_unit
-from fracslice.rendering.optics import footprint
-from fracslice.rendering.setup import prepare
+from fracslice.rendering.linking import camera_unit
+from fracslice.rendering.setup import footprint, prepare
 from fracslice.scene.view import Camera, View
 
 from .rays import distances

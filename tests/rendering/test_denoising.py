@@ -50,7 +50,7 @@ def test_the_error_falls_without_the_library(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(denoising, "advice", lambda: "missing")
     noisy = rendered(4)
     before = noisy.seen()
-    after = denoising.denoised(noisy)
+    after = denoising.denoise(noisy)
     errors = [error(seen.developed) for seen in (after, before)]
     assert errors[0] < 0.6 * errors[1], errors
     assert (after.alpha == before.alpha).all()
@@ -61,7 +61,7 @@ def test_open_image_denoise_falls_further(monkeypatch: pytest.MonkeyPatch) -> No
     if denoising.advice():
         pytest.skip("pyoidn is not there")
     noisy = rendered(4)
-    errors = [error(seen.developed) for seen in (denoising.denoised(noisy), noisy.seen())]
+    errors = [error(seen.developed) for seen in (denoising.denoise(noisy), noisy.seen())]
     assert errors[0] < 0.55 * errors[1], errors
 
 
@@ -77,7 +77,7 @@ def test_the_library_is_given_linear_light_and_its_guides(monkeypatch: pytest.Mo
     monkeypatch.setitem(sys.modules, "pyoidn", library)
     monkeypatch.setattr(denoising, "advice", lambda: "")
     noisy = rendered(1)
-    clean = denoising.denoised(noisy)
+    clean = denoising.denoise(noisy)
     assert np.allclose(clean.image, 2 * noisy.seen().image)
     albedo, normal = given["albedo"], given["normal"]
     assert given["hdr"] is True

@@ -12,8 +12,7 @@ from PIL import Image
 from fracslice.errors import SceneError
 from fracslice.formulas import Node, material, plane, sphere
 from fracslice.rendering import Pass, Renderer, lighting
-from fracslice.rendering.environments import Environment
-from fracslice.rendering.image_files import LinearImage, load_picture
+from fracslice.rendering.environments import Environment, LinearImage, load_picture
 from fracslice.rendering.units import environment as units
 from fracslice.rendering.units.glossy import glossy, highlight
 from fracslice.rendering.units.pixel import linear

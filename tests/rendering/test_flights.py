@@ -7,8 +7,8 @@ import pytest
 
 from fracslice.errors import SceneError
 from fracslice.formulas import Node, mandelbulb, sphere
+from fracslice.rendering.live import CameraInput
 from fracslice.rendering.setup import RenderSetup, clearance, prepare
-from fracslice.rendering.steering import CameraInput
 from fracslice.scene.view import Camera, View
 
 AHEAD = CameraInput(forward=1, pace=2)

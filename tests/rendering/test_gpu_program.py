@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fracslice.rendering.tiles import ordered
+from fracslice.rendering.accumulator import tile_order
 from tests.benchmarks.gpu import frame as gpu
 from tests.benchmarks.gpu.cpp import translated
 
@@ -24,7 +24,7 @@ def test_the_program_draws_the_picture_of_the_renderer(
     width, height = 96, 54
     for name, value in {"WIDTH": width, "HEIGHT": height, "TIMES": 1}.items():
         monkeypatch.setattr(gpu, name, value)
-    seen, pixels = gpu.frame(width, height), ordered(width, height)
+    seen, pixels = gpu.frame(width, height), tile_order(width, height)
     gpu.given(seen, pixels).tofile(tmp_path / "given")
     launched = re.sub(r"tile<<<(.+?), 128>>>\((.+?)\);", r"launch(\1, [&] { tile(\2); });", gpu.program(seen))
     text = translated(seen.linked.source, seen.linked.parameters.tolist()) + launched

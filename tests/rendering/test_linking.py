@@ -10,7 +10,7 @@ from fracslice.formulas.material import TRAPS
 from fracslice.formulas.registry import Node
 from fracslice.kernel.linker import link
 from fracslice.rendering.linking import Frame, link_frame
-from fracslice.rendering.optics import optics
+from fracslice.rendering.setup import optics
 from fracslice.scene.view import Camera, Fog, Light, Shading, View
 
 CAMERA = Camera(eye=(2, -2, 1))

@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 
 from fracslice.errors import SceneError
-from fracslice.rendering.live import Live
-from fracslice.rendering.steering import CameraInput
+from fracslice.rendering.live import CameraInput, Live
 from fracslice.scene.view import Camera
-from fracslice.viewer.controls import Controls
+from fracslice.viewer.viewer import Controls
 from fracslice.work import Work
 
 SCENE = '<scene version="1"><solid size="80mm">{}</solid><camera eye="3 -2 1"/><film samples="4"/></scene>'

@@ -21,7 +21,8 @@ from fracslice.formulas import (
     union,
 )
 from fracslice.kernel import compile_scene, reference
-from fracslice.rendering import Renderer, optics
+from fracslice.rendering import Renderer
+from fracslice.rendering import setup as optics
 from fracslice.scene import library, read
 from fracslice.scene.view import Camera, Film, Light, Shading, View
 from fracslice.work import Work

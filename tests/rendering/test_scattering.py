@@ -18,7 +18,7 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.rendering import Renderer, colours
+from fracslice.rendering import Renderer, materials
 from fracslice.rendering.glow import glowing_bodies
 from fracslice.rendering.units.glossy import glossy, highlight
 from fracslice.rendering.units.pixel import linear
@@ -140,7 +140,7 @@ def test_rays_to_glowing_bodies_change_no_mean(rough: float, monkeypatch: pytest
     root = lamp | material(sphere(radius=0.3), glow=2, colour=WHITE) + (-0.6, 0, 0.5) | floor
     shading, means = Shading(paths="yes", bounces=2), []
     for bodies in (glowing_bodies, lambda _: []):
-        monkeypatch.setattr(colours, "glowing_bodies", bodies)
+        monkeypatch.setattr(materials, "glowing_bodies", bodies)
         means.append(seen(root, shading, 512, camera, lights=lights).mean(0))
     assert means[0] == pytest.approx(means[1], rel=0.01)
 

@@ -21,14 +21,11 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.printing.limits import Limits
-from fracslice.printing.problems import Problem, verdict
+from fracslice.printing.problems import Limits, Problem, verdict
 from fracslice.scene import Print
 from fracslice.slicing import SliceJob, Slicer, plan_stack
-from fracslice.slicing.feature_graph import Graph
-from fracslice.slicing.layer_checks import PrintReport, check_layers
-from fracslice.slicing.layer_problems import misfit
-from fracslice.slicing.overhangs import farthest, unsupported
+from fracslice.slicing.feature_graph import Graph, farthest, unsupported_pixels
+from fracslice.slicing.layer_checks import PrintReport, check_layers, misfit
 from fracslice.slicing.printers import PRINTERS
 from fracslice.slicing.runs import Runs, layer_components, overlaps
 from fracslice.slicing.thickness import widths
@@ -163,7 +160,7 @@ def test_cantilevers_are_measured_by_the_limit_with_any_pixel(pixel: float) -> N
     def reaches(count: int) -> bool:
         above[5:15, 20 : 20 + count] = True
         solid = runs_of(above)
-        bare = unsupported(runs_of(below), solid, 1.0)
+        bare = unsupported_pixels(runs_of(below), solid, 1.0)
         return farthest(solid, bare, 1, (pixel, pixel), 10 * pixel, 100 * pixel) is not None
 
     assert not reaches(11)  # the first pixel rests on the one below
@@ -290,9 +287,9 @@ def test_parts_by_hand() -> None:
     assert empty.nodes.open[np.argsort(empty.nodes.area)].tolist() == [False, True]
     other, _ = layer_components(runs_of(np.roll(image, 1, 1)))
     assert overlaps(solid, other).tolist() == [[0, 0]]
-    bare = unsupported(solid.runs, other.runs, 0.0)
+    bare = unsupported_pixels(solid.runs, other.runs, 0.0)
     assert (bare.end - bare.begin).sum() == 5 - (image & np.roll(image, 1, 1) > 0).sum()
-    assert not len(unsupported(solid.runs, other.runs, 1.0).begin)
+    assert not len(unsupported_pixels(solid.runs, other.runs, 1.0).begin)
 
 
 def test_time_is_linear_in_the_holes() -> None:

@@ -31,7 +31,7 @@ from fracslice.formulas.field import Bounds
 from fracslice.jobs.completeness import layers_amount
 from fracslice.scene import scene
 from fracslice.slicing import Layer, SliceJob, Slicer, Stack, plan_stack
-from fracslice.slicing.slab import Sampler
+from fracslice.slicing.layers import Sampler
 from fracslice.work import Work
 from tests.examples import EXAMPLES
 

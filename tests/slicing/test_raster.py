@@ -14,10 +14,9 @@ from fracslice._slices import Encoding, encoded
 from fracslice.errors import SliceError
 from fracslice.formulas import Node, box, mandelbulb, menger, sphere, transform, union
 from fracslice.slicing import Layer, SliceJob, Slicer, Stack, plan_stack
-from fracslice.slicing.blur import blurred
-from fracslice.slicing.compensation import compensated
+from fracslice.slicing.compensation import compensate
 from fracslice.slicing.printers import Printer, printer
-from fracslice.slicing.raster import Screen
+from fracslice.slicing.raster import Screen, blur
 
 SMALL = Printer("small", "Small", (120, 100), (12.0, 10.0), 30)
 
@@ -184,8 +183,8 @@ def test_a_compensation_that_leaves_nothing_is_refused() -> None:
 def test_compensation_of_a_straight_edge_is_exact() -> None:
     image = np.zeros((9, 12), np.uint8)
     image[:, :5], image[:, 5] = 255, 128
-    assert compensated(image, 0.13, (0.1, 0.1))[4].tolist() == [255] * 6 + [205] + [0] * 5
-    assert compensated(image, -0.13, (0.1, 0.1))[4].tolist() == [255] * 4 + [51] + [0] * 7
+    assert compensate(image, 0.13, (0.1, 0.1))[4].tolist() == [255] * 6 + [205] + [0] * 5
+    assert compensate(image, -0.13, (0.1, 0.1))[4].tolist() == [255] * 4 + [51] + [0] * 7
 
 
 def test_gamma_leaves_black_and_white() -> None:
@@ -211,7 +210,7 @@ def test_blur_is_the_mean_over_a_square() -> None:
     dot[3, 4] = 250
     expected = np.zeros((7, 9))
     expected[2:5, 3:6] = 28
-    assert (blurred(dot, 1) == expected).all()
+    assert (blur(dot, 1) == expected).all()
     machine = Printer("s", "S", (200, 200), (20.0, 20.0), 30)
     stack = stack_of(box(size=(6, 6, 6)))
     sharp, soft = (picture(Screen(stack, machine, blur=b)).astype(int) for b in (0, 3))

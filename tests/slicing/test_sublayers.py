@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from fracslice.errors import ExportError, SliceError
-from fracslice.export.jobs import SliceRun
 from fracslice.export.layer_files import write_slices
+from fracslice.export.slice_run import SliceRun
 from fracslice.formulas import Node, box, intersection, transform
 from fracslice.slicing import SliceJob, Slicer, Stack, adapted, plan_stack
+from fracslice.slicing.layers import MeanSlicer
 from fracslice.slicing.raster import Screen
-from fracslice.slicing.sublayers import MeanSlicer
 from fracslice.work import Work
 
 SLOPE = 0.12

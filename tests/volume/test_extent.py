@@ -31,7 +31,7 @@ from fracslice.formulas import (
 from fracslice.formulas.box import Box
 from fracslice.formulas.field import Bounds, Device, Kernel, Precision
 from fracslice.kernel import compile_scene
-from fracslice.kernel.arrays import ArrayField
+from fracslice.kernel.tree import ArrayField
 from fracslice.scene import Print, scene
 from fracslice.slicing import SliceJob, plan_stack
 from fracslice.volume import extent, plan

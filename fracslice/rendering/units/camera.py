@@ -4,18 +4,13 @@ from __future__ import annotations
 
 from ...formulas.vocabulary import cos, maximum, minimum, sin, sqrt, where
 from .lights import disc
-from .normal import normalised
+from .march import normalised
 
 
 def pinhole(px, py, lens_u, lens_v, eye, corner, across, down):
     """Return the ray of a pinhole camera through a film position.
 
-    Parameters
-    ----------
-    corner : tuple of float
-        Direction to the film's upper left corner.
-    across, down : tuple of float
-        Change of direction per pixel, to the right and down.
+    `across`, `down`: change of direction per pixel.
     """
     ex, ey, ez = eye
     cx, cy, cz = corner
@@ -31,16 +26,7 @@ def lens(px, py, lens_u, lens_v, eye, corner, across, down, right, up, focus):
 
     The ray runs from a point of the lens to the intersection of the pinhole ray with the plane of focus.
 
-    Parameters
-    ----------
-    corner : tuple of float
-        Direction to the film's upper left corner.
-    across, down : tuple of float
-        Change of direction per pixel, to the right and down.
-    right, up : tuple of float
-        Half axes of the lens.
-    focus : float
-        Distance of the plane of focus.
+    `across`, `down`: change of direction per pixel.
     """
     ex, ey, ez = eye
     cx, cy, cz = corner
@@ -62,15 +48,7 @@ def lens(px, py, lens_u, lens_v, eye, corner, across, down, right, up, focus):
 def stereo_half(px, width):
     """Return the picture of two side by side that a film position is in, and the position in that picture.
 
-    Parameters
-    ----------
-    width : float
-        Width of one picture, pixels.
-
-    Returns
-    -------
-    second, column : float
-        -1 in the left picture, 1 in the right one; position across it, pixels.
+    `width` in pixels.
     """
     second = where(px < width, -1.0, 1.0 + 0.0 * px)
     return second, px - maximum(second, 0.0) * width
@@ -81,18 +59,7 @@ def stereo(px, py, lens_u, lens_v, eye, corner, across, down, offset, half, focu
 
     Both pictures agree at the distance `focus`: the axes are parallel and the films shifted.
 
-    Parameters
-    ----------
-    eye : tuple of float
-        Point between the eyes.
-    corner, across, down : tuple of float
-        As for `pinhole`, of one picture.
-    offset : tuple of float
-        From that point to the right eye.
-    half : float
-        Width of one picture, pixels.
-    focus : float
-        Distance at which the pictures agree.
+    `half` in pixels.
     """
     ex, ey, ez = eye
     cx, cy, cz = corner
@@ -113,16 +80,7 @@ def stereo(px, py, lens_u, lens_v, eye, corner, across, down, offset, half, focu
 def orthographic(px, py, lens_u, lens_v, eye, corner, across, down, forward):
     """Return one of parallel rays.
 
-    Parameters
-    ----------
-    eye : tuple of float
-        Not used: `corner` holds it.
-    corner : tuple of float
-        Position of the film's upper left corner.
-    across, down : tuple of float
-        Change of position per pixel, to the right and down.
-    forward : tuple of float
-        Unit direction of all rays.
+    `across`, `down`: change of position per pixel.
     """
     cx, cy, cz = corner
     ax, ay, az = across
@@ -138,19 +96,7 @@ def orthographic(px, py, lens_u, lens_v, eye, corner, across, down, forward):
 def fisheye(px, py, lens_u, lens_v, eye, right, up, forward, middle, pixel):
     """Return the ray of an equidistant fisheye: its angle grows evenly from the middle of the film.
 
-    Parameters
-    ----------
-    right, up, forward : tuple of float
-        Unit axes of the camera.
-    middle : tuple of float
-        Middle of the film, pixels.
-    pixel : float
-        Angle of a pixel, radians.
-
-    Returns
-    -------
-    ox, oy, oz, dx, dy, dz : float
-        Origin and unit direction. Beyond 180 degrees from the middle, rays look back.
+    `middle` in pixels; `pixel`: angle of a pixel, radians.
     """
     ex, ey, ez = eye
     rx, ry, rz = right
@@ -178,14 +124,7 @@ def equirectangular(px, py, lens_u, lens_v, eye, right, up, forward, width, heig
     With a radius, there is one such picture for each eye, side by side, and the eyes turn with the longitude
     (Peleg, Ben-Ezra and Pritch 2001, "Omnistereo: Panoramic Stereo Imaging").
 
-    Parameters
-    ----------
-    right, up, forward : tuple of float
-        Unit axes of the camera; `forward` is in the middle of a picture.
-    width, height : float
-        Size of one picture, pixels.
-    radius : float
-        Half the distance between the eyes.
+    `width`, `height` in pixels.
     """
     ex, ey, ez = eye
     rx, ry, rz = right

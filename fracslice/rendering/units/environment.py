@@ -1,4 +1,4 @@
-"""Light from a picture of the surroundings: longitude across, latitude down.
+"""Light from a picture of the surroundings, longitude across and latitude down, and textures.
 
 The table of light holds red, green and blue of each pixel. The tables of probability hold the distribution
 function of the rows, then that of the columns of each row, every one from 0 to 1 (Pharr, Jakob and Humphreys
@@ -17,17 +17,7 @@ HALF_TURN = 3.141592653589793
 def bounded(i, count):
     """Return a whole index limited to a range.
 
-    Parameters
-    ----------
-    i : float
-        Index; NaN becomes 0.
-    count : float
-        Number of elements.
-
-    Returns
-    -------
-    float
-        Index from 0 to count - 1.
+    `i`: index.
     """
     return minimum(where(i > 0.0, i, 0.0), count - 1.0)
 
@@ -35,15 +25,7 @@ def bounded(i, count):
 def seen_at(dx, dy, dz, turn):
     """Return the point of the picture in a direction.
 
-    Parameters
-    ----------
-    turn : float
-        Rotation about the z axis, full turns.
-
-    Returns
-    -------
-    u, v : float
-        Coordinates in [0, 1], from the upper left; the middle of the picture is at +y.
+    Returns u, v coordinates in [0, 1].
     """
     u = 0.5 + atan2(dx, dy) / TURN + turn
     return u - floor(u), atan2(sqrt(dx * dx + dy * dy), dz) / HALF_TURN
@@ -52,16 +34,7 @@ def seen_at(dx, dy, dz, turn):
 def between(light, width, left, right, across, upper, lower, down, P):
     """Interpolate four pixels bilinearly.
 
-    Parameters
-    ----------
-    light : float
-        Index of the table in P.
-    width : float
-        Pixels of a row.
-    left, right, upper, lower : float
-        Columns and rows of the four pixels.
-    across, down : float
-        Weights of the right column and of the lower row.
+    `left`, `right`, `upper`, `lower`: columns and rows of the four pixels.
     """
     a = light + 3.0 * (upper * width + left)
     b = light + 3.0 * (upper * width + right)
@@ -79,17 +52,7 @@ def between(light, width, left, right, across, upper, lower, down, P):
 
 
 def surroundings(dx, dy, dz, light, width, height, turn, tint, P):
-    """Return the light from a direction.
-
-    Parameters
-    ----------
-    light : float
-        Index of the table of light in P.
-    turn : float
-        Rotation about the z axis, full turns.
-    tint : tuple of float
-        Factor on red, green and blue.
-    """
+    """Return the light from a direction."""
     tr, tg, tb = tint
     u, v = seen_at(dx, dy, dz, turn)
     column = floor(u * width - 0.5)
@@ -105,30 +68,7 @@ def surroundings(dx, dy, dz, light, width, height, turn, tint, P):
 
 
 def interval(value, first, count, steps, half, P):
-    """Find the interval of a distribution function that contains a value, by bisection.
-
-    Parameters
-    ----------
-    value : float
-        Value in [0, 1).
-    first : float
-        Index of the function's first value in P; there are count + 1.
-    count : float
-        Number of intervals.
-    steps : int
-        Binary logarithm of the count, rounded up.
-    half : float
-        Largest power of two below the count.
-
-    Returns
-    -------
-    i : float
-        Number of the interval.
-    share : float
-        Position of the value in the interval, from 0 to 1.
-    density : float
-        Probability of the interval, relative to the mean one.
-    """
+    """Find the interval of a distribution function that contains a value, by bisection."""
     i = 0.0 * value
     step = i + half
     for _ in range(steps):
@@ -141,22 +81,7 @@ def interval(value, first, count, steps, half, P):
 
 
 def towards(u, v, rows, columns, size, steps, halves, turn, P):
-    """Sample a direction with a density in proportion to the light.
-
-    Parameters
-    ----------
-    rows, columns : float
-        Indices of the tables of probability in P.
-    size, steps, halves : tuple
-        Width and height of the picture; see `interval`.
-    turn : float
-        Rotation about the z axis, full turns.
-
-    Returns
-    -------
-    density : float
-        Probability density per unit solid angle.
-    """
+    """Sample a direction with a density in proportion to the light."""
     width, height = size
     across, down = steps
     half_across, half_down = halves
@@ -170,17 +95,7 @@ def towards(u, v, rows, columns, size, steps, halves, turn, P):
 
 
 def likelihood(dx, dy, dz, rows, columns, size, turn, P):
-    """Return the density with which `towards` takes a direction.
-
-    Parameters
-    ----------
-    rows, columns : float
-        Indices of the tables of probability in P.
-    size : tuple of float
-        Width and height of the picture.
-    turn : float
-        Rotation about the z axis, full turns.
-    """
+    """Return the density with which `towards` takes a direction."""
     width, height = size
     u, v = seen_at(dx, dy, dz, turn)
     row = bounded(floor(v * height), height)
@@ -196,11 +111,6 @@ def irradiance(nx, ny, nz, harmonics):
 
     Nine spherical harmonics (Ramamoorthi and Hanrahan 2001, "An Efficient Representation for Irradiance
     Environment Maps").
-
-    Parameters
-    ----------
-    harmonics : tuple of tuple of float
-        Factors of 1, y, z, x, xy, yz, 3 z^2 - 1, xz and x^2 - y^2, for red, green and blue.
     """
     hr, hg, hb = harmonics
     return harmonic(nx, ny, nz, hr), harmonic(nx, ny, nz, hg), harmonic(nx, ny, nz, hb)
@@ -209,14 +119,48 @@ def irradiance(nx, ny, nz, harmonics):
 def harmonic(x, y, z, h):
     """Return one channel of `irradiance`.
 
-    Parameters
-    ----------
-    x, y, z : float
-        Unit normal.
-    h : tuple of float
-        Nine factors.
+    `x`, `y`, `z`: unit normal; `h`: nine factors.
     """
     a, b, c, d, e, f, g, i, j = h
     linear = a + b * y + c * z + d * x
     square = e * x * y + f * y * z + g * (3.0 * z * z - 1.0) + i * x * z + j * (x * x - y * y)
     return maximum(linear + square, 0.0)
+
+
+def repeated(u, v, light, width, height, P):
+    """Return a picture that is repeated across and down.
+
+    `u`, `v`: coordinates, pictures.
+    """
+    a = width * (u - floor(u)) - 0.5
+    b = height * (v - floor(v)) - 0.5
+    column = floor(a)
+    row = floor(b)
+    left = bounded(where(column < 0.0, width - 1.0, column), width)
+    upper = bounded(where(row < 0.0, height - 1.0, row), height)
+    right = where(left > width - 1.5, 0.0, left + 1.0)
+    lower = where(upper > height - 1.5, 0.0, upper + 1.0)
+    return between(light, width, left, right, a - column, upper, lower, b - row, P)
+
+
+def triplanar(x, y, z, nx, ny, nz, light, width, height, tile, P):
+    """Return a picture seen along the three axes, weighted by the fourth power of the normal.
+
+    Geiss 2007, "Generating Complex Procedural Terrains Using the GPU", in GPU Gems 3.
+
+    `tile` in scene units.
+    """
+    across = 1.0 / tile
+    down = -across * width / height
+    ar, ag, ab = repeated(across * y, down * z, light, width, height, P)
+    br, bg, bb = repeated(across * x, down * z, light, width, height, P)
+    cr, cg, cb = repeated(across * x, down * y, light, width, height, P)
+    a = nx * nx * nx * nx
+    b = ny * ny * ny * ny
+    c = nz * nz * nz * nz
+    over = 1.0 / (a + b + c)
+    return (
+        over * (a * ar + b * br + c * cr),
+        over * (a * ag + b * bg + c * cg),
+        over * (a * ab + b * bb + c * cb),
+    )

@@ -8,12 +8,7 @@ from ...formulas.vocabulary import absolute, exp, maximum, minimum, where
 def fog(t, density):
     """Transmittance of fog (Beer-Lambert law).
 
-    Parameters
-    ----------
-    t : float
-        Distance, scene units.
-    density : float
-        Extinction per scene unit.
+    `t` in scene units; `density`: extinction per scene unit.
     """
     return exp(-density * t)
 
@@ -21,21 +16,7 @@ def fog(t, density):
 def thickness(z, density, level, height):
     """Extinction of fog that thins with the height.
 
-    Parameters
-    ----------
-    z : float
-        Height.
-    density : float
-        Extinction per scene unit at the level.
-    level : float
-        Height with that density.
-    height : float
-        Height over which it thins to 1/e.
-
-    Returns
-    -------
-    float
-        Extinction per scene unit.
+    `z`: height; `density`: extinction per scene unit at the level. Returns extinction per scene unit.
     """
     return density * exp(minimum((level - z) / height, 40.0))
 
@@ -43,14 +24,7 @@ def thickness(z, density, level, height):
 def height_fog(t, z, dz, density, level, height):
     """Transmittance of fog that thins with the height: the integral of its extinction along a ray.
 
-    Parameters
-    ----------
-    t : float
-        Distance, scene units.
-    z, dz : float
-        Height of the ray's end, and vertical component of its direction.
-    density, level, height : float
-        See `thickness`.
+    `t` in scene units; `z`, `dz`: height of the ray's end, and vertical component of its direction.
     """
     drop = minimum(maximum(t * dz / height, -40.0), 40.0)
     curved = absolute(drop) > 1e-3

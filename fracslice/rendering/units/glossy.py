@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from ...formulas.vocabulary import cos, maximum, rsqrt, sin, sqrt, where
 from .lights import TURN, frame
-from .normal import normalised
+from .march import normalised
 from .shade import fresnel, mirrored
 
 SMOOTHEST = 1e-3
@@ -17,50 +17,26 @@ LACQUER = 0.1
 
 
 def width(rough):
-    """Return the parameter of the distribution: the square of the roughness (Burley 2012).
-
-    Returns
-    -------
-    float
-        Width of the distribution of slopes.
-    """
+    """Return the parameter of the distribution: the square of the roughness (Burley 2012)."""
     return maximum(rough * rough, SMOOTHEST)
 
 
 def hidden(cosine, a):
     """Smith's Lambda: the area of microfacets hidden in a direction, relative to the visible one.
 
-    Parameters
-    ----------
-    cosine : float
-        Cosine of the angle between the direction and the normal.
-    a : float
-        Width of the distribution.
+    `a`: width of the distribution.
     """
     c2 = maximum(cosine * cosine, 1e-8)
     return 0.5 * (sqrt(1.0 + a * a * maximum(1.0 - c2, 0.0) / c2) - 1.0)
 
 
 def tinted(cosine, least):
-    """Reflectance at an angle of incidence; 0 for a surface that does not reflect.
-
-    Parameters
-    ----------
-    least : float
-        Reflectance at normal incidence.
-    """
+    """Reflectance at an angle of incidence; 0 for a surface that does not reflect."""
     return where(least > 0.0, fresnel(cosine, least), 0.0)
 
 
 def highlight(nx, ny, nz, dx, dy, dz, lx, ly, lz, rough):
-    """Return the reflection of a light, but for Fresnel's factor.
-
-    Returns
-    -------
-    value, cosine : float
-        Factor on the light (pi times the reflectance distribution times the cosine), and the cosine of the
-        angle between the light and the microfacet.
-    """
+    """Return the reflection of a light, but for Fresnel's factor."""
     a = width(rough)
     hx, hy, hz = normalised(lx - dx, ly - dy, lz - dz)
     nl = nx * lx + ny * ly + nz * lz
@@ -73,15 +49,7 @@ def highlight(nx, ny, nz, dx, dy, dz, lx, ly, lz, rough):
 
 
 def glossy(dx, dy, dz, nx, ny, nz, rough, u, v):
-    """Sample a reflected ray by the visible microfacets (Heitz 2018).
-
-    Returns
-    -------
-    x, y, z : float
-        Unit direction of reflection.
-    weight, cosine : float
-        Factor on the light but for Fresnel's, and the cosine of the angle between ray and microfacet.
-    """
+    """Sample a reflected ray by the visible microfacets (Heitz 2018)."""
     a = width(rough)
     ax, ay, az, bx, by, bz = frame(nx, ny, nz)
     vx, vy = -(ax * dx + ay * dy + az * dz), -(bx * dx + by * dy + bz * dz)

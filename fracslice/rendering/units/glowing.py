@@ -8,8 +8,7 @@ Carlo Rendering", with one sample. The ray itself finds what it meets, so that b
 from __future__ import annotations
 
 from ...formulas.vocabulary import absolute, maximum, where
-from .march import span
-from .normal import normalised
+from .march import normalised, span
 from .weights import HALF_TURN, facet_density
 
 SENT = 0.5
@@ -17,18 +16,7 @@ SENT = 0.5
 
 
 def prominence(x, y, z, nx, ny, nz, body):
-    """Return the weight with which a body is chosen.
-
-    Parameters
-    ----------
-    body : tuple of float
-        Centre and half sides of its box, and the light that it sends out.
-
-    Returns
-    -------
-    float
-        About the light that arrives; 0 below the horizon and inside the box.
-    """
+    """Return the weight with which a body is chosen."""
     cx, cy, cz, hx, hy, hz, power = body
     px, py, pz = cx - x, cy - y, cz - z
     height = px * nx + py * ny + pz * nz + hx * absolute(nx) + hy * absolute(ny) + hz * absolute(nz)
@@ -38,18 +26,7 @@ def prominence(x, y, z, nx, ny, nz, body):
 
 
 def smallness(x, y, z, body):
-    """Return the part of `SENT` for a body: rays of the surface meet a large one anyhow.
-
-    Parameters
-    ----------
-    body : tuple of float
-        See `prominence`.
-
-    Returns
-    -------
-    float
-        Near 1 for a small or distant body, near 0 for one that is larger than its distance.
-    """
+    """Return the part of `SENT` for a body: rays of the surface meet a large one anyhow."""
     cx, cy, cz, hx, hy, hz, power = body
     px, py, pz = cx - x, cy - y, cz - z
     ratio = (hx * hx + hy * hy + hz * hz) / (px * px + py * py + pz * pz)
@@ -57,20 +34,7 @@ def smallness(x, y, z, body):
 
 
 def sent_share(x, y, z, nx, ny, nz, P, bodies, count):
-    """Return the share of the rays that are sent to bodies.
-
-    Parameters
-    ----------
-    bodies : tuple of tuple of float
-        The bodies; see `prominence`.
-    count : int
-        Number of bodies.
-
-    Returns
-    -------
-    float
-        0 if no body is above the horizon.
-    """
+    """Return the share of the rays that are sent to bodies."""
     total = 0.0 * x
     small = 0.0 * x
     for k in range(count):
@@ -81,17 +45,7 @@ def sent_share(x, y, z, nx, ny, nz, P, bodies, count):
 
 
 def towards_body(x, y, z, nx, ny, nz, u, v, w, choice, P, bodies, count):
-    """Return the direction to a point of a body's box.
-
-    Parameters
-    ----------
-    u, v, w, choice : float
-        Random numbers in [0, 1) for the point and for the body.
-    bodies : tuple of tuple of float
-        The bodies; see `prominence`.
-    count : int
-        Number of bodies.
-    """
+    """Return the direction to a point of a body's box."""
     total = 0.0 * x
     px, py, pz = nx, ny, nz
     for k in range(count):
@@ -111,15 +65,7 @@ def towards_body(x, y, z, nx, ny, nz, u, v, w, choice, P, bodies, count):
 
 
 def body_density(x, y, z, nx, ny, nz, dx, dy, dz, P, bodies, count):
-    """Return the density with which `towards_body` takes a direction.
-
-    Parameters
-    ----------
-    bodies : tuple of tuple of float
-        The bodies; see `prominence`.
-    count : int
-        Number of bodies.
-    """
+    """Return the density with which `towards_body` takes a direction."""
     total = 0.0 * x
     density = 0.0 * x
     for k in range(count):
@@ -135,21 +81,8 @@ def body_density(x, y, z, nx, ny, nz, dx, dy, dz, P, bodies, count):
 def mixed_density(sent, beside, nx, ny, nz, dx, dy, dz, lx, ly, lz, rough, share):
     """Return the density of a ray from a rough or a scattering surface.
 
-    Parameters
-    ----------
-    sent : float
-        Share of the rays that are sent to bodies.
-    beside : float
-        Density of those in its direction.
-    nx, ny, nz, dx, dy, dz, lx, ly, lz : float
-        Unit normal, direction of the ray that arrives, direction of the one that continues.
-    share : float
-        Probability of reflection of the other rays.
-
-    Returns
-    -------
-    float
-        Probability density per unit solid angle, without that of a smooth mirror.
+    `nx`, `ny`, `nz`, `dx`, `dy`, `dz`, `lx`, `ly`, `lz`: unit normal, direction of the ray that arrives,
+    direction of the one that continues.
     """
     facets = where(rough > 0.0, facet_density(nx, ny, nz, dx, dy, dz, lx, ly, lz, rough), 0.0)
     cosine = maximum(nx * lx + ny * ly + nz * lz, 0.0)

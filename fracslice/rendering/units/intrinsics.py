@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...kernel.intrinsics import field, gather, intrinsic
+from ...kernel.loops import field, gather, intrinsic
 
 __all__ = [
     "GIVEN",
@@ -32,11 +32,7 @@ def blocker(x, y, z, P):
 def transparent(x, y, z, P):
     """Evaluate the field of the transparent parts of the scene.
 
-    Returns
-    -------
-    f, r, g, b, kept : float
-        Field value, absorption of red, green and blue per scene unit, and the fraction of the light that
-        passes the surface.
+    Returns f, r, g, b, kept green and blue per scene unit.
     """
     raise NotImplementedError
 
@@ -49,42 +45,19 @@ def camera_ray(px, py, lens_u, lens_v, P):
 
 @intrinsic
 def span_box(ox, oy, oz, dx, dy, dz, P):
-    """Return the interval of a ray in the scene's box.
-
-    Returns
-    -------
-    enter, leave : float
-        Distances along the ray; enter >= leave for a miss.
-    """
+    """Return the interval of a ray in the scene's box."""
     raise NotImplementedError
 
 
 @intrinsic
 def step_ray(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P):
-    """Take one step along a ray: `march.advance` with the scene's parameters.
-
-    Returns
-    -------
-    t, before, stride, gap : float
-        New state; gap is negative at a hit.
-    """
+    """Take one step along a ray: `march.advance` with the scene's parameters."""
     raise NotImplementedError
 
 
 @intrinsic
 def step_cone(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P):
-    """Take one step along a cone: `march.widen` with the scene's parameters.
-
-    Parameters
-    ----------
-    path : float
-        Half width of the cone at distance 1.
-
-    Returns
-    -------
-    t, before, stride, gap : float
-        New state; gap is negative at the end of the free part.
-    """
+    """Take one step along a cone: `march.widen` with the scene's parameters."""
     raise NotImplementedError
 
 
@@ -92,20 +65,7 @@ def step_cone(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P):
 def surface(x, y, z, dx, dy, dz, t, path, steps, side, last, u, P):
     """Shade a surface point.
 
-    Parameters
-    ----------
-    last : float
-        1 if the ray is not continued, else 0.
-    u : tuple of float
-        Random numbers in [0, 1).
-
-    Returns
-    -------
-    light : tuple of float
-        Light towards the ray's origin: red, green, blue.
-    onward : tuple of float
-        Continued ray: throughput (red, green, blue), origin, direction, side and density; empty if rays do
-        not continue.
+    `u`: random numbers in [0, 1).
     """
     raise NotImplementedError
 
@@ -114,9 +74,6 @@ def surface(x, y, z, dx, dy, dz, t, path, steps, side, last, u, P):
 def background(dx, dy, dz, q, P):
     """Return the light of a ray that misses the scene.
 
-    Parameters
-    ----------
-    q : float
-        Density of the direction; see `units.weights`.
+    `q`: density of the direction.
     """
     raise NotImplementedError

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...formulas.vocabulary import absolute, cos, maximum, rsqrt, sin, sqrt, where
-from .normal import normalised
+from .march import normalised
 
 TURN = 6.283185307179586
 
@@ -37,17 +37,7 @@ def disc(u, v):
 
 
 def sun(x, y, z, u, v, towards, spread, far):
-    """Sample a sun: a disc in the sky.
-
-    Parameters
-    ----------
-    towards : tuple of float
-        Unit direction to its centre.
-    spread : float
-        Tangent of half its angular diameter.
-    far : float
-        Distance of the light.
-    """
+    """Sample a sun: a disc in the sky."""
     lx, ly, lz = towards
     zero = 0.0 * x
     ax, ay, az, bx, by, bz = frame(lx + zero, ly + zero, lz + zero)
@@ -59,30 +49,14 @@ def sun(x, y, z, u, v, towards, spread, far):
 
 
 def sharp_sun(x, y, z, u, v, towards, far):
-    """Sample a point-like sun, which casts sharp shadows.
-
-    Parameters
-    ----------
-    towards : tuple of float
-        Unit direction to the sun.
-    far : float
-        Distance of the light.
-    """
+    """Sample a point-like sun, which casts sharp shadows."""
     lx, ly, lz = towards
     zero = 0.0 * x
     return lx + zero, ly + zero, lz + zero, far + zero, 1.0 + zero
 
 
 def lamp(x, y, z, u, v, position, radius):
-    """Sample a spherical lamp. Strength is that at distance 1 and falls with the squared distance.
-
-    Parameters
-    ----------
-    position : tuple of float
-        Centre of the lamp.
-    radius : float
-        Radius of the lamp.
-    """
+    """Sample a spherical lamp. Strength is that at distance 1 and falls with the squared distance."""
     px, py, pz = position
     h = 1.0 - 2.0 * u
     r = radius * sqrt(maximum(1.0 - h * h, 0.0))
@@ -95,13 +69,7 @@ def lamp(x, y, z, u, v, position, radius):
 
 
 def sharp_lamp(x, y, z, u, v, position):
-    """Sample a point lamp, which casts sharp shadows.
-
-    Parameters
-    ----------
-    position : tuple of float
-        Centre of the lamp.
-    """
+    """Sample a point lamp, which casts sharp shadows."""
     px, py, pz = position
     lx = px - x
     ly = py - y
@@ -123,11 +91,6 @@ def sky(dx, dy, dz, zenith, horizon, ground):
     """Return the sky's colour in a direction.
 
     The colour is interpolated from the horizon to the zenith above and to the ground below.
-
-    Parameters
-    ----------
-    zenith, horizon, ground : tuple of float
-        Linear colours.
     """
     zr, zg, zb = zenith
     hr, hg, hb = horizon

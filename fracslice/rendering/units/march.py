@@ -1,8 +1,8 @@
-"""Sphere tracing along rays and cones."""
+"""Sphere tracing along rays and cones, and surface normals."""
 
 from __future__ import annotations
 
-from ...formulas.vocabulary import absolute, any_of, exp, maximum, minimum, sqrt, where
+from ...formulas.vocabulary import absolute, any_of, exp, maximum, minimum, rsqrt, sqrt, where
 from .intrinsics import blocker, field, transparent
 
 MOST = 1.8
@@ -14,15 +14,7 @@ def span(ox, oy, oz, dx, dy, dz, lo, hi):
 
     Components of the direction are kept away from zero: 1e-9 bends a ray by less than any pixel.
 
-    Parameters
-    ----------
-    lo, hi : tuple of float
-        Lower and upper corner of the box.
-
-    Returns
-    -------
-    enter, leave : float
-        Distances along the ray; enter >= leave for a miss.
+    `lo`, `hi`: lower and upper corner of the box.
     """
     x0, y0, z0 = lo
     x1, y1, z1 = hi
@@ -59,17 +51,7 @@ def advance(
     Longer ones obey the same rule, so that no gap is passed; a step that leaves the solid by more is repeated
     up to the secant's root.
 
-    Parameters
-    ----------
-    cone, least, rounding : float
-        Half width of a pixel at distance 1 and at distance 0; resolution of positions.
-    glass : bool
-        True if rays may be inside the solid.
-
-    Returns
-    -------
-    t, before, stride, gap : float
-        New state; gap is negative at a hit.
+    `cone`, `least`, `rounding`: half width of a pixel at distance 1 and at distance 0.
     """
     f = field(ox + t * dx, oy + t * dy, oz + t * dz, P)
     if glass:
@@ -102,19 +84,7 @@ def advance(
 
 
 def widen(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness):
-    """Take one step of a cone, as far as the empty ball contains the whole cone.
-
-    Parameters
-    ----------
-    path : float
-        Half width of the cone at distance 1.
-
-    Returns
-    -------
-    t, before, stride, gap : float
-        New state; gap is negative where the ball is hardly wider than the cone. Every ray of the cone is free
-        up to t.
-    """
+    """Take one step of a cone, as far as the empty ball contains the whole cone."""
     radius = field(ox + t * dx, oy + t * dy, oz + t * dz, P) * steepness
     width = path * (t + maximum(radius, 0.0))
     gap = radius - 1.2 * width
@@ -125,25 +95,7 @@ def widen(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness):
 def visible(x, y, z, dx, dy, dz, far, least, P, steepness, patience, glass):
     """Trace a shadow ray.
 
-    Parameters
-    ----------
-    x, y, z : float
-        Start of the ray.
-    dx, dy, dz : float
-        Unit direction to the light.
-    far : float
-        Distance of the light.
-    least : float
-        Smallest step.
-    patience : int
-        Maximum steps.
-    glass : bool
-        True if transparent elements block the ray, too.
-
-    Returns
-    -------
-    float
-        1 if the light is visible, 0 if it is blocked.
+    `x`, `y`, `z`: start of the ray; `dx`, `dy`, `dz`: unit direction to the light.
     """
     t = 0.0 * x
     blocked = 0.0 * x
@@ -165,11 +117,6 @@ def tinted_shadow(x, y, z, dx, dy, dz, far, least, P, steepness, patience):
     """Return the light that transparent parts pass on to a point, as if they did not bend it.
 
     The arguments are those of `visible`.
-
-    Returns
-    -------
-    r, g, b : float
-        Fractions of red, green and blue.
     """
     t = 0.0 * x
     r = t + 1.0
@@ -192,3 +139,27 @@ def tinted_shadow(x, y, z, dx, dy, dz, far, least, P, steepness, patience):
         t = t + step
         going = going & (t < far)
     return r, g, b
+
+
+def normalised(x, y, z):
+    """Normalise a vector; the zero vector stays zero."""
+    over = rsqrt(maximum(x * x + y * y + z * z, 1e-36))
+    return x * over, y * over, z * over
+
+
+def normal(x, y, z, h, P):
+    """Return the unit normal from four field samples at the corners of a tetrahedron (Quilez 2015).
+
+    `h`: half edge of the cube that contains the corners.
+    """
+    gx, gy, gz = 0.0 * x, 0.0 * x, 0.0 * x
+    for k in range(4):
+        sy = 1.0 if k > 1 else -1.0
+        sz = 1.0 if k % 2 == 1 else -1.0
+        sx = sy * sz
+        f = field(x + sx * h, y + sy * h, z + sz * h, P)
+        gx = gx + sx * f
+        gy = gy + sy * f
+        gz = gz + sz * f
+    over = 1.0 / h
+    return normalised(gx * over, gy * over, gz * over)

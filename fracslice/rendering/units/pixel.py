@@ -24,17 +24,7 @@ def brightness(r, g, b):
 def squared_error(bright, squares, n):
     """Return the squared standard error of a pixel's displayed brightness.
 
-    Parameters
-    ----------
-    bright, squares : float
-        Sums of displayed brightness and of its square.
-    n : float
-        Samples of the pixel.
-
-    Returns
-    -------
-    float
-        Squared error; `UNKNOWN` below 2 samples.
+    `n`: samples of the pixel.
     """
     mean = bright / maximum(n, 1.0)
     spread = maximum(squares / maximum(n, 1.0) - mean * mean, 0.0)
@@ -48,13 +38,7 @@ def filmic(c):
 
 
 def reinhard(r, g, b):
-    """Return the factor of a luminance tone curve with white at 4; hues are kept (Reinhard et al. 2002).
-
-    Returns
-    -------
-    float
-        Factor on the light.
-    """
+    """Return the factor of a luminance tone curve with white at 4; hues are kept (Reinhard et al. 2002)."""
     y = 0.2126 * r + 0.7152 * g + 0.0722 * b
     return (1.0 + y * 0.0625) / (1.0 + y)
 
@@ -62,15 +46,7 @@ def reinhard(r, g, b):
 def encoded(c):
     """Encode linear light as sRGB (IEC 61966-2-1).
 
-    Parameters
-    ----------
-    c : float
-        Linear light of one channel, clipped to [0, 1].
-
-    Returns
-    -------
-    float
-        sRGB in [0, 1].
+    `c`: clipped to [0, 1]. Returns sRGB in [0, 1].
     """
     a = minimum(maximum(c, 0.0), 1.0)
     power = exp(log(maximum(a, 1e-6)) * 0.4166666666666667)
@@ -80,9 +56,6 @@ def encoded(c):
 def linear(colour: Sequence[float]) -> tuple[float, ...]:
     """Convert an sRGB colour to linear light (IEC 61966-2-1).
 
-    Parameters
-    ----------
-    colour : sequence of float
-        sRGB components in [0, 1].
+    `colour`: sRGB components in [0, 1].
     """
     return tuple(c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour)

@@ -22,12 +22,7 @@ def hashed(a):
 def scrambled(a, seed):
     """Owen-scramble a 32-bit fraction; see `fracslice.rendering.sequence`.
 
-    Parameters
-    ----------
-    a : int
-        Fraction, bits reversed.
-    seed : int
-        32-bit seed.
+    `a`: bits reversed.
     """
     a = (a ^ (a * 0x3D20ADEA)) & 0xFFFFFFFF
     a = (a + seed) & 0xFFFFFFFF
@@ -38,15 +33,7 @@ def scrambled(a, seed):
 
 
 def seeded(pixel, dimension):
-    """Return the seed of a pixel's dimension.
-
-    Parameters
-    ----------
-    pixel : int
-        Pixel, ``y << 16 | x``.
-    dimension : int
-        Dimension of a coordinate, below 64.
-    """
+    """Return the seed of a pixel's dimension."""
     return hashed((pixel * 64 + (pixel >> 26) * 0x9E3779B9 + dimension) & 0xFFFFFFFF)
 
 
@@ -68,14 +55,7 @@ def sample(a, pixel, dimension):
 def centred(a, pixel, dimension):
     """Like `sample`, digitally shifted so that the first point of the sequence is 1/2, the pixel's centre.
 
-    Parameters
-    ----------
-    a : int
-        Coordinate, bits reversed.
-    pixel : int
-        Pixel, ``y << 16 | x``.
-    dimension : int
-        Dimension of the coordinate.
+    `a`: bits reversed.
     """
     seed = seeded(pixel, dimension)
     shifted = scrambled(a & 0xFFFFFFFF, seed) ^ scrambled(0, seed) ^ 0x80000000

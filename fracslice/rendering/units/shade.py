@@ -4,17 +4,11 @@ from __future__ import annotations
 
 from ...formulas.vocabulary import absolute, exp, floor, log, maximum, minimum, sqrt, where
 from .intrinsics import field
-from .normal import normalised
+from .march import normalised
 
 
 def phong(nx, ny, nz, dx, dy, dz, lx, ly, lz, specular, shininess):
-    """Return the diffuse and specular factors of one light (Phong 1975, with Blinn's 1977 half vector).
-
-    Parameters
-    ----------
-    specular, shininess : float
-        Strength and exponent of the highlight.
-    """
+    """Return the diffuse and specular factors of one light (Phong 1975, with Blinn's 1977 half vector)."""
     diffuse = maximum(nx * lx + ny * ly + nz * lz, 0.0)
     hx, hy, hz = normalised(lx - dx, ly - dy, lz - dz)
     cosine = maximum(nx * hx + ny * hy + nz * hz, 1e-6)
@@ -24,17 +18,7 @@ def phong(nx, ny, nz, dx, dy, dz, lx, ly, lz, specular, shininess):
 def occlusion(x, y, z, nx, ny, nz, P, strength, reach):
     """Estimate ambient occlusion from five field samples along the normal (Evans 2006).
 
-    Parameters
-    ----------
-    strength : float
-        Factor on the occlusion.
-    reach : float
-        Distance of the last sample, scene units.
-
-    Returns
-    -------
-    float
-        Openness: 1 for an open point, 0 for a fully occluded one.
+    `reach` in scene units.
     """
     closed = 0.0 * x
     weight = 0.5
@@ -49,14 +33,7 @@ def occlusion(x, y, z, nx, ny, nz, P, strength, reach):
 def palette(tone, P, stops, count):
     """Interpolate a cyclic palette; tone 0 and tone 1 are both the first stop.
 
-    Parameters
-    ----------
-    tone : float
-        Position in [0, 1].
-    stops : tuple of float
-        Red, green and blue of each stop.
-    count : int
-        Number of stops.
+    `tone`: position in [0, 1].
     """
     r = 0.0 * tone
     g = 0.0 * tone
@@ -72,36 +49,13 @@ def palette(tone, P, stops, count):
 
 
 def varied(rough, vary, turn):
-    """Return the roughness at a position in a palette.
-
-    Parameters
-    ----------
-    rough : float
-        Roughness at the ends of the palette.
-    vary : float
-        Change in its middle.
-    turn : float
-        Position; only its fractional part counts.
-
-    Returns
-    -------
-    float
-        Roughness, 0 to 1.
-    """
+    """Return the roughness at a position in a palette."""
     middle = 1.0 - absolute(2.0 * (turn - floor(turn)) - 1.0)
     return minimum(maximum(rough + vary * middle, 0.0), 1.0)
 
 
 def lacquer(facing, coat):
-    """Return the reflectance of a lacquer of refractive index 1.5.
-
-    Parameters
-    ----------
-    facing : float
-        Cosine of the angle of incidence.
-    coat : float
-        Strength of the lacquer.
-    """
+    """Return the reflectance of a lacquer of refractive index 1.5."""
     cosine = minimum(maximum(facing, 0.0), 1.0)
     return coat * dielectric(cosine, 1.0 - (1.0 - cosine * cosine) / 2.25, 1.0 / 1.5)
 
@@ -113,30 +67,14 @@ def mirrored(dx, dy, dz, nx, ny, nz):
 
 
 def fresnel(cosine, least):
-    """Reflectance at an angle of incidence (Schlick 1994).
-
-    Parameters
-    ----------
-    least : float
-        Reflectance at normal incidence; at grazing incidence it is 1.
-    """
+    """Reflectance at an angle of incidence (Schlick 1994)."""
     a = 1.0 - minimum(maximum(cosine, 0.0), 1.0)
     a2 = a * a
     return least + (1.0 - least) * a2 * a2 * a
 
 
 def dielectric(cosine, left, ratio):
-    """Reflectance of a transparent surface for unpolarised light (Fresnel 1823).
-
-    Parameters
-    ----------
-    cosine : float
-        Cosine of the angle of incidence.
-    left : float
-        Square of the cosine of the angle of refraction; negative for total internal reflection.
-    ratio : float
-        Ratio of the refractive indices, near side to far side.
-    """
+    """Reflectance of a transparent surface for unpolarised light (Fresnel 1823)."""
     on = sqrt(maximum(left, 0.0))
     across = (ratio * cosine - on) / maximum(ratio * cosine + on, 1e-9)
     along = (cosine - ratio * on) / maximum(cosine + ratio * on, 1e-9)
@@ -144,35 +82,14 @@ def dielectric(cosine, left, ratio):
 
 
 def bent(dx, dy, dz, nx, ny, nz, cosine, ratio):
-    """Return the direction of refraction (Snell's law).
-
-    Parameters
-    ----------
-    cosine : float
-        Cosine of the angle between the normal and the reversed ray.
-    ratio : float
-        Ratio of the refractive indices, near side to far side.
-
-    Returns
-    -------
-    x, y, z : float
-        Direction of the refracted ray.
-    left : float
-        Negative for total internal reflection.
-    """
+    """Return the direction of refraction (Snell's law)."""
     left = 1.0 - ratio * ratio * (1.0 - cosine * cosine)
     k = ratio * cosine - sqrt(maximum(left, 0.0))
     return ratio * dx + k * nx, ratio * dy + k * ny, ratio * dz + k * nz, left
 
 
 def reflects(dx, dy, dz, nx, ny, nz, reflect):
-    """Return the reflectance of a mirror and the direction of reflection.
-
-    Parameters
-    ----------
-    reflect : float
-        Reflectance at normal incidence.
-    """
+    """Return the reflectance of a mirror and the direction of reflection."""
     cosine = -(dx * nx + dy * ny + dz * nz)
     part = where(reflect > 0.0, fresnel(cosine, reflect), 0.0)
     rx, ry, rz = mirrored(dx, dy, dz, nx, ny, nz)
@@ -184,24 +101,6 @@ def goes_on(dx, dy, dz, nx, ny, nz, side, reflect, clear, index, chance):
 
     A random number chooses between reflection and refraction with Fresnel weights. The normal points to the
     side of the incoming ray.
-
-    Parameters
-    ----------
-    reflect, clear : float
-        Reflectance at normal incidence; fraction of the light that a transparent surface passes on.
-    index : float
-        Refractive index of the solid.
-    chance : float
-        Random number in [0, 1).
-
-    Returns
-    -------
-    share : float
-        Fraction of the light that continues.
-    x, y, z : float
-        Direction of the continued ray.
-    out : float
-        -1 if the ray passes through the surface, 1 if it is reflected.
     """
     cosine = -(dx * nx + dy * ny + dz * nz)
     mirror = where(reflect > 0.0, fresnel(cosine, reflect), 0.0)

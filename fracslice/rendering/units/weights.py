@@ -14,18 +14,7 @@ HALF_TURN = 3.141592653589793
 
 
 def heuristic(taken, other):
-    """Return the weight of a sample.
-
-    Parameters
-    ----------
-    taken, other : float
-        Densities of the sample under the distribution it was taken from, and under the other one.
-
-    Returns
-    -------
-    float
-        Weight, 0 to 1; the weights of both distributions add up to 1.
-    """
+    """Return the weight of a sample."""
     ratio = other / maximum(taken, 1e-12)
     return where(taken > 0.0, 1.0 / (1.0 + ratio * ratio), 0.0)
 
@@ -33,10 +22,7 @@ def heuristic(taken, other):
 def facet_density(nx, ny, nz, dx, dy, dz, lx, ly, lz, rough):
     """Return the density with which `glossy.glossy` takes a direction.
 
-    Parameters
-    ----------
-    lx, ly, lz : float
-        Unit direction of reflection.
+    `lx`, `ly`, `lz`: unit direction of reflection.
     """
     a = width(rough)
     value, _ = highlight(nx, ny, nz, dx, dy, dz, lx, ly, lz, rough)
@@ -46,15 +32,7 @@ def facet_density(nx, ny, nz, dx, dy, dz, lx, ly, lz, rough):
 
 
 def weights(dense, diffuse, nx, ny, nz, dx, dy, dz, lx, ly, lz, rough, share, free):
-    """Return the weights of a light's sample for scattered and for reflected light.
-
-    Parameters
-    ----------
-    diffuse : float
-        Cosine of the angle between light and normal.
-    free : float
-        1 if no continued ray can meet the light.
-    """
+    """Return the weights of a light's sample for scattered and for reflected light."""
     facets = share * facet_density(nx, ny, nz, dx, dy, dz, lx, ly, lz, rough)
     scattered = heuristic(dense, (1.0 - share) * diffuse / HALF_TURN)
     reflected = where(rough > 0.0, heuristic(dense, facets), 1.0)
@@ -62,15 +40,7 @@ def weights(dense, diffuse, nx, ny, nz, dx, dy, dz, lx, ly, lz, rough, share, fr
 
 
 def mixed_weights(dense, likely, rough, free):
-    """Return the weights of a light's sample where all rays that continue have one density.
-
-    Parameters
-    ----------
-    likely : float
-        Density of a ray that continues in its direction; see `glowing.mixed_density`.
-    free : float
-        1 if no continued ray can meet the light.
-    """
+    """Return the weights of a light's sample where all rays that continue have one density."""
     weight = where(free > 0.5, 1.0, heuristic(dense, likely))
     return weight, where(rough > 0.0, weight, 1.0)
 
@@ -78,17 +48,8 @@ def mixed_weights(dense, likely, rough, free):
 def density_onward(chosen, nx, ny, nz, dx, dy, dz, ex, ey, ez, rough, share):
     """Return the density of a continued ray.
 
-    Parameters
-    ----------
-    chosen : bool
-        True if it is reflected, not scattered.
-    nx, ny, nz, dx, dy, dz, ex, ey, ez : float
-        Unit normal, direction of the ray, direction of the continued ray.
-
-    Returns
-    -------
-    float
-        Probability density per unit solid angle; 0 for a smooth mirror.
+    `nx`, `ny`, `nz`, `dx`, `dy`, `dz`, `ex`, `ey`, `ez`: unit normal, direction of the ray, direction of the
+    continued ray.
     """
     facets = share * facet_density(nx, ny, nz, dx, dy, dz, ex, ey, ez, rough)
     cosine = maximum(nx * ex + ny * ey + nz * ez, 0.0)
@@ -97,15 +58,7 @@ def density_onward(chosen, nx, ny, nz, dx, dy, dz, ex, ey, ez, rough, share):
 
 
 def sun_density(dx, dy, dz, towards, spread):
-    """Return the density with which `lights.sun` takes a direction.
-
-    Parameters
-    ----------
-    towards : tuple of float
-        Unit direction to the centre of the sun.
-    spread : float
-        Tangent of half its angular diameter.
-    """
+    """Return the density with which `lights.sun` takes a direction."""
     lx, ly, lz = towards
     cosine = dx * lx + dy * ly + dz * lz
     s2 = spread * spread
@@ -116,17 +69,7 @@ def sun_density(dx, dy, dz, towards, spread):
 def behind(q, dense):
     """Return the weight of a picture of the surroundings for a ray that misses the scene.
 
-    Parameters
-    ----------
-    q : float
-        Density of the ray; 0 for one of the camera, a mirror or glass.
-    dense : float
-        Density with which the picture is sampled in its direction.
-
-    Returns
-    -------
-    float
-        Weight, 0 to 1.
+    `q`: density of the ray.
     """
     return where(q > 0.0, heuristic(q, dense), 1.0)
 
@@ -134,16 +77,6 @@ def behind(q, dense):
 def sunshine(q, dense):
     """Return the light of a sun for a ray that misses the scene.
 
-    Parameters
-    ----------
-    q : float
-        Density of the ray; others than scattered and glossy ones do not see a sun.
-    dense : float
-        Density with which the sun is sampled in its direction.
-
-    Returns
-    -------
-    float
-        Factor on the sun's strength.
+    `q`: density of the ray.
     """
     return where(q > 0.0, HALF_TURN * dense * heuristic(q, dense), 0.0)

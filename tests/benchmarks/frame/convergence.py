@@ -16,8 +16,7 @@ import numpy as np
 from fracslice.formulas import Node, julia, mandelbulb, menger, plane, transform, union
 from fracslice.kernel.loop_linker import link_loops
 from fracslice.rendering import Renderer, packets
-from fracslice.rendering.accumulator import CHANNELS, COUNT, GOAL, PassPlan
-from fracslice.rendering.tiles import ordered
+from fracslice.rendering.accumulator import CHANNELS, COUNT, GOAL, PassPlan, tile_order
 from fracslice.rendering.units.random import hashed
 from fracslice.scene.view import Camera, Light, View
 from fracslice.work import Work
@@ -62,7 +61,7 @@ def renderer(root: Node, view: View) -> Renderer:
 
 def mean_of_rounds(of: Renderer, count: int, first: int = 0) -> Iterator[np.ndarray]:
     """The mean after every round of one sample in each pixel, from sample `first` on; float64 [pixels, 3]."""
-    sums, pixels, total = np.zeros((SIZE[0] * SIZE[1], CHANNELS), np.float32), ordered(*SIZE), 0.0
+    sums, pixels, total = np.zeros((SIZE[0] * SIZE[1], CHANNELS), np.float32), tile_order(*SIZE), 0.0
     for n in range(first, first + count):
         sums[:] = 0
         sums[:, COUNT], sums[:, GOAL] = n, n + 1

@@ -13,14 +13,13 @@ import numpy as np
 
 from fracslice import read
 from fracslice.animation import FilmJob, Timeline, film
-from fracslice.animation.depths import gradual_depths
+from fracslice.animation.film import gradual_depths
 from fracslice.formulas import Node
 from fracslice.rendering import develop
 from fracslice.scene import library
 from fracslice.scene.animation import Animation
-from fracslice.scene.camera import Camera
 from fracslice.scene.reader import reads
-from fracslice.scene.view import View
+from fracslice.scene.view import Camera, View
 from fracslice.work import Work
 
 from ..runner import Row, Run

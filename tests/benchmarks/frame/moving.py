@@ -11,9 +11,8 @@ from dataclasses import replace
 
 from fracslice import read
 from fracslice.rendering import Renderer
-from fracslice.rendering.accumulator import GOAL, PassPlan
+from fracslice.rendering.accumulator import GOAL, PassPlan, tile_order
 from fracslice.rendering.host_accumulator import HostAccumulator
-from fracslice.rendering.tiles import ordered
 from fracslice.scene import library
 from fracslice.scene.view import Camera
 
@@ -49,7 +48,7 @@ def moved(of: Renderer, show: Callable[[Camera], None], camera: Camera) -> Figur
     whole = timed(lambda: show(camera))
     kept = of.accumulator.host()
     size = of.width, of.height
-    picture, pixels = HostAccumulator.empty(*size, kept.sums.dtype), ordered(*size)
+    picture, pixels = HostAccumulator.empty(*size, kept.sums.dtype), tile_order(*size)
     picture.channels[..., GOAL] = 1
     pixels = pixels[kept.counts[pixels >> 16, pixels & 65535] > 0]
     plan = PassPlan(pixels, len(pixels), 1)

@@ -14,12 +14,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from fracslice.formulas import mandelbulb
-from fracslice.rendering.accumulator import GOAL, PassPlan
+from fracslice.rendering.accumulator import GOAL, PassPlan, tile_order
 from fracslice.rendering.cpu import BLOCK, CpuTracer
 from fracslice.rendering.host_accumulator import HostAccumulator
 from fracslice.rendering.linking import link_frame
-from fracslice.rendering.optics import optics
-from fracslice.rendering.tiles import ordered
+from fracslice.rendering.setup import optics
 from fracslice.scene.view import Camera, Light, Shading, View
 from fracslice.work import Work
 
@@ -61,7 +60,7 @@ def ours(of: CpuTracer, pixels: np.ndarray, samples: int, work: Work) -> Figures
 
 
 def rows(run: Run, width: int = 800, height: int = 600, samples: int = 16) -> Iterator[Row]:
-    of, pixels, work = tracer(width, height), ordered(width, height), Work(run.threads[0])
+    of, pixels, work = tracer(width, height), tile_order(width, height), Work(run.threads[0])
     with tempfile.NamedTemporaryFile(suffix=".ppm") as file:
         given = file.name, width, height, samples, "--runs", 1, "--threads", run.threads[0], "--roots"
         acts = {

@@ -13,13 +13,12 @@ import numpy as np
 
 from fracslice.formulas import mandelbulb
 from fracslice.kernel import cuda
-from fracslice.rendering.accumulator import CHANNELS, COUNT, COVER, GOAL, PassPlan
+from fracslice.rendering.accumulator import CHANNELS, COUNT, COVER, GOAL, PassPlan, tile_order
 from fracslice.rendering.cpu import BLOCK, STEPS, CpuTracer
 from fracslice.rendering.cuda import CudaTracer
 from fracslice.rendering.linking import Frame, link_frame
-from fracslice.rendering.optics import optics
 from fracslice.rendering.sequence import SampleRange
-from fracslice.rendering.tiles import ordered
+from fracslice.rendering.setup import optics
 from fracslice.scene.view import Camera, Light, Shading, View
 from fracslice.work import Work
 
@@ -158,7 +157,7 @@ def given(seen: Frame, pixels: np.ndarray) -> np.ndarray:
 
 
 def rows(run: Run) -> Iterator[Row]:
-    memory, seen, pixels = cuda.require(), frame(WIDTH, HEIGHT), ordered(WIDTH, HEIGHT)
+    memory, seen, pixels = cuda.require(), frame(WIDTH, HEIGHT), tile_order(WIDTH, HEIGHT)
     tracer = CudaTracer(seen, SINGLE, WIDTH, HEIGHT)
     placed = memory.to_device(pixels)
     sums, work = memory.to_device(empty()), Work(1)

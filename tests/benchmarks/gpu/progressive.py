@@ -13,8 +13,7 @@ import numpy as np
 from fracslice.formulas import mandelbulb
 from fracslice.kernel import cuda
 from fracslice.rendering import Renderer
-from fracslice.rendering.accumulator import CHANNELS, GOAL, PassPlan
-from fracslice.rendering.tiles import ordered
+from fracslice.rendering.accumulator import CHANNELS, GOAL, PassPlan, tile_order
 from fracslice.scene.view import Camera, Film, Light, View
 
 from ..runner import Row, Run, Spread
@@ -39,7 +38,7 @@ def rows(run: Run) -> Iterator[Row]:
     def shown() -> None:
         _ = next(passes).shown
 
-    pixels = memory.to_device(ordered(1920, 1080))
+    pixels = memory.to_device(tile_order(1920, 1080))
     sums = np.zeros((1920 * 1080, CHANNELS), of.dtype)
     sums[:, GOAL] = 3 * RUNS
     placed = memory.to_device(sums.ravel())

@@ -21,13 +21,13 @@ from pathlib import Path
 from typing import Any
 
 from fracslice.animation import FilmJob, Timeline, write_frames
-from fracslice.cluster import Contents, Pool, ResultFolder, Task, Workers, connected
-from fracslice.cluster.pool import run as make_piece
+from fracslice.cluster import Contents, Pool, ResultFolder, Task, Workers, connect
+from fracslice.cluster.pool import run_task as make_piece
 from fracslice.export.layer_files import write_slices
 from fracslice.formulas import mandelbulb
-from fracslice.jobs import mesh_tasks as meshtasks
+from fracslice.jobs import shared_mesh as meshtasks
 from fracslice.jobs.mesh import make_mesh
-from fracslice.jobs.slice_recipe import SliceRecipe
+from fracslice.jobs.slices import SliceRecipe
 from fracslice.meshjob import MeshJob
 from fracslice.rendering import Renderer
 from fracslice.scene import scene
@@ -244,7 +244,7 @@ def rows(
     acts, first = dict[str, Callable[[], Any]](), dict[str, float]()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        with connected(f"local:{threads}", f"{name}/pieces", threads) as plain:
+        with connect(f"local:{threads}", f"{name}/pieces", threads) as plain:
             pool = MeasuredWorkers(plain.client, plain.pieces)
             for kind, job in kinds.items():
                 shared, alone = Work(threads, cluster=pool), Work(threads)

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
-from fracslice.cluster import connected
+from fracslice.cluster import connect
 from fracslice.work import Work
 
 from ..runner import Figures, Row, Run, Spread
@@ -51,7 +51,7 @@ def measured(pairs: Sequence[tuple[Job, Job]], workers: int, threads: int) -> li
     found = []
     with (
         tempfile.TemporaryDirectory() as name,
-        connected(f"local:{workers}", f"{name}/pieces", workers * threads) as pool,
+        connect(f"local:{workers}", f"{name}/pieces", workers * threads) as pool,
     ):
         work = Work(threads, cluster=pool)
         for number, (large, small) in enumerate(pairs):

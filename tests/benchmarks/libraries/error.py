@@ -12,8 +12,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from fracslice.bench.bench_report import write_report
-from fracslice.bench.measurements import BenchmarkTask, measure
-from fracslice.bench.peers import Peer
+from fracslice.bench.measurements import BenchmarkTask, Peer, measure
 from fracslice.work import Work
 
 from ..runner import Row, Run

@@ -13,8 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from fracslice.bench.measure import WARM
-from fracslice.bench.methods import grid
-from fracslice.bench.workloads import WORKLOADS, Workload
+from fracslice.bench.methods import WORKLOADS, Workload, grid
 from fracslice.export import write
 from fracslice.mesh import Mesh
 from fracslice.work import Work

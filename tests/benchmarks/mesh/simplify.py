@@ -13,12 +13,12 @@ import numpy as np
 
 from fracslice.formulas import julia, mandelbulb, menger, sphere
 from fracslice.mesh import Mesh
-from fracslice.mesh.check import check_mesh
+from fracslice.mesh.checks import check_mesh
 from fracslice.mesh.extract import contour
-from fracslice.mesh.nearest import Nearest
-from fracslice.mesh.quantisation import quantised
+from fracslice.mesh.quantisation import quantise_mesh
 from fracslice.mesh.simplify import simplify
 from fracslice.mesh.solid import to_manifold
+from fracslice.mesh.spatial import Nearest
 from fracslice.volume import plan, sample_scene
 from fracslice.work import Work
 
@@ -65,7 +65,7 @@ def rows(run: Run, scenes: tuple[str, ...] = tuple(SCENES), share: float = 1.0) 
     for name in scenes:
         root, resolution = SCENES[name]
         planned = plan(root, share * resolution)
-        mesh, tolerance = quantised(contour(root, sample_scene(planned))), TOLERANCE * planned.voxel
+        mesh, tolerance = quantise_mesh(contour(root, sample_scene(planned))), TOLERANCE * planned.voxel
         count = len(by_us(mesh, tolerance, 0).triangles)
         acts = {how: partial(method, mesh, tolerance, count) for how, method in METHODS.items()}
         measured = run.interleaved(acts, warm=False)

@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from fracslice.export import png
-from fracslice.export.jobs import SliceRun
+from fracslice.export.slice_run import SliceRun
 from fracslice.formulas import julia, mandelbulb, menger, torus
 from fracslice.slicing import Layer, SliceJob, Slicer, plan_stack
 from fracslice.slicing.raster import Screen

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from fracslice.export import png
-from fracslice.export.jobs import SliceRun
+from fracslice.export.slice_run import SliceRun
 from fracslice.formulas import mandelbulb
 from fracslice.formulas.box import Box
 from fracslice.slicing import Layer, Slicer, Stack

@@ -11,11 +11,11 @@ from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
-from fracslice.export.jobs import SliceRun
 from fracslice.export.layer_files import write_slices
 from fracslice.export.resins import Resin
+from fracslice.export.slice_run import SliceRun
 from fracslice.formulas import mandelbulb
-from fracslice.jobs.stack_model import StackModel
+from fracslice.jobs.slices import StackModel
 from fracslice.scene import scene
 from fracslice.slicing import SliceJob, plan_stack
 from fracslice.slicing.printers import Printer

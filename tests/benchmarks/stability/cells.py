@@ -31,9 +31,9 @@ from fracslice.formulas import (
 from fracslice.formulas.field import Cells
 from fracslice.kernel import compile_scene
 from fracslice.kernel.cpu import compile_loops
-from fracslice.kernel.enclosures import Enclosures
 from fracslice.kernel.linker import link
 from fracslice.kernel.loops import enclosures
+from fracslice.kernel.tree import Enclosures
 from fracslice.volume import Plan, plan
 from fracslice.volume.pruning import Proofs
 from fracslice.volume.sampler import sample_signs

@@ -15,8 +15,8 @@ from fracslice.formulas import Node, mandelbulb, material, sphere, transform, un
 from fracslice.kernel import link
 from fracslice.kernel.linker import Linked
 from fracslice.rendering.linking import link_frame
-from fracslice.rendering.optics import optics
 from fracslice.rendering.packets import loops
+from fracslice.rendering.setup import optics
 from fracslice.scene.view import Camera, Fog, Light, Shading, View
 from tests.budgets.instructions import CPU, FEATURES, assembly, sizes
 

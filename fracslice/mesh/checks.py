@@ -1,0 +1,321 @@
+"""Checks of a mesh: counts of defects, sums over its pieces, distances, what of the surface it lacks, and
+a verdict.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._native import bounds, near
+from ..common.messages import format_count
+from ..errors import MeshError
+from ..formulas.algebra import dot
+from ..volume import Plan
+from ..volume.accuracy import NEAR, surface_error, surface_points
+from ..work import Work
+from .cleaning import Finished
+from .model import Mesh
+from .quantisation import quantise_mesh
+from .spatial import Nearest
+
+
+@dataclass(frozen=True)
+class MeshReport:
+    """Result of `check_mesh`; every field is plain JSON. Counts of defects are zero for a printable
+    solid.
+    """
+
+    triangles: int  # triangles and vertices of the quantised mesh
+    vertices: int
+    watertight: bool  # true if every edge joins at least two triangles
+    # true if every edge joins exactly two triangles and the triangles at every vertex form one fan
+    manifold: bool
+    # true if adjacent triangles have the same orientation and every shell faces out of the material
+    oriented: bool
+    self_intersections: int  # triangles that cut, touch or cover another one
+    # triangles searched for self-intersections; at the others they are excluded by construction
+    searched_triangles: int
+    degenerate_triangles: int  # triangles without area
+    duplicate_triangles: int  # triangles with the corners of an earlier one
+    open_edges: int  # edges of one triangle
+    nonmanifold_edges: int  # edges of more than two triangles
+    nonmanifold_vertices: int  # vertices whose triangles form more than one fan
+    misoriented_edges: int  # edges whose triangles have opposite orientations
+    misplaced_shells: int  # shells that are inside out or inside another body
+    components: int  # outer bodies
+    cavities: int  # sealed shells inside bodies
+    genus: int | None  # sum over all shells; None if the surface is not a closed 2-manifold
+    volume_mm3: float  # signed volume, mm3
+    area_mm2: float  # surface area, mm2
+    # low and high corner of the bounding box, mm
+    bbox_mm: tuple[tuple[float, float, float], tuple[float, float, float]]
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """Descriptions of the defects, tuple of str; empty for a printable mesh."""
+        counts = (
+            (self.open_edges, "open edge", "open edges", "(a hole in the surface)"),
+            (self.nonmanifold_edges, "edge", "edges", "with more than two triangles"),
+            (self.nonmanifold_vertices, "vertex", "vertices", "where the surface touches itself"),
+            (self.misoriented_edges, "edge", "edges", "between triangles of opposite orientation"),
+            (self.misplaced_shells, "shell", "shells", "inside out or inside another body"),
+            (
+                self.self_intersections,
+                "triangle that cuts or touches",
+                "triangles that cut or touch",
+                "others",
+            ),
+            (self.degenerate_triangles, "triangle", "triangles", "without area"),
+            (self.duplicate_triangles, "triangle that repeats", "triangles that repeat", "another"),
+        )
+        problems = tuple(
+            f"{format_count(count, one, more)} {what}" for count, one, more, what in counts if count
+        )
+        return problems if problems or self.volume_mm3 > 0 else ("it encloses no volume",)
+
+    @property
+    def printable(self) -> bool:
+        """True if the mesh is a closed, oriented manifold of positive volume without self-intersections."""
+        return not self.problems
+
+    def as_dict(self) -> dict[str, Any]:
+        """Report as plain JSON, with the verdict."""
+        return asdict(self) | {"printable": self.printable, "problems": list(self.problems)}
+
+
+def check_mesh(mesh: Mesh, *, threads: int | None = None) -> MeshReport:
+    """Check a mesh as a slicer reads its file: rounded to float32, equal positions welded, nothing repaired.
+
+    All counts are exact. The search for self-intersections takes most of the time.
+
+    `mesh` in mm.
+    """
+    from .._native import connected_components
+    from .cleaning import Finished
+    from .topology import component_sizes
+
+    if not len(mesh.triangles):
+        raise MeshError("the mesh has no triangles")
+    threads = threads or 0
+    mesh = quantise_mesh(mesh, threads)
+    sizes = mesh.sizes(threads)
+    area, flat = float(sizes.areas[0]), int(sizes.flat[0])
+    whole = mesh
+    if flat:
+        a, b, c = mesh.triangles.T
+        whole = mesh.selected((a != b) & (b != c) & (c != a), threads)
+    if not len(whole.triangles):
+        raise MeshError("the mesh has only triangles without area")
+    tally = Tally(threads)
+    tally.add(Finished.whole(whole))
+    labels, shells = connected_components(whole.triangles, len(whole.vertices), threads)
+    volumes = component_sizes(whole.vertices, whole.triangles, labels, shells, threads).volumes
+    closed = not (tally.open_edges or tally.misoriented_edges)
+    cavities = int((volumes < 0).sum()) if closed else 0
+    misplaced = _misplaced_shells(whole, labels, volumes, threads) if closed else 0
+    return replace(
+        tally.report(shells - cavities, cavities, misplaced),
+        triangles=len(mesh.triangles),
+        vertices=len(mesh.vertices),
+        degenerate_triangles=flat,
+        volume_mm3=float(volumes.sum()),
+        area_mm2=area,
+        bbox_mm=_box(mesh),
+    )
+
+
+def _misplaced_shells(
+    mesh: Mesh, labels: NDArray[np.int32], volumes: NDArray[np.float64], threads: int
+) -> int:
+    """Shells whose outside is neither empty space nor, for a cavity, the material of one body."""
+    from .shells import nesting
+
+    return int((nesting(mesh, labels, volumes, threads=threads).winding != (volumes < 0)).sum())
+
+
+def _box(mesh: Mesh) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Low and high corner of the bounding box, as tuples."""
+    (x0, y0, z0), (x1, y1, z1) = mesh.bounds.tolist()
+    return (x0, y0, z0), (x1, y1, z1)
+
+
+@dataclass
+class Tally:
+    """Sums over finished pieces; fields as in `MeshReport`, but edges count by their ends, twice each."""
+
+    threads: int = 0
+    triangles: int = 0
+    vertices: int = 0
+    open_edges: int = 0
+    nonmanifold_edges: int = 0
+    misoriented_edges: int = 0
+    nonmanifold_vertices: int = 0
+    self_intersections: int = 0
+    searched_triangles: int = 0
+    degenerate_triangles: int = 0
+    duplicate_triangles: int = 0
+    volume: float = 0.0
+    area: float = 0.0
+    low: tuple[float, ...] = (np.inf,) * 3
+    high: tuple[float, ...] = (-np.inf,) * 3
+
+    def add(self, piece: Finished) -> None:
+        """Add a piece."""
+        from .spatial import self_intersecting_triangles
+        from .topology import edge_ends
+
+        mesh, passed = piece.mesh, piece.passed
+        ends = edge_ends(mesh.triangles, piece.counted, self.threads)
+        crossing = np.empty(0, np.int64)
+        if len(piece.suspects):
+            among = None
+            if len(piece.suspects) < len(mesh.triangles):
+                among = np.zeros(len(mesh.triangles), bool)
+                among[piece.suspects] = True
+            crosses = self_intersecting_triangles(mesh, threads=self.threads, among=among)
+            crossing = np.flatnonzero(crosses[: piece.done])
+        sizes = passed.sizes(self.threads)
+        apex = passed.vertices[sizes.outermost[0, 0]] if len(passed.triangles) else np.zeros(3)
+        self.triangles += len(passed.triangles)
+        self.vertices += len(piece.points)
+        self.open_edges += ends.open_edges
+        self.nonmanifold_edges += ends.non_manifold_edges
+        self.misoriented_edges += ends.misoriented_edges
+        self.nonmanifold_vertices += ends.non_manifold_vertices
+        self.self_intersections += len(crossing)
+        self.searched_triangles += int(np.searchsorted(piece.suspects, piece.done))
+        self.degenerate_triangles += int(sizes.flat[0])
+        self.duplicate_triangles += _duplicates(mesh.triangles[crossing])
+        self.volume += float(sizes.volumes[0] + dot(apex, sizes.vectors[0]) / 3)  # cones over the origin
+        self.area += float(sizes.areas[0])
+        if len(piece.points):
+            low, high = bounds(piece.points, self.threads)
+            self.low = tuple(np.minimum(self.low, low).tolist())
+            self.high = tuple(np.maximum(self.high, high).tolist())
+
+    def include(self, other: Tally) -> None:
+        """Add the sums over other pieces."""
+        for name in (f.name for f in fields(self)):
+            if name not in ("threads", "low", "high"):
+                setattr(self, name, getattr(self, name) + getattr(other, name))
+        self.low = tuple(np.minimum(self.low, other.low).tolist())
+        self.high = tuple(np.maximum(self.high, other.high).tolist())
+
+    def report(self, bodies: int, cavities: int, misplaced: int) -> MeshReport:
+        """Report on the whole mesh, as `check_mesh` returns it."""
+        manifold = not (self.open_edges or self.nonmanifold_edges or self.nonmanifold_vertices)
+        shells, euler = bodies + cavities, self.vertices - self.triangles // 2
+        (x0, y0, z0), (x1, y1, z1) = self.low, self.high
+        return MeshReport(
+            triangles=self.triangles,
+            vertices=self.vertices,
+            watertight=not self.open_edges,
+            manifold=manifold,
+            oriented=not (self.misoriented_edges or misplaced),
+            self_intersections=self.self_intersections,
+            searched_triangles=self.searched_triangles,
+            degenerate_triangles=self.degenerate_triangles,
+            duplicate_triangles=self.duplicate_triangles,
+            open_edges=self.open_edges // 2,
+            nonmanifold_edges=self.nonmanifold_edges // 2,
+            nonmanifold_vertices=self.nonmanifold_vertices,
+            misoriented_edges=self.misoriented_edges // 2,
+            misplaced_shells=misplaced,
+            components=bodies,
+            cavities=cavities,
+            genus=shells - euler // 2 if manifold and not self.misoriented_edges else None,
+            volume_mm3=self.volume,
+            area_mm2=self.area,
+            bbox_mm=((x0, y0, z0), (x1, y1, z1)),
+        )
+
+
+def _duplicates(triangles: NDArray[np.int32]) -> int:
+    """Number of triangles with the three corners of an earlier one, in any order."""
+    distinct = np.unique(np.sort(triangles, axis=1), axis=0) if len(triangles) else triangles
+    return len(triangles) - len(distinct)
+
+
+POINTS = 256
+"""Random points on the field's surface, besides its extreme points."""
+
+NEARBY, FARTHER = 2.5, 2.0
+"""First distance within which triangles are searched, voxels, and its growth."""
+
+
+def surface_to_mesh(
+    planned: Plan, pieces: Callable[[], Iterable[Mesh]], scale: float, work: Work
+) -> NDArray[np.float64]:
+    """Distances from the extreme points of a field, and from other points on its surface, to the mesh.
+
+    `pieces` in scene units; `scale`: mm per scene unit. Returns float64 (n,), mm.
+    """
+
+    def search(points: NDArray[np.float64], reach: float) -> NDArray[np.float64]:
+        return nearest(pieces(), points, reach, work)
+
+    points, voxel = surface_samples(planned, work), planned.voxel
+    return scale * distances(search, points, voxel, search(points, NEARBY * voxel))
+
+
+def surface_samples(planned: Plan, work: Work) -> NDArray[np.float64]:
+    """Extreme points of a field and other points on its surface, found without a mesh.
+
+    Returns float64 (n, 3), scene units.
+    """
+    tips = planned.tips.T  # only extreme points that are still on the surface
+    tips = tips[surface_error(planned.root, tips, planned.voxel, work) < NEAR * planned.voxel]
+    samples = surface_points(planned.root, planned.outer, planned.voxel, POINTS, work)
+    return np.concatenate([tips, samples])
+
+
+def distances(
+    search: Callable[[NDArray[np.float64], float], NDArray[np.float64]],
+    points: NDArray[np.float64],
+    voxel: float,
+    nearby: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Distances from points to a mesh.
+
+    For points without a triangle nearby, those farther away are searched.
+
+    `points`: float64 (n, 3); `nearby`: float64 (n,), distances to the triangles within `NEARBY` voxels.
+    Returns float64 (n,).
+    """
+    result, reach = nearby.copy(), NEARBY * voxel
+    # Triangles lie within a grid cell: any nearer one has its corners in reach.
+    while (far := result > reach - np.sqrt(3) * voxel).any():
+        reach *= FARTHER
+        result[far] = search(points[far], reach)
+    return result
+
+
+def nearest(
+    pieces: Iterable[Mesh], points: NDArray[np.float64], reach: float, work: Work
+) -> NDArray[np.float64]:
+    """Distances from points to the triangles of a mesh within reach.
+
+    `points`: float64 (n, 3). Returns float64 (n,).
+    """
+    return _least((_near(mesh, points, reach, work) for mesh in pieces), points, work)
+
+
+def _near(mesh: Mesh, points: NDArray[np.float64], reach: float, work: Work) -> Mesh:
+    """Triangles with a corner near points."""
+    chosen = near(mesh.vertices, mesh.triangles, points, reach, work.threads)
+    return Mesh(mesh.vertices, mesh.triangles[chosen])
+
+
+def _least(meshes: Iterable[Mesh], points: NDArray[np.float64], work: Work) -> NDArray[np.float64]:
+    """Distance from each point to the nearest of several meshes; infinite without triangles."""
+    numbers = np.arange(len(points), dtype=np.int32)
+    spots, least = Mesh(points, np.stack([numbers] * 3, 1)), np.full(len(points), np.inf)
+    for mesh in meshes:
+        if len(mesh.triangles):
+            least = np.minimum(least, Nearest(mesh).samples(spots, 1.0, work))
+    return least
