@@ -141,7 +141,7 @@ def test_commands_are_understood(line: str, folder: Path, monkeypatch, capfd) ->
         "animation.Timeline",
         "bench.measurements.measure",
         "viewer.fly",
-        "cluster.connected",
+        "cluster.connect",
     ):
         monkeypatch.setattr(f"fracslice.{work}", begin)
     monkeypatch.setattr("fracslice.viewer.show", begin)
@@ -165,7 +165,7 @@ def test_options_exist(page: Path) -> None:
 def test_modules_and_make_targets_exist() -> None:
     text = "\n".join(TEXT.values())
     modules = set(re.findall(r"python -m (tests[\w.]*\w)", text))
-    assert modules == {"tests.benchmarks", "tests.budgets"}
+    assert modules == {"tests.benchmarks", "tests.budgets", "tests.outputs", "tests.structure"}
     assert {name for name in modules if find_spec(name) is None} == set()
     targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
     assert set(re.findall(r"(?:`|^ {4}|^)make ([a-z-]+)", text, re.MULTILINE)) <= targets

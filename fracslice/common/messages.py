@@ -44,7 +44,7 @@ def format_count(count: int, one: str, more: str = "") -> str:
 
     Examples
     --------
-    >>> counted(1, "layer"), counted(13068, "triangle"), counted(2, "cavity", "cavities")
+    >>> format_count(1, "layer"), format_count(13068, "triangle"), format_count(2, "cavity", "cavities")
     ('1 layer', '13,068 triangles', '2 cavities')
     """
     return f"{count:,} {one if count == 1 else more or one + 's'}"

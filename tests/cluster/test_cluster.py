@@ -21,8 +21,7 @@ from fracslice.cluster.workers import Identity
 from fracslice.errors import Cancelled, ClusterError, FracsliceWarning
 from fracslice.export.layer_files import write_slices
 from fracslice.formulas import mandelbulb, sphere
-from fracslice.jobs import shared_mesh as meshsampling
-from fracslice.jobs import shared_mesh as meshtasks
+from fracslice.jobs import shared_mesh
 from fracslice.jobs.mesh import make_mesh
 from fracslice.jobs.slices import SliceRecipe
 from fracslice.mesh import shells
@@ -106,10 +105,10 @@ def no_workers_of_other_tests(cluster: Cluster) -> Iterator[None]:
 @pytest.fixture(autouse=True)
 def small_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(progressive, "PIXELS", 1024)
-    monkeypatch.setattr(meshtasks, "LEAST", 1)
+    monkeypatch.setattr(shared_mesh, "LEAST", 1)
     monkeypatch.setattr(shells, "FAN", 2)
     monkeypatch.setattr(exploration, "MANY", 1)
-    monkeypatch.setattr(meshsampling, "BRICKS", 32)
+    monkeypatch.setattr(shared_mesh, "BRICKS", 32)
     monkeypatch.setattr(workers, "CONNECT", SECONDS)  # the machine may be busy
 
 
@@ -168,10 +167,10 @@ SHARED = {
 """Options, pieces and file of a command."""
 PASSES = 4
 """Passes of the rendered command."""
-STARTED = """from fracslice.jobs import shared_mesh as mesh_tasks
-from fracslice.rendering import parts
-mesh_tasks.LEAST = 1
-parts.PIXELS = 1024
+STARTED = """from fracslice.jobs import shared_mesh
+from fracslice.rendering import progressive
+shared_mesh.LEAST = 1
+progressive.PIXELS = 1024
 from fracslice.cli.main import main; main()"""
 
 

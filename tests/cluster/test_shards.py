@@ -17,9 +17,7 @@ from fracslice.errors import ClusterError, SharedError
 from fracslice.export import packages
 from fracslice.export.layer_files import write_slices
 from fracslice.formulas import box, cone, flake, sphere
-from fracslice.jobs import shared_files
-from fracslice.jobs import shared_mesh as meshsampling
-from fracslice.jobs import shared_mesh as meshtasks
+from fracslice.jobs import shared_files, shared_mesh
 from fracslice.jobs.mesh import MeshResult, make_mesh
 from fracslice.mesh import shells
 from fracslice.meshjob import MeshJob
@@ -92,18 +90,18 @@ def test_shards_of_a_mesh_make_one_file(tmp_path: Path, monkeypatch: pytest.Monk
 
     Tasks write the triangles to their places: the file is the one that they wrote, under another name.
     """
-    monkeypatch.setattr(meshtasks, "LEAST", 1)
+    monkeypatch.setattr(shared_mesh, "LEAST", 1)
     monkeypatch.setattr(shared_files, "FIRST", 7)
     monkeypatch.setattr(shared_files, "ROWS", 1000)
-    monkeypatch.setattr(files, "appended", None)
+    monkeypatch.setattr(files, "append_file", None)
     places, make = list[str](), shared_files.PlaceTask.make
     monkeypatch.setattr(
         shared_files.PlaceTask, "make", lambda of, work: (places.append(of.name), make(of, work))[1]
     )
     monkeypatch.setattr(shells, "FAN", 2)
-    joins, join = list[str](), meshtasks.JoinTask.make
+    joins, join = list[str](), shared_mesh.JoinTask.make
     monkeypatch.setattr(
-        meshtasks.JoinTask, "make", lambda of, work: (joins.append(of.name), join(of, work))[1]
+        shared_mesh.JoinTask, "make", lambda of, work: (joins.append(of.name), join(of, work))[1]
     )
     shape = cone(radius=0.5, height=2.0) | sphere(radius=0.05).translate((0.8, 0.0, 0.0))
     turned = scene(shape.rotate(70.0, (0.0, 1.0, 0.2)), size="20mm")
@@ -139,7 +137,7 @@ def test_shards_of_a_mesh_make_one_file(tmp_path: Path, monkeypatch: pytest.Monk
 
 
 def test_other_formats_are_joined(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(meshtasks, "LEAST", 1)
+    monkeypatch.setattr(shared_mesh, "LEAST", 1)
     hollowed, job = scene(box() - sphere(radius=0.6), size="20mm"), MeshJob(resolution=16)
     shard = Shard(ResultFolder(str(tmp_path / "pieces")), 1, 1)
     one, two = (tmp_path / f"{name}.ply" for name in ("one", "two"))
@@ -151,7 +149,7 @@ def test_other_formats_are_joined(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 def test_a_3mf_file_is_concatenated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """By two shards; vertices at seams and at a tip's triangles, which come last, are numbered once."""
-    monkeypatch.setattr(meshtasks, "LEAST", 1)
+    monkeypatch.setattr(shared_mesh, "LEAST", 1)
     monkeypatch.setattr(packages, "ROWS", 256)
     monkeypatch.setattr(shared_files, "BLOCKS", 2)
     monkeypatch.setattr(shared_files, "joined_pieces", None)
@@ -185,7 +183,7 @@ def test_a_3mf_file_is_concatenated(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 def test_what_needs_the_whole_mesh_is_sampled_by_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Chord and simplification are of the whole mesh, so shard 1 makes them of the shared samples."""
     monkeypatch.setattr(exploration, "MANY", 1)
-    monkeypatch.setattr(meshsampling, "BRICKS", 8)
+    monkeypatch.setattr(shared_mesh, "BRICKS", 8)
     ball, job = scene(sphere(), size="20mm"), MeshJob(resolution=16, chord_mm=0.2, simplify_mm=0.3)
     pieces, made = ResultFolder(str(tmp_path / "pieces")), list[str]()
     write = ResultFolder.write
@@ -227,7 +225,7 @@ def test_options_that_exclude_each_other(line: list[str], capsys: pytest.Capture
 
 def test_a_shared_mesh_has_the_note_on_near_bodies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In a file of pieces, whose bodies meet in pieces and over seams."""
-    monkeypatch.setattr(meshtasks, "LEAST", 1)
+    monkeypatch.setattr(shared_mesh, "LEAST", 1)
     flakes = scene(flake(solid="tetrahedron", level=1), size="40mm", name="flakes")
     shard = Shard(ResultFolder(str(tmp_path / "pieces")), 1, 1, patience=0)
     shared, alone = (

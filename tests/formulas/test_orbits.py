@@ -284,5 +284,5 @@ def test_the_code_of_a_step_is_cached(monkeypatch: pytest.MonkeyPatch) -> None:
     texts = [code.traced(0) for code in bulbs]
     assert texts[0] != texts[1]
     orbits._trace_step.cache_clear()
-    monkeypatch.setattr(orbits, "traced", None)
+    monkeypatch.setattr(orbits, "trace", None)
     assert [code.traced(0) for code in bulbs] == texts

@@ -22,7 +22,7 @@ def asked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[int]:
 
     (tmp_path / "cpuinfo").write_text(CPU)
     monkeypatch.setenv("FRACSLICE_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(host, "_asked", answer)
+    monkeypatch.setattr(host, "_ask_llvm", answer)
     monkeypatch.setattr(host, "PROCESSORS", tmp_path / "cpuinfo")
     return questions
 

@@ -49,7 +49,7 @@ def makes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[str]:
         names.append(function.__name__)
         return make(tree, function, *given)
 
-    monkeypatch.setattr(source, "copied", counted)
+    monkeypatch.setattr(source, "copy_text", counted)
     return names
 
 

@@ -72,7 +72,7 @@ def test_arrays_become_addresses_in_one_place() -> None:
     result = {
         str(path.relative_to(package)) for path in package.rglob("*.py") if address.search(path.read_text())
     }
-    own = {"viewer/screen.py"}  # names X11 result type
+    own = {"viewer/screen.py"}  # names X11's result type
     driver = {f"kernel/cuda_{part}.py" for part in ("launching", "memory")}  # returns when it has copied
     assert result == {"kernel/machine.py"} | own | driver
 
@@ -81,7 +81,7 @@ def test_a_file_that_the_loader_does_not_know_is_left_to_llvm(monkeypatch: pytes
     """Machine code and values are the same."""
     points = np.random.default_rng(0).uniform(-1, 1, (3, 1000))
     linked = link(mandelbulb(power=8, iterations=4))
-    own = {"viewer/screen.py"}  # names X11 result type
+    own = CpuKernel(linked)
     monkeypatch.setattr(machine, "KIND", b"")
     other = CpuKernel(linked)
     assert isinstance(own._points._engine, Image)

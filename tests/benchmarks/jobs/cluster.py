@@ -25,7 +25,7 @@ from fracslice.cluster import Contents, Pool, ResultFolder, Task, Workers, conne
 from fracslice.cluster.pool import run_task as make_piece
 from fracslice.export.layer_files import write_slices
 from fracslice.formulas import mandelbulb
-from fracslice.jobs import shared_mesh as meshtasks
+from fracslice.jobs import shared_mesh
 from fracslice.jobs.mesh import make_mesh
 from fracslice.jobs.slices import SliceRecipe
 from fracslice.meshjob import MeshJob
@@ -237,7 +237,7 @@ def rows(
     workers: tuple[int, ...] = (1, 10, 100, 300, 1000),
     plot: str = "",
 ) -> Iterator[Row]:
-    meshtasks.LEAST, exploration.MANY = bricks, bricks  # samples are tasks, as in the larger job
+    shared_mesh.LEAST, exploration.MANY = bricks, bricks  # samples are tasks, as in the larger job
     threads, sizes = run.threads[0], (pixels, layers, voxels, width, frames)
     kinds, smaller = jobs(*sizes), jobs(pixels, 8, voxels // 2, width // 2, 1)
     nothing = [Nothing("nothing", number) for number in range(empty)]
