@@ -74,8 +74,13 @@ NEAR, GROWTH = 0.05, 2.0
 factor by which it grows.
 """
 
-MOST, TURNS, RETRIES = 250, 6, 8
-"""Maximum triangles that a fan replaces, rounds of fans, and attempts."""
+MOST, RINGS, TURNS, RETRIES = 64, 6, 6, 8
+"""Maximum triangles that a fan replaces, and their distance from a bad one; rounds of fans, and attempts."""
+
+ROUGH = 0.25
+"""Wrong triangles of an attempt, relative to its new vertices, above which a surface is too rough for sharp
+edges. On solids they are below 0.2 at the first attempt, and fewer at each further one.
+"""
 
 
 def with_ridges(
@@ -168,6 +173,9 @@ def _take_in(caps: list[Cap], crumb: Cap, reach: float) -> None:
         old = np.union1d(caps[nearest].old, crumb.old)
         caps[nearest] = Cap(old, caps[nearest].fan)
 
+
+FAN = -2
+"""Mark of the triangles of new fans."""
 
 Disk = tuple[list[int], list[tuple[int, int, int]]]
 """Triangles, and the fan that may replace them."""
@@ -265,7 +273,7 @@ class _Sharpened:
         keep = np.ones(len(self.parents), bool)
         keep[gone] = False
         mesh = Mesh(self.mesh.vertices, np.concatenate([self.mesh.triangles[keep], fans]))
-        parents = np.concatenate([self.parents[keep], np.full(len(fans), -1)])
+        parents = np.concatenate([np.maximum(self.parents[keep], -1), np.full(len(fans), FAN)])
         return _Sharpened(self.old, mesh, parents, np.concatenate([self.measured[keep], measured]))
 
     def bad(self, voxel: float, least: float = UP) -> NDArray[np.int64]:
@@ -325,7 +333,7 @@ class _Sharpening:
         sided[self._missed.of(mesh, edges).edges] = True
         hosts, corners = self._missed.corners(mesh, np.flatnonzero(sided[edges.sides].any(axis=1)))
         banned, reach, given = np.empty((0, 3)), NEAR * self._voxel, None
-        stays = np.ones(len(corners), bool)
+        stays, most = np.ones(len(corners), bool), math.inf
         for _ in range(RETRIES):
             self._work.check()
             if given is None or not stays[given.corners].all():
@@ -337,6 +345,10 @@ class _Sharpening:
             wrong = self._wrong(result)
             if not len(wrong):
                 return result
+            most = min(most, ROUGH * len(result.new_vertices()))
+            if len(wrong) >= most:
+                return None
+            most = len(wrong)
             at = np.unique(result.mesh.triangles[wrong])
             new = result.mesh.vertices[at[at >= len(mesh.vertices)]]
             banned = np.concatenate([banned, new, result.mesh.corners[wrong].mean(axis=1)])
@@ -375,12 +387,15 @@ class _Sharpening:
         )
         ends = np.ones(len(given.corners), bool), np.zeros(len(points), bool)
         fixed = np.concatenate([self._tips, *ends])
+        bad = state.bad(self._voxel)
         for _ in range(TURNS):
             self._work.check()
-            following = self._fanned(state, fixed)
+            following = self._fanned(state, fixed, bad) if len(bad) else None
             if following is None:
                 break
-            state = following
+            # the others were tried, and nothing near them has changed
+            near = _rings(following.mesh, np.flatnonzero(following.parents == FAN))
+            state, bad = following, np.intersect1d(following.bad(self._voxel), near)
         return state
 
     def _wrong(self, state: _Sharpened) -> NDArray[np.int64]:
@@ -391,13 +406,12 @@ class _Sharpening:
         crossing = self_intersecting_triangles(as_written, threads=self._work.threads, among=new)
         return np.union1d(state.bad(self._voxel, 0.0), np.flatnonzero(crossing))
 
-    def _fanned(self, state: _Sharpened, fixed: NDArray[np.bool_]) -> _Sharpened | None:
+    def _fanned(
+        self, state: _Sharpened, fixed: NDArray[np.bool_], bad: NDArray[np.int64]
+    ) -> _Sharpened | None:
         """Replace bad triangles by fans around new vertices or corners; None if none can be replaced."""
         mesh, voxel = state.mesh, self._voxel
-        bad = state.bad(voxel)
-        if not len(bad):
-            return None
-        disks = _Disks(state, fixed, THIN * voxel)
+        disks = _Disks(state, fixed, THIN * voxel, bad)
         apex = fixed.copy()
         apex[len(state.old.vertices) :] = True
         near = bad[np.argsort(~fixed[mesh.triangles[bad]].any(axis=1), kind="stable")].tolist()
@@ -420,26 +434,45 @@ class _Sharpening:
 
 
 class _Disks:
-    """Disks of triangles, each seen in full from a vertex. Plain numbers: disks are small."""
+    """Disks of triangles, each seen in full from a vertex. Plain numbers, of triangles within `RINGS` of some
+    alone: disks are small.
+    """
 
-    def __init__(self, state: _Sharpened, fixed: NDArray[np.bool_], thin: float) -> None:
-        corners = state.mesh.triangles.astype(np.int64)
+    def __init__(
+        self, state: _Sharpened, fixed: NDArray[np.bool_], thin: float, some: NDArray[np.int64]
+    ) -> None:
+        self._thin, self._which = thin, _rings(state.mesh, some)
+        self._vertices, corners = np.unique(state.mesh.triangles[self._which], return_inverse=True)
+        corners = corners.reshape(-1, 3).astype(np.int64)
         after = np.roll(corners, -1, axis=1)
         keys, back = ((a << 32 | b).ravel() for a, b in ((corners, after), (after, corners)))
         order = np.argsort(keys)
         place = np.minimum(np.searchsorted(keys, back, sorter=order), len(keys) - 1)
         beyond = np.where(keys[order[place]] == back, order[place] // 3, -1).reshape(-1, 3)
-        self._beyond, self._triangles, self._thin = beyond.tolist(), corners.tolist(), thin
+        self._beyond, self._triangles = beyond.tolist(), corners.tolist()
         self._order = np.argsort(corners, axis=None, kind="stable")
-        self._starts = np.searchsorted(corners.ravel()[self._order], np.arange(len(state.mesh.vertices) + 1))
-        self._points, self._fixed = state.mesh.vertices.tolist(), fixed
-        self._normals = state.measured[:, :3].tolist()
-        self._alike = [tuple(normal) for normal in np.round(state.measured[:, :3], 3).tolist()]
+        self._starts = np.searchsorted(corners.ravel()[self._order], np.arange(len(self._vertices) + 1))
+        self._points = state.mesh.vertices[self._vertices].tolist()
+        self._fixed = fixed[self._vertices].tolist()
+        measured = state.measured[self._which, :3]
+        self._normals = measured.tolist()
+        self._alike = [tuple(normal) for normal in np.round(measured, 3).tolist()]
 
     def grown(self, first: int, apex: int) -> Disk | None:
         """A disk with a triangle and the star of a vertex, grown until the fan around that vertex faces as
         the disk does: its triangles and the fan. None if there is no such disk or it would swallow a corner.
         """
+        found = self._grown(
+            int(np.searchsorted(self._which, first)), int(np.searchsorted(self._vertices, apex))
+        )
+        if found is None:
+            return None
+        disk, fan = found
+        fans = self._vertices[np.array(fan)].tolist()
+        return self._which[disk].tolist(), [(a, b, c) for a, b, c in fans]
+
+    def _grown(self, first: int, apex: int) -> Disk | None:
+        """The same in numbers of this class."""
         more = {first, *(self._order[self._starts[apex] : self._starts[apex + 1]] // 3).tolist()}
         disk, normals = set[int](), dict[tuple[float, ...], list[float]]()
         while more and len(disk) + len(more) <= MOST:
@@ -492,9 +525,22 @@ class _Disks:
         return disk, fan
 
 
+def _rings(mesh: Mesh, some: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Some triangles of a mesh and those within `RINGS` of them."""
+    near = np.zeros(len(mesh.triangles), bool)
+    near[some] = True
+    for _ in range(RINGS):
+        reached = np.zeros(len(mesh.vertices), bool)
+        reached[mesh.triangles[near]] = True
+        near = np.asarray(reached[mesh.triangles].any(axis=1))
+    return np.flatnonzero(near)
+
+
 def _away(points: NDArray[np.float64], banned: NDArray[np.float64], reach: float) -> NDArray[np.bool_]:
     """Whether points are farther than `reach` from all banned ones."""
-    away = np.ones(len(points), bool)
-    for one in banned:
-        away &= np.linalg.norm(points - one, axis=1) > reach
+    from scipy.spatial import cKDTree
+
+    if not len(banned) or not len(points):
+        return np.ones(len(points), bool)
+    away: NDArray[np.bool_] = cKDTree(banned).query(points, distance_upper_bound=2 * reach)[0] > reach
     return away
