@@ -1,6 +1,6 @@
 # make demo: a shipped scene becomes a printable mesh. make test: tests and linters. make wheel: a wheel that needs no OpenVDB.
 # make docs: the site, in docs/_build.
-# make nightly: 500 random scenes, an hour or two, and 200 random hybrids.
+# make nightly: the tests with all their cases, 500 random scenes, 200 random hybrids; some hours.
 # make native-tests: unit tests of the native code. make sanitize: all of it under GCC's sanitizers, some minutes.
 # All of them set up what is missing first: Debian packages (as root or with sudo) and an own .venv. Debian 12, Ubuntu 24.04.
 # Another Python, in a venv of its own: make test PYTHON=python3.13 VENV=.venv-3.13
@@ -45,6 +45,7 @@ $(VENV)/.docs: docs/requirements.lock | $(VENV)/.locked
 	touch $@
 
 nightly: setup
+	$(BIN)/python -m pytest -n 2 -m nightly
 	$(BIN)/python -m tests.benchmarks stability.random_scenes
 	$(BIN)/python -m tests.benchmarks stability.random_hybrids
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable
 from functools import reduce
+from typing import Any
+
+import pytest
 
 from fracslice.formulas import (
     Formula,
@@ -222,3 +226,20 @@ DEFINED = {
     "a distance": formula(Definition("egg", (("flat", Number(0.7, "")),), _EGG, "distance"))(),
 }
 """Formulas as a scene defines them; they are not registered."""
+
+REPRESENTATIVES = {
+    "a distance", "a step", "abox", "apollonian", "bend", "bounds", "bristorbrot julia", "burning ship",
+    "cone", "cosine bulb", "deep", "difference", "foam of walls", "gear", "gyroid wall", "honeycomb",
+    "hybrid transformed", "julia 4d", "kaleidoscopic octahedron", "kelvin struts", "koch",
+    "lambda bulb", "mandelbox -1.5", "mandelbulb", "mandelbulb 7.5", "many", "material", "menger",
+    "mirror", "octahedron flake", "perlin noise", "prism", "pseudo kleinian", "quaternion julia 4",
+    "repeat overlapping", "rounded box", "schwarz_d wall", "shell", "smooth intersection",
+    "smooth union", "snowflake", "sphere", "superquadric", "thread", "transform", "tree", "twist x",
+}  # fmt: skip
+"""Examples of which none is built like another; tests that are stamped on all have the others in a night."""
+
+
+def stamped(cases: Iterable[Any], often: Collection[Any] = REPRESENTATIVES) -> list[Any]:
+    """Cases of a test: those of `often` in every run, the others in `make nightly`."""
+    values = ((case, case if isinstance(case, tuple) else (case,)) for case in cases)
+    return [case if case in often else pytest.param(*of, marks=pytest.mark.nightly) for case, of in values]

@@ -13,12 +13,25 @@ import pytest
 from tests.benchmarks import __main__ as benchmarks
 from tests.benchmarks.jobs.scaling import serial_share
 from tests.benchmarks.runner import Run, Spread, markdown, process
+from tests.examples import stamped
+
+pytestmark = pytest.mark.once
 
 PAGE = (Path(__file__).parents[1] / "docs/measurements.md").read_text(encoding="utf-8")
 NAMES = list(benchmarks.summaries())
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if not name.startswith("gpu.")])
+HERE = [name for name in NAMES if not name.startswith("gpu.")]
+LONG = {
+    "jobs.cluster",
+    "jobs.workers",
+    "stability.random_hybrids",
+    "stability.random_scenes",
+    "frame.convergence",
+}
+
+
+@pytest.mark.parametrize("name", stamped(HERE, {*HERE} - LONG))
 def test_runs_at_its_smallest_size(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     if name in ("jobs.cluster", "jobs.workers"):  # workers as threads, which start at once
         distributed = pytest.importorskip("distributed")

@@ -11,10 +11,24 @@ from fracslice.mesh.solid import to_manifold
 from fracslice.scene import library, read, reads, to_xml
 from fracslice.scene.layout import formulas
 from fracslice.scene.schema import OPEN, PATH
+from tests.examples import stamped
+
+pytestmark = pytest.mark.once
 
 NAMES = library.names()
 FINE = ("lattice-cube", "mandelbulb", "pendant", "three-worlds")
 """Scenes that are made at 256 voxels, too."""
+OFTEN = (
+    "bauble",
+    "hybrid",
+    "mandelbox",
+    "menger-tower",
+    "own-formula",
+    "pendant",
+    "quaternion-julia",
+    "three-worlds",
+)
+"""Scenes that are made in every run; the others in a night."""
 
 
 def test_there_are_at_least_ten_and_they_show_what_there_is():
@@ -40,7 +54,10 @@ def test_it_fits_the_schema_and_survives_writing(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "resolution"), [*((name, 128) for name in NAMES), *((name, 256) for name in FINE)]
+    ("name", "resolution"),
+    stamped(
+        [*((name, 128) for name in NAMES), *((name, 256) for name in FINE)], [(name, 128) for name in OFTEN]
+    ),
 )
 def test_it_becomes_a_solid_that_prints(name, resolution):
     scene = read(library.path(name))

@@ -21,6 +21,8 @@ from fracslice.work import Work
 
 from ..mesh import shapes
 
+pytestmark = pytest.mark.once
+
 COPY = 'import shutil, sys; shutil.copy(sys.argv[1], sys.argv[2]); print(\'{"wall_s": 7.5, "cpu_s": 8}\')'
 
 

@@ -14,6 +14,8 @@ from .evaluations import evaluations, per_sample
 from .instructions import assembly, instructions, sizes
 from .ledger import budgets, exceeded
 
+pytestmark = pytest.mark.once
+
 X86 = platform.machine() in ("x86_64", "AMD64")
 
 

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.once
+
 BALL = '<scene version="1"><solid size="20mm"><sphere/></solid></scene>'
 MODULES = """
 import sys

@@ -17,6 +17,8 @@ from PIL import Image
 
 from fracslice.mesh import Mesh
 
+pytestmark = pytest.mark.once
+
 COARSE = ["--layer", "0.5mm", "--pixel", "0.5mm", "-q"]
 PLATE = (20, 20, 2)
 

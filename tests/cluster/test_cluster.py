@@ -37,6 +37,8 @@ from fracslice.work import Work
 
 from .processes import SECONDS, Cluster, wait_until
 
+pytestmark = pytest.mark.once
+
 pytest.importorskip("distributed")
 ROOT = mandelbulb(iterations=4)
 RECIPE = SliceRecipe(to_xml(scene(ROOT, size="20mm")), "bulb", SliceJob(20.0, 0.1, (0.05, 0.05)), None, "cli")

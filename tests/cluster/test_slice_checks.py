@@ -20,6 +20,8 @@ from fracslice.slicing import SliceJob
 from fracslice.slicing.layer_checks import check_layers, findings_of
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 pytest.importorskip("fsspec")
 CAVITY = sphere(radius=0.3).translate((-0.4, 0.0, 0.0))
 WELL = cylinder(radius=0.2, height=1.0).translate((0.4, 0.0, 0.4))

@@ -33,7 +33,9 @@ from fracslice.formulas import (
     union,
 )
 from fracslice.kernel import reference
-from tests.examples import EXAMPLES
+from tests.examples import EXAMPLES, stamped
+
+pytestmark = pytest.mark.once
 
 ESCAPE_TIME = {k for k, n in EXAMPLES.items() if n.bounds.exterior_only}
 
@@ -43,7 +45,7 @@ def test_every_formula_has_an_example() -> None:
     assert used == set(names())
 
 
-@pytest.mark.parametrize("name", EXAMPLES)
+@pytest.mark.parametrize("name", stamped(EXAMPLES))
 def test_inside_is_within_the_box(name: str) -> None:
     root = EXAMPLES[name]
     points = np.random.default_rng(1).uniform(-3, 3, (3, 40_000))
@@ -68,7 +70,7 @@ def worst_slope(root: Node, seed: int = 0, count: int = 20_000) -> float:
     return float((np.abs(f(*a) - f(*b)) / np.linalg.norm(a - b, axis=0)).max() / root.bounds.lipschitz)
 
 
-@pytest.mark.parametrize("name", sorted(set(EXAMPLES) - ESCAPE_TIME))
+@pytest.mark.parametrize("name", stamped(sorted(set(EXAMPLES) - ESCAPE_TIME)))
 def test_lipschitz_bound(name: str) -> None:
     assert worst_slope(EXAMPLES[name]) <= 1 + 1e-9
 

@@ -31,7 +31,9 @@ from fracslice.formulas import (
 from fracslice.formulas.inversions import MIDDLE, mirrors
 from fracslice.kernel import compile_scene
 from tests.benchmarks.formulas import pictures
-from tests.examples import EXAMPLES
+from tests.examples import EXAMPLES, stamped
+
+pytestmark = pytest.mark.once
 
 RNG = np.random.default_rng(7)
 BEFORE = {
@@ -57,7 +59,7 @@ FAMILIES = {
 }
 """Examples of all families."""
 
-each_family = pytest.mark.parametrize("name", FAMILIES)
+each_family = pytest.mark.parametrize("name", stamped(FAMILIES))
 
 
 def field(root: Node) -> Callable[..., np.ndarray]:

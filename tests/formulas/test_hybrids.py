@@ -21,8 +21,11 @@ from fracslice.formulas import (
 from fracslice.formulas.orbits import growth_of
 from fracslice.kernel import compile_scene, link, reference
 from fracslice.scene import reads, scene, to_xml
+from tests.examples import stamped
 from tests.stability.bounds import verdict
 from tests.stability.random_hybrids import lost, random_hybrid
+
+pytestmark = pytest.mark.once
 
 RNG = np.random.default_rng(3)
 SCENE = """<scene version="1">
@@ -123,7 +126,7 @@ def test_only_a_step_is_repeated() -> None:
         orbit(sphere())
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", stamped(range(20), range(4)))
 def test_a_random_hybrid_loses_no_inside_sample(seed: int) -> None:
     """`make nightly` tries hundreds."""
     assert lost(random_hybrid(seed), 64) == 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -21,6 +22,8 @@ def main() -> None:
     assert cuda.available()
     with np.errstate(all="ignore"):
         for name, root in (EXAMPLES | DEFINED).items():
+            if sys.argv[1:] and name not in sys.argv[1:]:
+                continue
             for precision in ("float32", "float64"):
                 points(name, cuda.compile_scene(root, precision), reference(root))
         idioms()

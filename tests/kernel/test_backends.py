@@ -7,7 +7,7 @@ import pytest
 
 from fracslice.formulas import mandelbulb, sphere
 from fracslice.kernel import compile_scene, link, reference
-from tests.examples import DEFINED, EXAMPLES
+from tests.examples import DEFINED, EXAMPLES, stamped
 
 ALL = EXAMPLES | DEFINED
 
@@ -23,7 +23,7 @@ def random_points(dtype: str, count: int = 5000) -> np.ndarray:
 
 
 @pytest.mark.parametrize("precision", PRECISIONS)
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("name", stamped(ALL))
 class TestAgainstTheReference:
     def test_random_points(self, name: str, precision: str) -> None:
         points = random_points(precision)

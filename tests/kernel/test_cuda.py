@@ -17,19 +17,25 @@ import pytest
 from fracslice.errors import KernelError
 from fracslice.formulas import Node, sphere
 from fracslice.kernel import cuda, cuda_loops, cuda_source, link
-from tests.examples import DEFINED, EXAMPLES
+from tests.examples import DEFINED, EXAMPLES, stamped
 from tests.kernel.cuda_ptx import compiled
+
+pytestmark = pytest.mark.once
 
 installed = pytest.mark.skipif(
     importlib.util.find_spec("numba_cuda") is None, reason="numba-cuda is not installed"
 )
 
 
+SIMULATED = "foam of walls", "hybrid transformed", "mandelbulb 7.5", "menger", "smooth union", "twist x"
+"""Examples that are run on the simulator in every run; the others in a night."""
+
+
 @installed
 class TestMachineCode:
     """PTX for an H100 or H200, which needs no GPU to be compiled."""
 
-    @pytest.mark.parametrize("name", EXAMPLES | DEFINED)
+    @pytest.mark.parametrize("name", stamped(EXAMPLES | DEFINED))
     def test_float32_kernels_hold_no_float64(self, name: str, tmp_path: Path) -> None:
         ptx = points_of((EXAMPLES | DEFINED)[name], 32, tmp_path)
         assert ".f32" in ptx
@@ -58,10 +64,12 @@ def points_of(root: Node, bits: int, folder: Path) -> str:
 
 
 @installed
-def test_every_example_agrees_with_the_reference_on_the_simulator() -> None:
+@pytest.mark.parametrize("names", [SIMULATED, pytest.param((), marks=pytest.mark.nightly)])
+def test_examples_agree_with_the_reference_on_the_simulator(names: tuple[str, ...]) -> None:
+    """Some of them, or all."""
     # The simulator is chosen when Numba is imported, so it needs a process of its own.
     environment = {**os.environ, "NUMBA_ENABLE_CUDASIM": "1"}
-    command = [sys.executable, "-m", "tests.kernel.cuda_simulated"]
+    command = [sys.executable, "-m", "tests.kernel.cuda_simulated", *names]
     done = subprocess.run(command, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
 

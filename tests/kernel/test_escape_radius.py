@@ -34,6 +34,8 @@ from fracslice.scene.layout import formulas
 from tests.stability.bounds import verdict
 from tests.stability.random_hybrids import random_hybrid
 
+pytestmark = pytest.mark.once
+
 ORBITS = [f for f in formulas() if f.hooks.get("select") is orbit_select and f.name != "orbit"]
 TURNED = transform(abox(angle=20), rotate=(1, 2, 3, 40), scale=0.9, translate=(0.1, 0.2, 0))
 RNG = np.random.default_rng(5)

@@ -18,7 +18,9 @@ from fracslice.kernel.linker import CALLED, FIELD, link
 from fracslice.kernel.loops import enclosures
 from fracslice.kernel.reference import enclosure
 from fracslice.kernel.tree import Enclosures
-from tests.examples import EXAMPLES
+from tests.examples import EXAMPLES, stamped
+
+pytestmark = pytest.mark.once
 
 CELLS, POINTS = 96, 12
 KINDS = {
@@ -48,7 +50,7 @@ def cells(half: float) -> tuple[np.ndarray, np.ndarray]:
     return centres, centres[:, :, None] + offsets
 
 
-@pytest.mark.parametrize("name", sorted(EXAMPLES))
+@pytest.mark.parametrize("name", stamped(sorted(EXAMPLES)))
 def test_bounds_enclose_the_exact_field(name: str) -> None:
     root = resolve_depths(EXAMPLES[name], 0.1)
     enclosed, field = enclosure(root), exact(root)
@@ -90,7 +92,7 @@ def test_cells_are_empty_full_or_unknown() -> None:
     assert empty.tolist() == [False, False, True] and full.tolist() == [True, False, False]
 
 
-@pytest.mark.parametrize("name", sorted(EXAMPLES))
+@pytest.mark.parametrize("name", stamped(sorted(EXAMPLES)))
 def test_no_cell_is_lost(name: str) -> None:
     """Cells against a dense grid of 64^3 points."""
     root = resolve_depths(EXAMPLES[name], 0.1)

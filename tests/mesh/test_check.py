@@ -24,6 +24,8 @@ from fracslice.mesh.topology import component_sizes, edge_topology
 
 from .shapes import BAD, GOOD, cube, inverted, sphere, torus, with_moved
 
+pytestmark = pytest.mark.once
+
 
 @pytest.mark.parametrize("name", GOOD)
 def test_good_meshes_are_accepted(name: str) -> None:

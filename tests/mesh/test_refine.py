@@ -29,6 +29,8 @@ from fracslice.mesh.refine import refine
 from fracslice.scene import scene
 from fracslice.volume import Plan, plan, sample_scene
 
+pytestmark = pytest.mark.once
+
 
 def made(root: Node, resolution: float) -> tuple[Plan, Mesh]:
     planned = plan(root, resolution)

@@ -21,6 +21,8 @@ from fracslice.work import Work
 
 from . import shapes
 
+pytestmark = pytest.mark.once
+
 
 def fine(root, resolution: float) -> Mesh:
     planned = plan(root, resolution)

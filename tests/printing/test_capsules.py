@@ -11,6 +11,8 @@ from fracslice.printing.bridging import capsules
 from fracslice.printing.samples import positions
 from fracslice.volume import Bricks, Lattice, sample
 
+pytestmark = pytest.mark.once
+
 VOXEL = 0.05
 LIKE = sample(
     compile_scene(sphere()), sphere().bounds, Lattice.around(sphere().bounds.box.grown(VOXEL), VOXEL)

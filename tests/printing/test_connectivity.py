@@ -20,6 +20,8 @@ from fracslice.volume import Lattice, Plan, plan, sample, sample_scene_signs
 from fracslice.volume.sizing import Sizing
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 SIZE = 20.0
 VOXEL = 2 / COARSE
 """Of objects two units large, about, in their units."""

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 import trimesh
 
 from fracslice.formulas import mandelbulb, sphere, transform
 from fracslice.mesh import Mesh
 from fracslice.mesh.field import MeshField
 from fracslice.printing.edits import EditedField
+
+pytestmark = pytest.mark.once
 
 TORN = mandelbulb(iterations=4, power=7.5)
 

@@ -12,6 +12,8 @@ from fracslice.scene import Print
 from fracslice.slicing import SliceJob, plan_stack
 from fracslice.slicing.layer_checks import PrintReport, check_layers
 
+pytestmark = pytest.mark.once
+
 
 def checked(root: Node, **printing: float | str) -> PrintReport:
     how = Print(**printing)  # type: ignore[arg-type]

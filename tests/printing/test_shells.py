@@ -12,6 +12,8 @@ from fracslice.printing.problems import Limits
 from fracslice.printing.solid_checks import SolidReport, check_object
 from fracslice.volume import plan
 
+pytestmark = pytest.mark.once
+
 SIZE = 20.0
 VOXEL = 2.1 / 96
 """Of objects two units large, about, in their units."""

@@ -49,6 +49,8 @@ from fracslice.volume.grid import from_grid, to_grid
 from fracslice.volume.sizing import Sizing
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 SIZE = 20.0
 
 

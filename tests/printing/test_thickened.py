@@ -15,6 +15,8 @@ from fracslice.volume import Plan, plan, sample_scene
 from fracslice.volume.sizing import Sizing
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 SIZE = 20.0
 
 

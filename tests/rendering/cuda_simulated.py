@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -21,7 +22,7 @@ SINGLE = np.dtype(np.float32)
 
 
 def kernels() -> None:
-    for name in CASES:
+    for name in sys.argv[1:] or CASES:
         pictures = [HostAccumulator.empty(WIDTH, HEIGHT, SINGLE) for _ in range(2)]
         for picture in pictures:
             picture.channels[..., 5:7] = SAMPLE, SAMPLE + 1

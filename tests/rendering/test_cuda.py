@@ -14,15 +14,21 @@ import pytest
 from fracslice.kernel import Linked
 from fracslice.rendering import cuda_accumulator
 from fracslice.rendering.cuda_loops import loops
+from tests.examples import stamped
 from tests.kernel.cuda_ptx import compiled
 from tests.rendering.cuda_cases import CASES, frame
 
-pytestmark = pytest.mark.skipif(
-    importlib.util.find_spec("numba_cuda") is None, reason="numba-cuda is not there"
-)
+pytestmark = [
+    pytest.mark.once,
+    pytest.mark.skipif(importlib.util.find_spec("numba_cuda") is None, reason="numba-cuda is not there"),
+]
 
 
-@pytest.mark.parametrize("name", CASES)
+SIMULATED = "bodies that glow", "depth of field", "glass and mirrors", "surroundings, a sun that rays meet"
+"""Cases of every run; the others are of a night."""
+
+
+@pytest.mark.parametrize("name", stamped(CASES, SIMULATED))
 def test_float32_kernels_hold_no_float64(name: str, tmp_path: Path) -> None:
     seen = frame(name)
     ptx = compiled(seen.linked, 32, loops(seen), "tile", "RNRIRnrn", tmp_path)
@@ -46,8 +52,10 @@ def test_threads_go_on_together_after_the_march(tmp_path: Path) -> None:
     assert "bar.warp.sync" in compiled(seen.linked, 32, loops(seen), "tile", "RNRIRnrn", tmp_path)
 
 
-def test_pictures_are_those_of_the_lanes_on_the_simulator() -> None:
+@pytest.mark.parametrize("names", [SIMULATED, pytest.param((), marks=pytest.mark.nightly)])
+def test_pictures_are_those_of_the_lanes_on_the_simulator(names: tuple[str, ...]) -> None:
+    """Some of them, or all."""
     environment = {**os.environ, "NUMBA_ENABLE_CUDASIM": "1"}
-    command = [sys.executable, "-m", "tests.rendering.cuda_simulated"]
+    command = [sys.executable, "-m", "tests.rendering.cuda_simulated", *names]
     done = subprocess.run(command, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

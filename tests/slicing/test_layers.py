@@ -33,7 +33,7 @@ from fracslice.scene import scene
 from fracslice.slicing import Layer, SliceJob, Slicer, Stack, plan_stack
 from fracslice.slicing.layers import Sampler
 from fracslice.work import Work
-from tests.examples import EXAMPLES
+from tests.examples import EXAMPLES, stamped
 
 FINITE = [name for name, root in EXAMPLES.items() if root.bounds.box.finite]
 
@@ -85,7 +85,7 @@ def test_an_object_far_from_the_origin_is_exact_or_refused() -> None:
         made(1e5)
 
 
-@pytest.mark.parametrize("name", FINITE)
+@pytest.mark.parametrize("name", stamped(FINITE))
 def test_closed_and_equal_to_dense_sampling(name: str) -> None:
     stack = stack_of(EXAMPLES[name])
     z = stack.z[len(stack.z) // 3 :][:8]
@@ -171,7 +171,7 @@ def test_threads_and_the_choice_of_layers_do_not_matter(name: str) -> None:
     assert some == [first[k][1] for k in (3, 9, 11)]
 
 
-@pytest.mark.parametrize("name", FINITE)
+@pytest.mark.parametrize("name", stamped(FINITE))
 def test_runs_are_those_of_the_pixels(name: str) -> None:
     stack = stack_of(EXAMPLES[name], 61)
 

@@ -25,6 +25,8 @@ from fracslice.slicing import SliceJob, plan_stack
 from fracslice.slicing.layer_checks import PrintReport, check_layers
 from fracslice.volume import extent
 
+pytestmark = pytest.mark.once
+
 SEEDS = range(5)
 Random = np.random.Generator
 Family = Callable[[Random], Node]

@@ -26,6 +26,8 @@ from .bounds import verdict
 from .draws import drawn
 from .seams import SEAMS
 
+pytestmark = pytest.mark.once
+
 HARD: dict[str, Node] = {
     "Julia set in pieces": julia(iterations=12, c=(0.3, 0.5, 0.4, 0)),
     "shipped Julia set": julia(iterations=12, c=(-0.291, -0.399, 0.339, 0.437)),

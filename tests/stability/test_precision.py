@@ -10,19 +10,21 @@ import pytest
 from fracslice.formulas import names, sphere, transform
 from fracslice.formulas.field import Precision
 from fracslice.kernel import compile_scene
-from tests.examples import EXAMPLES
+from tests.examples import EXAMPLES, stamped
 from tests.stability.random_scenes import ORBITS
 
 from .extremes import ends
 from .measure import coordinate_error, depth_error, nan_count, scale_error
 from .scaling import LENGTHS, scaled
 
+pytestmark = pytest.mark.once
+
 LIMIT: dict[Precision, float] = {"float32": 1e-5, "float64": 2e-14}
 DEEP = {name: root for name, root in EXAMPLES.items() if "iterations" in root.values}
 
 
 @pytest.mark.parametrize("precision", LIMIT)
-@pytest.mark.parametrize("name", EXAMPLES)
+@pytest.mark.parametrize("name", stamped(EXAMPLES))
 class TestEveryFormula:
     def test_ten_decades_of_scale(self, name: str, precision: Precision) -> None:
         assert scale_error(EXAMPLES[name], precision, 500) < LIMIT[precision]
@@ -36,7 +38,7 @@ class TestEveryFormula:
 
 
 @pytest.mark.parametrize("precision", LIMIT)
-@pytest.mark.parametrize("name", DEEP)
+@pytest.mark.parametrize("name", stamped(DEEP))
 def test_a_thousand_steps(name: str, precision: Precision) -> None:
     assert depth_error(DEEP[name], precision, 400) < LIMIT[precision]
 

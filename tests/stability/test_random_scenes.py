@@ -7,9 +7,12 @@ import pytest
 
 from fracslice.formulas import Formula, Node
 from fracslice.kernel.depth import AUTO
+from tests.examples import stamped
 
 from .random_scenes import LEAVES, OTHERS, leaf, random_scene
 from .volumes import volumes
+
+pytestmark = pytest.mark.once
 
 TREES, EACH = (2, 10, 16, 19, 25, 29, 50, 57, 69), 4
 """Trees with every kind of element that need little to be compiled, and four times other numbers."""
@@ -17,7 +20,7 @@ TREES, EACH = (2, 10, 16, 19, 25, 29, 50, 57, 69), 4
 RESOLUTION = 48
 
 
-@pytest.mark.parametrize("tree", TREES)
+@pytest.mark.parametrize("tree", stamped(TREES, TREES[1:3]))
 def test_a_random_scene_is_a_solid_of_its_own_volume(tree: int) -> None:
     result = {numbers: volumes(random_scene(tree, numbers), RESOLUTION) for numbers in range(EACH)}
     assert {numbers: one.faults for numbers, one in result.items() if one.faults} == {}

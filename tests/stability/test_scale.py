@@ -12,6 +12,8 @@ from fracslice.volume import plan, sample_scene
 
 from .scaling import SCALINGS
 
+pytestmark = pytest.mark.once
+
 VOXELS = 40.0
 
 

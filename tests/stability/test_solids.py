@@ -10,11 +10,19 @@ from fracslice.formulas import intersection, sphere, transform
 from fracslice.kernel.depth import resolve_depths
 from fracslice.scene import library
 from tests.benchmarks.stability.scenes import drawn_settings
+from tests.examples import stamped
 
 from .solids import Outcome, outcome
 
+pytestmark = pytest.mark.once
 
-@pytest.mark.parametrize("name", sorted({*library.names()} - {"hybrid"}))  # its steps are no solids
+
+OFTEN = "geode", "mandelbulb", "spinning-top", "trophy"
+
+
+@pytest.mark.parametrize(
+    "name", stamped(sorted({*library.names()} - {"hybrid"}), OFTEN)
+)  # its steps are no solids
 def test_other_numbers_make_a_solid(name: str) -> None:
     root = drawn_settings(name, 1)[1]
     result = outcome(root, 24, threads=2)

@@ -19,6 +19,8 @@ from fracslice.scene.view import Camera
 from fracslice.viewer import fly, screen, viewer
 from tests.viewer.xserver import AVAILABLE, XServer, xserver
 
+pytestmark = pytest.mark.once
+
 pytest.importorskip("pyvista")
 real = pytest.mark.skipif(not AVAILABLE, reason="Xvfb and libXtst are not installed")
 

@@ -31,7 +31,7 @@ from fracslice.volume import Bricks, Lattice, extent, plan, sample, sample_scene
 from fracslice.volume.bricks import INSIDE, OUTSIDE
 from fracslice.volume.pruning import Proofs
 from fracslice.work import Work
-from tests.examples import EXAMPLES
+from tests.examples import EXAMPLES, stamped
 
 FINITE = [name for name, root in EXAMPLES.items() if root.bounds.box.finite]
 
@@ -67,7 +67,7 @@ def open_edges(bricks: Bricks) -> int:
     return count
 
 
-@pytest.mark.parametrize("name", FINITE)
+@pytest.mark.parametrize("name", stamped(FINITE))
 def test_closed_and_equal_to_dense_sampling(name: str) -> None:
     planned = plan(EXAMPLES[name], 48)
     bricks = sample_scene(planned)
