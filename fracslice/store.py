@@ -19,6 +19,9 @@ from .kernel.host import toolchain
 
 Arrays = Mapping[str, np.ndarray]
 
+NAME = "name of the file"
+"""Entry of a file that holds its name."""
+
 
 @dataclass(frozen=True)
 class Store:
@@ -33,12 +36,12 @@ class Store:
     def get(self, made_of: tuple[object, ...], make: Callable[[], Arrays]) -> Arrays:
         """Return cached arrays, or compute and cache them."""
         kept, name = Kept(self.folder), f"{key(program(), toolchain(), *made_of)}.npz"
-        value = kept.get(name, _read_arrays)
+        value = kept.get(name, partial(_read_arrays, name))
         if value is not None:
             return value
         made = make()
         try:
-            kept.put(name, partial(_write, made))
+            kept.put(name, partial(_write, name, made))
         except ExportError as error:
             raise VolumeError(str(error)) from None
         return made
@@ -49,14 +52,15 @@ def stored(store: Store | None, parts: tuple[object, ...], root: Field, make: Ca
     return make() if store is None else store.get((*parts, root.key), make)
 
 
-def _read_arrays(file: BinaryIO) -> Arrays | None:
-    """Read the arrays of a file; None if it is incomplete."""
+def _read_arrays(name: str, file: BinaryIO) -> Arrays | None:
+    """Read the arrays of a file; None if it is incomplete or was written under another name."""
     try:
         with np.load(file, allow_pickle=False) as arrays:
-            return dict(arrays)
+            found = dict(arrays)
+            return found if str(found.pop(NAME)) == name else None
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
         return None
 
 
-def _write(arrays: Arrays, file: BinaryIO) -> None:
-    np.savez(file, allow_pickle=False, **arrays)
+def _write(name: str, arrays: Arrays, file: BinaryIO) -> None:
+    np.savez(file, allow_pickle=False, **arrays, **{NAME: np.array(name)})

@@ -178,3 +178,18 @@ def test_files_of_the_program_are_read_once(tmp_path: Path, monkeypatch: pytest.
     (package / "inner" / "b.py").write_text("2")
     assert program() != before
     assert len(hashed) == 2
+
+
+def test_a_file_under_another_name_is_made_again(tmp_path: Path) -> None:
+    """Two complete files that were exchanged: both are of another field."""
+    work = Work(store=Store(tmp_path))
+    sampled(work, sphere(), sphere(radius=0.5))
+    one, other = sorted(tmp_path.iterdir())
+    for a, b in ((one, tmp_path / "kept"), (other, one), (tmp_path / "kept", other)):
+        a.rename(b)
+    own = [sample_scene(planned(root), Work()).evaluations for root in (sphere(), sphere(radius=0.5))]
+    assert sampled(work, sphere(), sphere(radius=0.5)) == own
+    kept = cache.Kept(tmp_path / "texts")
+    assert (kept.cached("a", lambda: b"1"), kept.cached("b", lambda: b"2")) == (b"1", b"2")
+    (kept.folder / "a").replace(kept.folder / "b")
+    assert kept.cached("b", lambda: b"2") == b"2"

@@ -56,7 +56,7 @@ class Kept:
         """Read a cached file with a checksum; without one, or if it is damaged, make and cache its
         contents.
         """
-        data = self.get(name, _verify_checksum)
+        data = self.get(name, lambda file: _verify(name, file))
         if data is None:
             data = make()
             self.put_checked(name, data)
@@ -65,7 +65,7 @@ class Kept:
     def put_checked(self, name: str, data: bytes) -> None:
         """Replace a cached file of `cached`; ignore a folder that cannot be written."""
         with suppress(ExportError):
-            self.put(name, lambda file: file.write(hashlib.sha256(data).digest() + data))
+            self.put(name, lambda file: file.write(_digest(name, data) + data))
 
     def _read(self, name: str, read: Callable[[BinaryIO], T], here: int | None) -> T:
         with open_private(self.folder / name, "rb", folder=here) as file:
@@ -83,10 +83,15 @@ class Kept:
         return None
 
 
-def _verify_checksum(file: BinaryIO) -> bytes | None:
+def _digest(name: str, data: bytes) -> bytes:
+    """Checksum of a file's name and contents: a file under another name is not taken for its own."""
+    return hashlib.sha256(name.encode() + b"\0" + data).digest()
+
+
+def _verify(name: str, file: BinaryIO) -> bytes | None:
     """Contents after their checksum; None if they do not match."""
     digest, data = file.read(hashlib.sha256().digest_size), file.read()
-    return data if hashlib.sha256(data).digest() == digest else None
+    return data if _digest(name, data) == digest else None
 
 
 @cache
