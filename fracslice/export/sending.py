@@ -10,10 +10,14 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import socket
+import threading
+import time
 import uuid
 from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from functools import partial
-from http.client import HTTPConnection, HTTPException, HTTPResponse
+from http.client import HTTPConnection, HTTPException
 from io import BufferedReader
 from pathlib import Path
 from urllib.parse import quote, urlsplit
@@ -21,13 +25,16 @@ from urllib.parse import quote, urlsplit
 from ..common.files import reporting_errors
 from ..common.settings import read_text
 from ..errors import ExportError
+from ..formulas.parameters import printable
 from ..work import Work
 
 PACKET = 1 << 20
 """Bytes of a packet of SDCP."""
 
 TIMEOUT = 30.0
-"""Seconds without an answer after which a printer counts as unreachable."""
+"""Seconds without a byte after which a printer counts as unreachable."""
+PATIENCE, LONGEST = 120.0, 1 << 20
+"""Most seconds that a packet and its answer take, and most bytes of an answer."""
 
 PORTS = {"prusalink": 80, "sdcp": 3030}
 STORAGES = {"prusalink": ("", "/", "/usb", "/local"), "sdcp": ("", "/")}
@@ -56,16 +63,69 @@ def send(path: str | Path, address: str, work: Work) -> str:
     protocol, host, port, storage = printer_address(address)
     upload = partial(_prusalink, storage) if protocol == "prusalink" else _sdcp
     with reporting_errors(Path(path)), open(path, "rb") as file:
-        connection = HTTPConnection(host, port, timeout=TIMEOUT)
+        connection = _Connection(host, port, timeout=TIMEOUT)
         try:
-            upload(connection, Path(path).name, file, os.fstat(file.fileno()).st_size, work)
+            with connection.watched(work):
+                upload(connection, Path(path).name, file, os.fstat(file.fileno()).st_size, work)
         except (OSError, HTTPException) as error:
-            raise ExportError(f"{address}: {getattr(error, 'strerror', None) or error}") from None
+            reason = getattr(error, "strerror", None) or str(error)
+            raise ExportError(f"{address}: {printable(reason[:200])}") from None
         except ExportError as error:
             raise ExportError(f"{address}: {error}") from None
         finally:
             connection.close()
     return f"{Path(path).name} is on {host}"
+
+
+class _Connection(HTTPConnection):
+    """A connection that ends when a packet and its answer take too long, or the job is cancelled.
+
+    A limit of the socket is for each byte alone, and a signal does not end a wait for the next one.
+    """
+
+    _end, _socket, _late = 0.0, None, False
+
+    def connect(self) -> None:
+        super().connect()
+        self._socket = self.sock  # a response may take it over
+
+    @contextmanager
+    def watched(self, work: Work) -> Iterator[None]:
+        """Watch the time and the cancellation of what is done within."""
+        done = threading.Event()
+        self.renew()
+        watch = threading.Thread(target=self._watch, args=(work, done), daemon=True)
+        watch.start()
+        try:
+            yield
+        except (OSError, HTTPException, ExportError):
+            if not self._late:
+                raise
+        finally:
+            done.set()
+            watch.join()
+        if self._late:
+            work.check()
+            raise ExportError(f"no complete answer within {PATIENCE:g} s")
+
+    def renew(self) -> None:
+        """Begin the time of the next packet."""
+        self._end = time.monotonic() + PATIENCE
+
+    def answer(self) -> tuple[int, bytes]:
+        """Status and contents of the response."""
+        response = self.getresponse()
+        contents = response.read(LONGEST + 1)
+        if len(contents) > LONGEST:
+            raise ExportError(f"the printer's answer is longer than {LONGEST} bytes")
+        return response.status, contents
+
+    def _watch(self, work: Work, done: threading.Event) -> None:
+        while not done.wait(0.05):
+            self._late = work.cancel.is_set() or time.monotonic() > self._end
+            if self._late and self._socket is not None:
+                with suppress(OSError):  # not connected any more
+                    self._socket.shutdown(socket.SHUT_RDWR)
 
 
 def _key() -> str:
@@ -81,18 +141,19 @@ def _key() -> str:
     return key
 
 
-def _packets(file: BufferedReader, size: int, work: Work) -> Iterator[bytes]:
+def _packets(connection: _Connection, file: BufferedReader, size: int, work: Work) -> Iterator[bytes]:
     """Contents of a file in packets."""
     sent = 0
     while packet := file.read(PACKET):
         work.check()
+        connection.renew()
         yield packet
         sent += len(packet)
         work.progress("sending", sent / size)
 
 
 def _prusalink(
-    storage: str, connection: HTTPConnection, name: str, file: BufferedReader, size: int, work: Work
+    storage: str, connection: _Connection, name: str, file: BufferedReader, size: int, work: Work
 ) -> None:
     """Store a file on a printer with PrusaLink; an existing one stays."""
     headers = {
@@ -103,8 +164,8 @@ def _prusalink(
         "Print-After-Upload": "?0",
     }
     url = f"/api/v1/files/{storage}/{quote(name)}"
-    connection.request("PUT", url, _packets(file, size, work), headers)
-    status = _read_response(connection.getresponse()).status
+    connection.request("PUT", url, _packets(connection, file, size, work), headers)
+    status, _ = connection.answer()
     if status in (401, 403):
         raise ExportError("the printer refuses the key")
     if status == 404:
@@ -115,37 +176,30 @@ def _prusalink(
         raise ExportError(f"the printer refuses the file with status {status}")
 
 
-def _sdcp(connection: HTTPConnection, name: str, file: BufferedReader, size: int, work: Work) -> None:
+def _sdcp(connection: _Connection, name: str, file: BufferedReader, size: int, work: Work) -> None:
     """Store a file on a printer with SDCP, packet by packet."""
     digest = hashlib.file_digest(file, "md5").hexdigest()
     file.seek(0)
     common = {"S-File-MD5": digest, "Check": "1", "Uuid": uuid.uuid4().hex, "TotalSize": str(size)}
     offset = 0
-    for packet in _packets(file, size, work):
+    for packet in _packets(connection, file, size, work):
         body, kind = _form({**common, "Offset": str(offset)}, name, packet)
         connection.request("POST", "/uploadFile/upload", body, {"Content-Type": kind})
-        response = connection.getresponse()
-        text = response.read()
+        status, text = connection.answer()
         try:
             done = json.loads(text)
-        except ValueError:
+        except (ValueError, RecursionError):
             done = {}
-        if response.status != 200 or not isinstance(done, dict) or not done.get("success"):
+        if status != 200 or not isinstance(done, dict) or not done.get("success"):
             raise ExportError(f"the printer refuses the file at byte {offset}: {_reason(done)}")
         offset += len(packet)
-
-
-def _read_response(response: HTTPResponse) -> HTTPResponse:
-    """A response whose contents have been read."""
-    response.read()
-    return response
 
 
 def _reason(answer: object) -> str:
     """Message of an answer of SDCP."""
     messages = answer.get("messages") if isinstance(answer, dict) else None
     first = messages[0] if isinstance(messages, list) and messages else {}
-    return f"{first.get('message', 'no reason')}" if isinstance(first, dict) else "no reason"
+    return printable(str(first.get("message", "no reason"))[:200]) if isinstance(first, dict) else "no reason"
 
 
 def _form(fields: dict[str, str], name: str, packet: bytes) -> tuple[bytes, str]:

@@ -6,15 +6,16 @@ import hashlib
 import json
 import re
 import threading
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 
 import pytest
 from fracslice.cli.main import run
 
-from fracslice.errors import ExportError
+from fracslice.errors import Cancelled, ExportError
 from fracslice.export import sending
 from fracslice.work import Work
 
@@ -167,6 +168,48 @@ def test_no_printer_is_one_line(job: Path) -> None:
             ExportError, match="expected prusalink://HOST, prusalink://HOST/local or sdcp://HOST"
         ):
             sending.printer_address(text)
+
+
+class Hostile(Sdcp):
+    """Answers each packet as it likes, byte after byte."""
+
+    begin, more = b"", b""
+
+    def do_POST(self) -> None:
+        self.rfile.read(int(self.headers["Content-Length"]))
+        with suppress(OSError):
+            self.wfile.write(self.begin)
+            while self.more:
+                self.wfile.write(self.more)
+                time.sleep(0.001)
+
+
+@pytest.mark.parametrize(
+    ("begin", "more", "message"),
+    [
+        (b"", b"HTTP/1.1 100 Continue\r\n\r\n", "no complete answer within 0.3 s"),
+        (b"", b"H", "no complete answer within 0.3 s|got more than"),
+        (b"HTTP/1.1 200 OK\r\n\r\n", b"{", "no complete answer within 0.3 s"),
+        (b"HTTP/1.1 200 OK\r\n\r\n", b"[" * (1 << 20), "answer is longer than"),
+        (b"HTTP/1.1 200 OK\r\n\r\n" + b"[" * 100_000, b"", "at byte 0: no reason"),
+        (b'HTTP/1.1 200 OK\r\n\r\n{"messages": [{"message": "\\u001b[2J"}]}', b"", r"at byte 0: \?\[2J"),
+        (b"\x1b[31m nothing\r\n", b"", r"\?\[31m nothing"),
+    ],
+)
+def test_a_printer_that_says_anything_is_one_line(
+    begin: bytes, more: bytes, message: str, job: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sending, "PATIENCE", 0.3)
+    hostile = type("Hostile", (Hostile,), {"begin": begin, "more": more})
+    with printer(hostile) as (port, _), pytest.raises(ExportError, match=message):
+        sending.send(job, f"sdcp://127.0.0.1:{port}", Work())
+
+
+def test_cancellation_ends_a_wait_for_the_printer(job: Path) -> None:
+    hostile, work = type("Hostile", (Hostile,), {"more": b"HTTP/1.1 100 Continue\r\n\r\n"}), Work()
+    threading.Timer(0.2, work.cancel.set).start()
+    with printer(hostile) as (port, _), pytest.raises(Cancelled):
+        sending.send(job, f"sdcp://127.0.0.1:{port}", work)
 
 
 def test_slice_sends_with_the_flag_only(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
