@@ -35,7 +35,7 @@ def gradual_depths(root: Node, camera: Camera, size: tuple[int, int], count: int
     A depth is a whole number, so a picture of one depth jumps to the next one. The mean of pictures over a
     range of details changes from one depth to the next as gradually as the camera moves.
 
-    `size` in pixels. Returns the coarsest of half a pixel.
+    `size` in pixels. Returns trees from the coarsest detail, half a pixel, to the finest.
     """
     growth, base = footprint(camera, size)
     detail = DETAIL * (growth * (surroundings(root, camera, growth) if growth else 0.0) + base)

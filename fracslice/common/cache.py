@@ -118,7 +118,7 @@ PACKAGE = Path(__file__).parents[1]
 def key(*parts: object) -> str:
     """Hash some values: equal for equal values in the same order, different otherwise.
 
-    *parts in bytes.
+    Returns 32 hexadecimal digits.
     """
     digest = hashlib.sha256()
     for part in parts:

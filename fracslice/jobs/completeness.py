@@ -72,7 +72,8 @@ def lost_size(
 ) -> tuple[Triple, tuple[str, ...]]:
     """Compare the size of a mesh or layers with that of the object.
 
-    `box`, `made`, `whole`, `spacing` in mm. Returns a value in mm.
+    `box`, `made`, `whole` (with the bodies that were removed), `spacing` in mm. Returns the length that is
+    missing along each axis, mm, and a note on it if it is more than a sample.
     """
     x, y, z = lost = [max(of - own, 0.0) for of, own in zip(box, made, strict=True)]
     samples = [mm / step for mm, step in zip(lost, spacing, strict=True)]

@@ -51,7 +51,8 @@ def placing(planned: Plan, signs: SignBricks, place: Placement) -> tuple[NDArray
 def largest_crumb(volumes: NDArray[np.float64], voxel: float) -> float:
     """Return the volume below which bodies are tips that the samples separate from the body beside them.
 
-    `volumes`: float64 (s,); `voxel`: volume of a voxel. Returns half a voxel.
+    `volumes`: float64 (s,); `voxel`: volume of a voxel. Returns half a voxel, or 0 if such
+    bodies hold much of the material.
     """
     crumbs = volumes[(volumes > 0) & (volumes < CRUMB * voxel)]
     return CRUMB * voxel if crumbs.sum() < PIECES * volumes.sum() else 0.0
@@ -202,7 +203,7 @@ class Check:
 def on_the_plate(mesh: Mesh, threads: int = 0) -> float:
     """Return the area of the triangles at z = 0.
 
-    `mesh` in mm. Returns a value in mm2.
+    `mesh` in mm; the area in mm2.
     """
     from .._native import touching
 

@@ -34,7 +34,7 @@ def make_implicit(
 ) -> Implicit:
     """Write the formula of a scene as 3MF with the volumetric and implicit extensions.
 
-    `what`: and the voxel that automatic depths follow from.
+    `what`: the size, and the voxel that automatic depths follow from.
     """
     from ..export import check_target
     from ..export.implicit import write_implicit

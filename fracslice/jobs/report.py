@@ -40,7 +40,7 @@ class SurfaceError:
     def of(cls, mm: NDArray[np.float64]) -> SurfaceError:
         """Summarise distances.
 
-        `mm` in mm.
+        `mm`: distances, mm.
         """
         return cls(float(mm.mean()), quantile(mm, 0.99), float(mm.max()))
 
@@ -57,7 +57,7 @@ class SurfaceToMesh:
     def of(cls, mm: NDArray[np.float64]) -> SurfaceToMesh:
         """Summarise distances.
 
-        `mm` in mm.
+        `mm`: distances, mm.
         """
         return cls(float(mm.mean()), float(mm.max()), len(mm))
 

@@ -137,7 +137,7 @@ def surface_of(planned: Plan, signs: SignBricks, most: int, folder: Path | None,
 def refine_surface(surface: Surface, chord: float, clock: Clock) -> tuple[Surface, Refined]:
     """Refine a surface in one piece.
 
-    `chord` in scene units. Returns with lengths in scene units.
+    `chord`, and the lengths of the result, in scene units.
     """
     from ..mesh.contouring import Piece
     from ..mesh.pieces import Pieces

@@ -73,7 +73,8 @@ def least_size(
 ) -> Callable[[Corners, Corners, np.ndarray], np.ndarray]:
     """Return a function of cells, and the size of their farthest points, that bounds the last |w| from below.
 
-    `values`: and squares of the radii where orbits stop.
+    `values`: those of the arguments of the steps, and squares of the radii where orbits stop.
+    The bound is huge where all orbits stop.
     """
     function = on_intervals(_last_size(steps, first))
     given = [values[name] for name in functions.parameters(function)[9:]]

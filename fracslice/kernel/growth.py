@@ -281,7 +281,7 @@ class Growth:
 def growth(steps: Round, values: tuple[tuple[str, Any], ...], iterations: int) -> Growth | None:
     """Sample the growth of an orbit.
 
-    Returns none if orbits do not escape.
+    Returns None if orbits do not escape.
     """
     known = dict(values)
     images = [image(steps, place, known) for place in range(len(steps))]

@@ -52,7 +52,7 @@ def quantise_mesh(mesh: Mesh, threads: int = 0) -> Mesh:
     Every triangle is kept, in order; unused vertices are removed. Quantise once, before the check and the
     export, so that both treat the same mesh.
 
-    Returns coordinates rounded to float32.
+    The coordinates are rounded to float32.
     """
     return weld(quantise(mesh, used_vertices(mesh), threads=threads).mesh)
 

@@ -382,7 +382,7 @@ def refine(
     flipped to improve the normals of triangles. Old vertices do not move. The surface stays closed and free
     of self-intersections: a split that would cause one is refused.
 
-    `mesh`, `chord`, `voxel` in scene units. Returns `Mesh` in scene units; with lengths in scene units.
+    All lengths in scene units.
     """
     work, count = work or Work(), len(mesh.triangles)
     state = Fitted.of(mesh, Fit(root, AIM * chord, voxel, work))

@@ -183,7 +183,8 @@ class Examination:
     def distances(self, collapsed: Collapsed) -> tuple[float, float]:
         """Greatest distances between the two surfaces.
 
-        Returns a value in mm; a value in mm.
+        Returns a proved bound from the original to the simplified one, and the greatest sampled
+        distance back, mm.
         """
         there, back = self.bound[collapsed.changed], self.back[collapsed.changed & ~collapsed.gone]
         return float(there.max(initial=0.0)), float(back.max(initial=0.0))

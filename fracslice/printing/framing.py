@@ -40,7 +40,7 @@ def frame_bodies(planned: Plan, size: Sizing, count: int, work: Work) -> Plan:
     The size of the object is that of the bodies that stay. Bodies that are much smaller than the whole scene
     need samples of their own: the part around them is sampled again, until they fill it.
 
-    Returns with the voxel in mm of `planned`.
+    The voxel in mm is that of `planned`.
     """
     made, region = planned, planned.outer
     for _ in range(ROUNDS):

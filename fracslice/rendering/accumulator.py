@@ -40,7 +40,7 @@ UNIFORM = 3
 def grids(width: int, height: int) -> tuple[int, ...]:
     """Return the grid spacings of the first passes, which take one sample in each pixel of their grids.
 
-    `width`, `height` in pixels. Returns a value in pixels.
+    All in pixels; the last spacing is 1.
     """
     spacings = [1, COARSE]
     while width * height > SOON * spacings[-1] ** 2:

@@ -335,7 +335,8 @@ def draw(W, Q, P, pixels, A, n, m, width, frame):
 
     A pixel has the same numbers in the film and in a part of it.
 
-    `W`: workspace; `Q`, `P`, `pixels`, `A` in pixels.
+    `W`: workspace, written from `Row.px` on; `Q`, `P`, `pixels`, `A`: sample sequence, scene parameters,
+    pixels, sums of the picture.
     """
     first = (int(P[frame.far + 2]) << 16) + int(P[frame.far + 1])
     for k in range(m):

@@ -16,7 +16,7 @@ def fog(t, density):
 def thickness(z, density, level, height):
     """Extinction of fog that thins with the height.
 
-    `z`: height; `density`: extinction per scene unit at the level. Returns extinction per scene unit.
+    `z`: height; `density`: extinction per scene unit at `level`; it thins to 1/e over `height`.
     """
     return density * exp(minimum((level - z) / height, 40.0))
 
