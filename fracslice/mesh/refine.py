@@ -156,6 +156,13 @@ def edges_of(triangles: NDArray[np.int32]) -> Edges:
     return Edges(np.stack([keys >> 32, keys & 0xFFFFFFFF], axis=1), sides.reshape(-1, 3))
 
 
+def with_neighbours(mesh: Mesh, some: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Some triangles of a mesh, bool (m,), and those that share a vertex with them."""
+    near = np.zeros(len(mesh.vertices), bool)
+    near[mesh.triangles[some]] = True
+    return np.asarray(near[mesh.triangles].any(axis=1))
+
+
 def with_needles(
     split: NDArray[np.bool_], sides: NDArray[np.int64], lengths: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
@@ -282,9 +289,7 @@ def _candidates(
     """Candidate flips at due triangles and their worth: edges with too large opposite angles, and edges of
     steep triangles. A smaller worth is better.
     """
-    near = np.zeros(len(mesh.vertices), bool)
-    near[mesh.triangles[due]] = True
-    some = np.flatnonzero(near[mesh.triangles].any(axis=1))
+    some = np.flatnonzero(with_neighbours(mesh, due))
     edges = edges_of(mesh.triangles[some])
     order = np.argsort(edges.sides.ravel(), kind="stable")
     at = edges.sides.ravel()[order]
@@ -496,6 +501,6 @@ def _folding_vertices(state: Fitted, fresh: NDArray[np.bool_], first: int, work:
     marked = np.zeros(len(mesh.vertices), bool)
     marked[mesh.triangles[crossing]] = True
     if crossing.any() and not marked[first:].any():
-        marked[mesh.triangles[marked[mesh.triangles].any(axis=1)]] = True
+        marked[mesh.triangles[with_neighbours(mesh, crossing)]] = True
     marked[mesh.triangles[away]] = True
     return marked[first:]

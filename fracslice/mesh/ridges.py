@@ -24,7 +24,7 @@ from .fit import OFF, UPRIGHT, Fit
 from .model import Mesh
 from .pieces import Pieces, rows
 from .quantisation import quantise, used_vertices
-from .refine import Edges, edges_of, on_creases, on_three, split_edges
+from .refine import Edges, edges_of, on_creases, on_three, split_edges, with_neighbours
 from .spatial import self_intersecting_triangles
 from .tips import Cap, heights, replace_by_fans, spans, tips_to_end
 from .topology import component_sizes
@@ -530,9 +530,7 @@ def _rings(mesh: Mesh, some: NDArray[np.int64]) -> NDArray[np.int64]:
     near = np.zeros(len(mesh.triangles), bool)
     near[some] = True
     for _ in range(RINGS):
-        reached = np.zeros(len(mesh.vertices), bool)
-        reached[mesh.triangles[near]] = True
-        near = np.asarray(reached[mesh.triangles].any(axis=1))
+        near = with_neighbours(mesh, near)
     return np.flatnonzero(near)
 
 
