@@ -122,7 +122,7 @@ class _Connection(HTTPConnection):
 
     def _watch(self, work: Work, done: threading.Event) -> None:
         while not done.wait(0.05):
-            self._late = work.cancel.is_set() or time.monotonic() > self._end
+            self._late |= work.cancel.is_set() or time.monotonic() > self._end
             if self._late and self._socket is not None:
                 with suppress(OSError):  # not connected any more
                     self._socket.shutdown(socket.SHUT_RDWR)
