@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import subprocess
 import sys
@@ -139,8 +140,8 @@ def test_threads_may_make_the_same_at_once(folder: Path) -> None:
     assert code() in made
 
 
-def test_planted_code_does_not_run_and_is_reported_once(folder: Path, tmp_path: Path) -> None:
-    """In a folder that all can write: a box under the name of a sphere."""
+def test_planted_code_does_not_run_and_is_reported_once(folder: Path) -> None:
+    """In a folder that all can write: a box under the name of a sphere, and with a checksum for it."""
 
     def values(*shapes: str) -> subprocess.CompletedProcess[str]:
         program = (
@@ -151,10 +152,11 @@ def test_planted_code_does_not_run_and_is_reported_once(folder: Path, tmp_path: 
 
     values("box()")
     (planted,) = folder.glob("*.o")
-    planted.rename(tmp_path / "planted")
+    code = planted.read_bytes()[hashlib.sha256().digest_size :]
+    planted.unlink()
     right = values("sphere()").stdout
     (kept,) = folder.glob("*.o")
-    (tmp_path / "planted").rename(kept)
+    kept.write_bytes(hashlib.sha256(kept.name.encode() + b"\0" + code).digest() + code)
     assert values("sphere()").stdout != right  # it would run
     folder.chmod(0o1777)
     result = values("sphere()", "sphere(radius=0.5)", "box()")
