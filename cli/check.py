@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fracslice.common.messages import decimal, format_count, significant
+from fracslice.records import PIXEL, MeshJob, Placed, Print, SliceJob
 
 from .inputs import BadInput, check_targets, is_model, load_model, load_scene, refuse_options
 from .options import (
-    LAYER,
     LENGTH,
-    PIXEL_MM,
     ClusterOptions,
     LayerOptions,
     MeshOptions,
@@ -23,7 +22,7 @@ from .options import (
     argument,
     command,
     flag,
-    layer_option,
+    kind_option,
     option,
     printer_option,
     write_page,
@@ -35,8 +34,8 @@ if TYPE_CHECKING:
     from fracslice.kernel import Field
     from fracslice.mesh import Mesh
     from fracslice.printing.problems import Limits
-    from fracslice.scene import Print, Scene
-    from fracslice.slicing import SliceJob, Stack
+    from fracslice.scene import Scene
+    from fracslice.slicing import Stack
     from fracslice.slicing.layer_checks import PrintReport
     from fracslice.slicing.printers import Printer
     from fracslice.volume.sizing import Sizing
@@ -44,7 +43,7 @@ if TYPE_CHECKING:
 
 SHARED = {"cluster", "shard", "store"}
 OF_LAYERS = {*SHARED, "pixel", "machine", "picture", "html", "fix", "material"}
-OF_MESHES = {"voxel", "resolution", "dust", "chord", "simplify", "proved"}
+OF_MESHES = MeshJob.kinds().keys() - Placed.kinds().keys()
 OF_SCENES = {*OF_MESHES, *SHARED, "settings"}
 
 AXES = (0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0)
@@ -64,8 +63,12 @@ class CheckOptions(LayerOptions, MeshOptions, ClusterOptions):
 
     source: str = argument("MODEL|SCENE")
     as_json: bool = flag("Print all figures as JSON.", "--json")
-    layer: Any = layer_option("Check layers of this height.")
-    pixel: float | None = option(LENGTH, "With layers: pixel size; the printer's by default, or 0.05mm.")
+    without = MeshOptions.without | LayerOptions.without
+    size: float | None
+    up: Triple
+    scale: Triple
+    pixel: tuple[float, float] | None
+    layer: Any = kind_option(SliceJob.kinds()["layer"], None, "Check layers of this height")
     machine: Printer | None = printer_option(
         'With layers: the printer that the object must fit; "list" shows all.'
     )
@@ -134,7 +137,7 @@ def of_mesh(given: CheckOptions, work: Work) -> Checked:
     from fracslice.printing.solid_checks import check_solid
 
     scene = load_scene(given.source, given.settings)
-    result = make_mesh(scene, given.job(scene), work)
+    result = make_mesh(scene, given.mesh_job(scene), work)
     solid = check_solid(result.root, result.bricks, result.place.scale, given.limits, work)
     problems = (*result.report.problems, *solid.thin)
     hint = "" if problems else "; --layer looks at islands, cups, traps, overhangs and necks, too"
@@ -153,17 +156,17 @@ def of_scene(given: CheckOptions, work: Work) -> Checked:
 
 def of_model(given: CheckOptions, work: Work) -> Checked:
     """Check the mesh of a model and, if it encloses a volume, its layers."""
+    from fracslice.common.parameters import LONGEST
     from fracslice.errors import EmptyError, MeshError
     from fracslice.mesh.checks import check_mesh
     from fracslice.mesh.field import MeshField
-    from fracslice.scene import Print
-    from fracslice.scene.lengths import LARGEST
-    from fracslice.volume.sizing import SAME, UP, Sizing
+    from fracslice.records import SAME, UP
+    from fracslice.volume.sizing import Sizing
 
     turned = place(load_model(given.source), given.up, SAME)
     length = longest(turned) or 1.0
     side = given.size or length
-    if side > LARGEST:
+    if side > LONGEST:
         raise BadInput(f"{given.source}: {side:.3g} mm long, more than a kilometre: expected a model in mm")
     x, y, z = (factor * side / length for factor in given.scale)
     mesh = place(turned, UP, (x, y, z))
@@ -176,13 +179,13 @@ def of_model(given: CheckOptions, work: Work) -> Checked:
         line = f"{given.source}: {sizes(report)}"
     if not report.watertight or report.misoriented_edges or not report.volume_mm3:
         return numbers, [line], report.problems
-    size, thinnest = longest(mesh), float(LAYER[:-2])
+    size, thinnest = longest(mesh), SliceJob().layer[0]
     if size <= thinnest and given.layer is None:
         raise BadInput(f"{given.source}: {size:.3g} mm long, less than a layer: expected a model in mm")
     height = max(size / ACROSS, thinnest)
     layered = given.but(
         layer=given.layer or (height, None),
-        pixel=given.pixel or (None if given.machine else max(height, PIXEL_MM)),
+        pixel=given.pixel or (None if given.machine else 2 * (max(height, PIXEL),)),
         up=UP,
     )
     factor = size / side  # the mesh is compensated already: a size that is advised is before that
@@ -191,7 +194,8 @@ def of_model(given: CheckOptions, work: Work) -> Checked:
     try:
         layers, lines, problems = of_layers(field, sides, given.printing(Print()), layered, work)
     except EmptyError:
-        finest = f"layer of {layered.layer[0]:.3g} mm has a pixel of {max(layered.pixels):.3g} mm"
+        pixel = max(layered.slice_job(Print()).pixels)
+        finest = f"layer of {layered.layer[0]:.3g} mm has a pixel of {pixel:.3g} mm"
         nothing = f"no {finest} inside: all of it is thinner"
         return numbers, [line, verdict([nothing])], (*report.problems, nothing)
     return numbers | {"layers": layers}, [line, *lines], (*report.problems, *problems)
@@ -200,7 +204,8 @@ def of_model(given: CheckOptions, work: Work) -> Checked:
 def place(mesh: Mesh, up: Triple, scale: Triple) -> Mesh:
     """Mesh turned and scaled."""
     from fracslice.formulas.algebra import product
-    from fracslice.volume.sizing import SAME, UP, orientation
+    from fracslice.records import SAME, UP
+    from fracslice.volume.sizing import orientation
 
     if up == UP and scale == SAME:
         return mesh
@@ -301,13 +306,14 @@ def examine_layers(
     from fracslice.jobs.completeness import layers_amount
     from fracslice.printing.problems import Problem
     from fracslice.scene import Scene
-    from fracslice.slicing import SliceJob, Slicer, adapted, plan_stack
+    from fracslice.slicing import Slicer, adapted, plan_stack
     from fracslice.slicing.layer_checks import check_layers, misfit
 
-    machine, (layer, most) = given.machine, given.layer
-    sides = size.side, layer, given.pixels, up, how, size.factors, size.unit
-    job, root = SliceJob(*sides), of.root if isinstance(of, Scene) else of
-    stack, settings = plan_stack(root, job, work), (flags, size, how, up)
+    machine, most = given.machine, given.layer[1]
+    side = None if size.unit else size.side
+    job = replace(given.slice_job(how), up=up, size=side)
+    root = of.root if isinstance(of, Scene) else of
+    stack, settings = plan_stack(root, job, work, size), (flags, size, how, up)
     if machine and (unfit := misfit(stack, machine)):
         numbers = {"size": stack.size, "fits": False, "problems": [str(unfit)]}
         return Attempt(*settings, numbers, f"would not print: {unfit}", [unfit], None)
@@ -328,8 +334,7 @@ def shared_check(scene: Scene, job: SliceJob, given: CheckOptions, work: Work) -
     from fracslice.jobs.slices import SliceRecipe
     from fracslice.scene.writer import to_xml
 
-    recipe = SliceRecipe(to_xml(scene), scene.name, job, given.layer[1], printer=given.machine)
-    run = recipe.run(work, scene)
+    run = SliceRecipe(to_xml(scene), scene.name, job).run(work, scene)
     return run.stack, check_run(run, given.limits)
 
 

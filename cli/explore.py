@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 def read_spread(text: str) -> float:
     """Parse the size of changes."""
-    from fracslice.formulas.parameters import Number
+    from fracslice.common.parameters import Number
 
     return float(Number(0.3, "", above=0, most=4).read(text))
 

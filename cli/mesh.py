@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,17 +31,17 @@ from .sweeps import MOST, TABLE, families, going_on, is_table, with_suffix
 
 if TYPE_CHECKING:
     from fracslice.jobs.report import MeshResult, Report
-    from fracslice.meshjob import MeshJob
     from fracslice.scene import Scene
     from fracslice.store import Store
     from fracslice.work import Work
 
 GRID = ".vdb"
-COLOURS = ("material", "point", "axes", "planes", "sphere", "steps", "direction")
 
 
 class MeshFileOptions(ClusterOptions, MeshOptions):
     """Options of `mesh`."""
+
+    without = frozenset()
 
     source: str = argument("SCENE")
     output: str = output(
@@ -72,21 +71,12 @@ class MeshFileOptions(ClusterOptions, MeshOptions):
         "The device that evaluates the field; cpu by default. auto: the GPU, if there is one.",
         default="cpu",
     )
-    colour: str | None = option(
-        click.Choice(COLOURS),
-        "Colour the vertices of a .ply, .glb or .3mf file: as the scene's materials, or by a property of "
-        "the orbit. PLY and GLB hold the property itself, too.",
-    )
     material: str = option(
         click.Choice(list(DENSITIES)),
         "Material of the weight in the summary; resin by default.",
         default="resin",
     )
     price: float | None = option(AMOUNT, "Price of a kilogram.")
-
-    def job(self, scene: Scene) -> MeshJob:
-        """Mesh job of a scene, with colours."""
-        return replace(super().job(scene), colour=self.colour)
 
 
 @command(MeshFileOptions)
@@ -170,7 +160,7 @@ def write_formula(scene: Scene, given: MeshFileOptions, work: Work) -> bool:
     """Write the formula of a scene, and print its size. A formula has no problems."""
     from fracslice.jobs.implicit import make_implicit
 
-    made = make_implicit(scene, given.job(scene), given.output, work)
+    made = make_implicit(scene, given.mesh_job(scene), given.output, work)
     for note in made.notes:
         click.echo(note, err=True)
     if not given.quiet:
@@ -199,7 +189,7 @@ def make_and_write(scene: Scene, given: MeshFileOptions, work: Work) -> MeshResu
     from fracslice.jobs.mesh import make_mesh
     from fracslice.jobs.mesh_writing import metadata
 
-    job, output, picture = given.job(scene), given.output, given.picture
+    job, output, picture = given.mesh_job(scene), given.output, given.picture
     if picture is None and Path(output).suffix.lower() != GRID:
         return make_mesh(scene, job, work, path=output)
     result = make_mesh(scene, job, work)

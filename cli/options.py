@@ -13,19 +13,31 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias, TypeVar
 
 import click
 
+from fracslice.common.parameters import (
+    Choice,
+    Count,
+    Flag,
+    Heights,
+    Listed,
+    Number,
+    Parameter,
+    Percent,
+    Record,
+    Vector,
+)
 from fracslice.errors import ClusterError, SceneError, VolumeError
+from fracslice.records import MeshJob, Part, Print, RasterOptions, SliceJob
 
 from .execution import NOTHING, working
 from .inputs import BadInput
 
 if TYPE_CHECKING:
     from fracslice.cluster import Pool
-    from fracslice.meshjob import MeshJob
-    from fracslice.scene import Print, Scene
+    from fracslice.scene import Scene
     from fracslice.slicing import Stack
     from fracslice.slicing.layer_checks import PrintReport
     from fracslice.slicing.printers import Printer
@@ -104,16 +116,54 @@ class Parsed(click.types.StringParamType):
             self.fail(f"{value!r}: expected {error}", option, context)
 
 
-class PrintSetting(click.types.StringParamType):
-    """The attribute of `<print>` that the option is named after."""
+class OfKind(click.types.StringParamType):
+    """A value of a parameter kind."""
 
-    name, metavar = "text", "LENGTH"
+    name = "text"
+
+    def __init__(self, kind: Parameter) -> None:
+        self.kind, self.metavar = kind, metavar(kind)
 
     def convert(self, value: Any, option: click.Parameter | None, context: click.Context | None) -> Any:
-        from fracslice.scene import Print
+        try:
+            return self.kind.read(value) if isinstance(value, str) else value
+        except ValueError as error:
+            self.fail(f"{value!r}: expected {error}", option, context)
 
-        assert option is not None
-        return Parsed(Print.kinds()[str(option.name)].read, "").convert(value, option, context)
+
+def metavar(kind: Parameter) -> str:
+    """What stands for a value in the help."""
+    if isinstance(kind, Count):
+        return "|".join([*kind.words, "N"])
+    if isinstance(kind, Choice | Listed):
+        return "|".join(map(str, kind.choices if isinstance(kind, Choice) else kind.values))
+    if isinstance(kind, Heights):
+        return "LENGTH[..LENGTH]"
+    if isinstance(kind, Number | Vector):
+        return kind.unit.upper() or ("N" if isinstance(kind, Number) else "X Y Z")
+    return "N%[,N%,N%]" if isinstance(kind, Percent) else "LENGTH"
+
+
+def kind_option(kind: Parameter, default: Any, text: str = "") -> Any:
+    """Declare an option of a parameter kind, whose documentation is the help."""
+    text = text or kind.doc[0].upper() + kind.doc[1:]
+    if isinstance(kind, Flag):
+        return flag(f"{text}.")
+    usual = "" if kind.default is None else kind.text(kind.default)
+    text += f"; {usual} by default." if usual and usual not in ("0mm", "0") and "default" not in text else "."
+    if isinstance(kind, Vector):
+        return option(
+            NUMBER, text, metavar="X Y Z", nargs=3, default=default, callback=partial(checked, kind)
+        )
+    return option(OfKind(kind), text, default=default)
+
+
+def checked(kind: Parameter, _: click.Context, __: click.Parameter, value: Any) -> Any:
+    """Check a value of several words."""
+    try:
+        return kind.check(value)
+    except ValueError as error:
+        raise click.BadParameter(f"{kind.text(value)}: expected {error}") from None
 
 
 def read_length(text: str) -> float:
@@ -138,30 +188,13 @@ def read_interval(text: str) -> float:
     return seconds
 
 
-def read_factors(text: str) -> tuple[float, float, float]:
-    """Parse the compensation of shrinkage into factors along x, y and z."""
-    from fracslice.scene.lengths import Percent
-
-    x, y, z = Percent(None, "").read(text)
-    return x, y, z
-
-
-def direction(
-    _: click.Context, __: click.Parameter, value: tuple[float, float, float]
-) -> tuple[float, float, float]:
-    """Check that a direction is not zero."""
-    if not any(value):
-        raise click.BadParameter("0 0 0: expected a direction")
-    return value
-
-
 NUMBER, AMOUNT, POSITIVE = Finite(), Signed(">="), Signed(">")
 LENGTH, SECONDS = Parsed(read_length, "LENGTH"), Parsed(read_seconds, "TIME")
 INTERVAL = Parsed(read_interval, "TIME")
-FACTORS = Parsed(read_factors, "N%[,N%,N%]")
 
 
 R = TypeVar("R", bound="CommandOptions")
+Records: TypeAlias = tuple[type[Record], ...]
 
 
 def argument(metavar: str, **settings: Any) -> Any:
@@ -219,8 +252,17 @@ class CommandOptions:
         callback=run_formulas,
     )
 
+    records: ClassVar[Records] = ()
+    """Records whose fields are options, too."""
+    without: ClassVar[frozenset[str]] = frozenset()
+    """Fields of the records that are no options of the command."""
+
     def __init__(self, **values: Any) -> None:
         vars(self).update(values)
+
+    def values(self, record: type[Record]) -> dict[str, Any]:
+        """Given values of the fields of a record."""
+        return {name: value for name in record.kinds() if (value := vars(self).get(name)) is not None}
 
     def but(self: R, **values: Any) -> R:
         """Copy with other values."""
@@ -228,12 +270,18 @@ class CommandOptions:
 
     @classmethod
     def parameters(cls) -> list[click.Parameter]:
-        """Parameters of click: those of the class, then those of its bases."""
+        """Parameters of click: those of the class and its records, then those of its bases."""
         declared: dict[str, Any] = {}
         for owner in cls.__mro__:
             for name, value in vars(owner).items():
                 if isinstance(value, partial):
                     declared.setdefault(name, value)
+            for record in vars(owner).get("records", ()):
+                for name, kind in record.kinds().items():
+                    # what is not given leaves a part of the scene as it is
+                    default = None if issubclass(record, Part) else kind.default
+                    if name not in cls.without:
+                        declared.setdefault(name, kind_option(kind, default))
         return [make(name=name) for name, make in declared.items()]
 
 
@@ -296,92 +344,29 @@ class SceneOptions(RunOptions):
     )
 
 
-class PlacementOptions(SceneOptions):
-    """Size and orientation of an object."""
+class PreparationOptions(SceneOptions):
+    """Print preparation; each option overrides the scene's."""
 
-    size: float | None = option(
-        LENGTH, "The longest side, such as 80mm, 8cm or 3.1in; the scene's by default."
-    )
-    up: tuple[float, float, float] = option(
-        NUMBER,
-        "The object's direction that is up; 0 0 1 by default.",
-        metavar="X Y Z",
-        nargs=3,
-        default=(0.0, 0.0, 1.0),
-        callback=direction,
-    )
-    scale: tuple[float, float, float] = option(
-        FACTORS,
-        "Compensate shrinkage: 102%, or 102%,102%,101% along x, y and z; 100% by default.",
-        default="100%",
-    )
-
-
-_SETTING = PrintSetting()
-
-
-class PreparationOptions(PlacementOptions):
-    """Print preparation: attributes of `<print>`; each option overrides the scene's."""
-
-    cavities: Any = option(
-        _SETTING, "Keep sealed cavities, or fill them; keep by default.", metavar="keep|fill"
-    )
-    keep: Any = option(
-        _SETTING,
-        "Keep all connected components, the largest or N of them; all by default.",
-        metavar="all|largest|N",
-    )
-    bridge: Any = option(_SETTING, "Join connected components by struts of this diameter.")
-    gap: Any = option(_SETTING, "Close gaps up to this width.")
-    thickness: Any = option(_SETTING, "Thicken thinner walls to this.")
-    hollow: Any = option(_SETTING, "Hollow the object, leaving walls of this thickness.")
-    drain: Any = option(_SETTING, "Diameter of the drain holes of a hollow, 3mm by default; 0: none.")
-    base: Any = option(_SETTING, "Cut off this much at the bottom, to stand flat.")
-    raft: Any = option(_SETTING, "Put the object on a plate of this height.")
+    records: ClassVar[Records] = (Print,)
 
     def printing(self, given: Print) -> Print:
         """Print settings, overridden by those of the options."""
-        own = {name: getattr(self, name) for name in given.kinds()}
-        changed = replace(given, **{name: value for name, value in own.items() if value is not None})
-        if self.drain is not None and not changed.hollow:
+        own = self.values(Print)
+        changed = replace(given, **own)
+        if "drain" in own and not changed.hollow:
             raise click.UsageError("--drain: expected --hollow, or a hollow in the scene's <print>")
         return changed
 
 
 class MeshOptions(PreparationOptions):
-    """Resolution and refinement of a mesh."""
+    """Options of meshes without colours."""
 
-    voxel: float | None = option(LENGTH, "Voxel size, such as 0.25mm.")
-    resolution: int | None = option(
-        Whole(8, 16384), "Voxels along the longest side, instead of --voxel; 256 by default."
-    )
-    dust: float | None = option(
-        AMOUNT,
-        "Drop bodies of less volume, in mm3; 1e-5 of the whole, at least half a voxel, by default.",
-        metavar="MM3",
-    )
-    chord: float | None = option(
-        LENGTH, "Split triangles farther than this from a smooth surface, such as 0.001mm."
-    )
-    simplify: float | None = option(LENGTH, "Remove triangles within this tolerance, such as 0.02mm.")
-    proved: bool = flag("Skip space by proofs only, not by the measured bounds of fractals.")
+    records: ClassVar[Records] = (MeshJob,)
+    without = frozenset({"colour"})
 
-    def job(self, scene: Scene) -> MeshJob:
+    def mesh_job(self, scene: Scene) -> MeshJob:
         """Mesh job of a scene."""
-        from fracslice.meshjob import MeshJob
-
-        return MeshJob(
-            size_mm=self.size,
-            voxel_mm=self.voxel,
-            resolution=self.resolution,
-            dust_mm3=self.dust,
-            printing=self.printing(scene.printing),
-            chord_mm=self.chord,
-            simplify_mm=self.simplify,
-            up=self.up,
-            scale=self.scale,
-            proved=self.proved,
-        )
+        return MeshJob(**self.values(MeshJob), printing=self.printing(scene.printing))
 
 
 UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0}
@@ -415,22 +400,6 @@ PIXELS, PART = Parsed(read_pixels, "WxH"), Parsed(read_part, "X,Y,W,H")
 DURATION = Parsed(read_duration, "TIME")
 
 
-LAYER, PIXEL_MM = "0.05mm", 0.05
-
-
-def read_shift(text: str) -> float:
-    """Parse a length, zero or negative ones included, into mm."""
-    from fracslice.scene.lengths import Shift
-
-    return float(Shift(0.0, "").read(text))
-
-
-def read_heights(text: str) -> tuple[float, float | None]:
-    """Parse a layer height into mm, or the minimum and maximum of adaptive layers."""
-    low, dots, high = text.partition("..")
-    return read_length(low), read_length(high) if dots else None
-
-
 def printer(context: click.Context, _: click.Parameter, name: str | None) -> Printer | None:
     """Look up a printer by name; "list" prints all printers and ends the command."""
     from fracslice.slicing import printers
@@ -443,34 +412,25 @@ def printer(context: click.Context, _: click.Parameter, name: str | None) -> Pri
     context.exit()
 
 
-def layer_option(text: str, **settings: Any) -> Any:
-    """Declare --layer, a height or a range of heights."""
-    return option(Parsed(read_heights, "LENGTH[..LENGTH]"), text, **settings)
-
-
 def printer_option(text: str) -> Any:
     """Declare --printer, looked up before missing options are reported."""
     return option(str, text, "--printer", metavar="NAME|FILE", callback=printer, is_eager=True)
 
 
 class LayerOptions(PreparationOptions):
-    """Options of layers."""
+    """Options of layers as they are; those of a printer's screen are of `slice`."""
 
-    layer: tuple[float, float | None]
+    records: ClassVar[Records] = (SliceJob,)
+    without = frozenset(RasterOptions.kinds()) | {"sections"}
     machine: Printer | None
-    pixel: float | None = option(LENGTH, "Pixel size; the printer's by default, or 0.05mm.")
     html: str | None = option(
         Name("FILE.html", ".html"),
         "Write a page: figures, problems, pictures of the worst layers, cross-section over height.",
     )
 
-    @property
-    def pixels(self) -> tuple[float, float]:
-        """Pixel size, mm: that of --pixel or of --printer, which exclude each other."""
-        pixel, machine = self.pixel, self.machine
-        if pixel is not None and machine is not None:
-            raise click.UsageError("--pixel and --printer: expected one of them")
-        return (pixel, pixel) if pixel else machine.pixel if machine else (PIXEL_MM, PIXEL_MM)
+    def slice_job(self, printing: Print) -> SliceJob:
+        """Slice job with these options and print settings."""
+        return SliceJob(**self.values(SliceJob), printer=self.machine, printing=printing)
 
 
 def write_page(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -68,7 +69,9 @@ def print_(given: SlicerOptions) -> int:
         printer_address(address)
     chosen.check(given.profiles)  # before the mesh, which may take minutes
     scene = load_scene(given.source, given.settings)
-    job = given.but(simplify=given.simplify or TOLERANCE).job(scene)
+    job = given.mesh_job(scene)
+    if job.simplify is None:
+        job = replace(job, simplify=TOLERANCE)
     with tempfile.TemporaryDirectory(prefix="fracslice-") as folder, given.working() as work:
         model = Path(folder) / f"{Path(output).stem}{chosen.model}"
         report = make_mesh(scene, job, work, path=model).report

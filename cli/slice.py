@@ -13,24 +13,20 @@ import click
 
 from fracslice.common.messages import decimal, format_count
 from fracslice.errors import keeping
+from fracslice.records import RasterOptions
 
 from .inputs import check_targets, load_scene, refuse_options
 from .options import (
     AMOUNT,
-    LAYER,
     NUMBER,
     ClusterOptions,
     LayerOptions,
     Name,
-    Parsed,
-    Whole,
     argument,
     command,
-    layer_option,
     option,
     output,
     printer_option,
-    read_shift,
     write_page,
 )
 from .summary import of_layers
@@ -42,12 +38,12 @@ if TYPE_CHECKING:
     from fracslice.jobs.completeness import Completeness
     from fracslice.jobs.slices import SliceRecipe
     from fracslice.scene import Scene
-    from fracslice.slicing import SliceJob, Stack
+    from fracslice.slicing import Stack
     from fracslice.slicing.printers import Printer
     from fracslice.work import Work
 
 DATE = "SOURCE_DATE_EPOCH"
-OF_PICTURES = {"compensation", "gamma", "levels", "blur", "mirror", "sections"}
+OF_PICTURES = {*RasterOptions.kinds(), "mirror", "sections"}
 
 
 def listed_resin(context: click.Context, _: click.Parameter, name: str | None) -> str | None:
@@ -67,6 +63,8 @@ def listed_resin(context: click.Context, _: click.Parameter, name: str | None) -
 class SliceOptions(ClusterOptions, LayerOptions):
     """Options of `slice`."""
 
+    without = frozenset()
+
     source: str = argument("SCENE")
     output: str = output(
         "OUT",
@@ -80,32 +78,12 @@ class SliceOptions(ClusterOptions, LayerOptions):
         "--format",
         metavar="NAME",
     )
-    layer: tuple[float, float | None] = layer_option(
-        "Layer height, 0.05mm by default; or a range, 0.05mm..0.2mm: thick where the surface is steep.",
-        default=LAYER,
-    )
+    layer: tuple[float, float | None]
     machine: Printer | None = printer_option(
         'The printer whose screen the layers are for, or a .toml file of it; "list" shows all.'
     )
-    compensation: float = option(
-        Parsed(read_shift, "LENGTH"),
-        "Move all outlines outwards by this, or inwards if it is negative; at most 1mm, 0 by default.",
-        default="0",
-    )
-    gamma: float = option(NUMBER, "Gamma of grey levels; 1 by default.", default=1.0)
-    levels: int = option(
-        Whole(1, 255),
-        "Anti-aliasing: grey levels above black, 1 for black and white; 255 by default.",
-        default=255,
-    )
-    blur: int = option(Whole(0, 16), "Radius of the blur of outlines, in pixels; 0 by default.", default=0)
     mirror: bool | None = option(
         None, "Mirror along x; as the printer needs it by default.", "--mirror/--no-mirror", default=None
-    )
-    sections: str = option(
-        click.Choice(["1", "2", "4", "8"]),
-        "Sections per layer, for grey from z: the share of the layer's height that is inside; 1 by default.",
-        default="1",
     )
     exposure: tuple[float, float] | None = option(
         NUMBER,
@@ -162,7 +140,7 @@ def slice_(given: SliceOptions) -> int:
     scene = load_scene(given.source, given.settings)
     last: list[str] = []
     with given.working(KEPT) as work:
-        run = recipe(given, scene, kind, resin, work).run(work, scene)
+        run = recipe(given, scene, kind, resin).run(work, scene)
         write_slices(run, output, given.form)
         with keeping(f"{output} is written"):
             if given.preview:
@@ -181,27 +159,13 @@ def slice_(given: SliceOptions) -> int:
     return 1 if complete.problems else 0
 
 
-def recipe(given: SliceOptions, scene: Scene, kind: str, resin: Resin | None, work: Work) -> SliceRecipe:
+def recipe(given: SliceOptions, scene: Scene, kind: str, resin: Resin | None) -> SliceRecipe:
     """Scene and settings of the layers."""
     from fracslice.jobs.slices import SliceRecipe
     from fracslice.scene.writer import to_xml
 
-    return SliceRecipe(
-        scene=to_xml(scene),
-        name=scene.name,
-        job=job(scene, given, work),
-        most=given.layer[1],
-        form=kind,
-        printer=given.machine,
-        compensation=given.compensation,
-        gamma=given.gamma,
-        mirror=given.mirror,
-        resin=resin,
-        created=creation_date(),
-        sections=int(given.sections),
-        levels=given.levels,
-        blur=given.blur,
-    )
+    job = replace(given.slice_job(given.printing(scene.printing)), mirror=given.mirror)
+    return SliceRecipe(to_xml(scene), scene.name, job, kind, resin, creation_date())
 
 
 def describe_layers(run: SliceRun, output: str, complete: Completeness) -> list[str]:
@@ -237,7 +201,7 @@ def resin_of(given: SliceOptions) -> Resin | None:
     """
     from fracslice.export.resins import Resin, default_resin, moving, resin
 
-    machine, layer = given.machine, given.layer[0]
+    machine, (layer, _) = given.machine, given.layer
     profile = default_resin(machine, layer) if machine else None
     if given.resin is not None:
         profile = resin(given.resin, machine, layer)
@@ -301,16 +265,6 @@ def creation_date() -> datetime:
         return datetime.fromtimestamp(int(seconds), UTC)
     except (ValueError, OverflowError, OSError):
         raise click.UsageError(f"{DATE}={seconds}: expected seconds since 1970") from None
-
-
-def job(scene: Scene, given: SliceOptions, work: Work) -> SliceJob:
-    """Slice job with the given options."""
-    from fracslice.slicing import SliceJob
-    from fracslice.volume.sizing import sizing
-
-    pixel, size = given.pixels, sizing(scene, given.size, given.scale, work)
-    how = given.printing(scene.printing), size.factors, size.unit
-    return SliceJob(size.side, given.layer[0], pixel, given.up, *how)
 
 
 def write_preview(stack: Stack, path: str, work: Work) -> None:

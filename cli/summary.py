@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from fracslice.common.messages import decimal, format_count, place, significant
+from fracslice.records import JOINING
 
 if TYPE_CHECKING:
     import numpy as np
@@ -107,8 +108,6 @@ def duration(seconds: float) -> str:
 
 def of_mesh(result: MeshResult, material: str, price: float | None) -> Closing:
     """Closing figures of a mesh."""
-    from fracslice.meshjob import JOINING  # imports the formulas, which --help does not need
-
     report = result.report
     mesh, grams = report.mesh, report.mesh.volume_mm3 / 1000 * DENSITIES[material]
     return Closing(

@@ -71,7 +71,7 @@ _WHERE = {
     "FracsliceError": "errors",
     "Light": "scene.view",
     "Mesh": "mesh",
-    "MeshJob": "meshjob",
+    "MeshJob": "records",
     "Node": "formulas",
     "Picture": "api.pictures",
     "Print": "scene",

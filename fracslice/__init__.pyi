@@ -74,7 +74,7 @@ from .formulas import union as union
 from .formulas import voronoi as voronoi
 from .jobs.report import Report as Report
 from .mesh import Mesh as Mesh
-from .meshjob import MeshJob as MeshJob
+from .records import MeshJob as MeshJob
 from .scene import Print as Print
 from .scene import Scene as Scene
 from .scene import read as read

@@ -82,7 +82,7 @@ class Work:
             from .cluster import Workers
 
             object.__setattr__(self, "cluster", Workers.of(self.cluster))
-        from .formulas.parameters import (
+        from .common.parameters import (
             Count,  # imports NumPy, which --help does not need
             validate_value,
         )

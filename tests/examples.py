@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from fracslice.common.parameters import Number
 from fracslice.formulas import (
     Formula,
     Node,
@@ -77,7 +78,6 @@ from fracslice.formulas import (
     voronoi,
 )
 from fracslice.formulas.definitions import Definition, formula
-from fracslice.formulas.parameters import Number
 
 
 def cut(endless: Node) -> Node:

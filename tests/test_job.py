@@ -54,7 +54,7 @@ def test_the_longest_side_is_the_size_and_it_stands_on_the_bed():
 
 
 def test_the_job_may_ask_for_another_size():
-    result = make_mesh(BALL, MeshJob(size_mm=10, resolution=32))
+    result = make_mesh(BALL, MeshJob(size=10, resolution=32))
     assert result.place.scale == 10 / 6  # the mesh itself lies within the ball
     assert result.mesh.size.max() == pytest.approx(10, rel=1e-3)
     assert result.report.size_mm == 10
@@ -62,7 +62,7 @@ def test_the_job_may_ask_for_another_size():
 
 
 def test_a_voxel_in_mm_is_that_of_the_finished_object():
-    report = make_mesh(BALL, MeshJob(voxel_mm=1)).report
+    report = make_mesh(BALL, MeshJob(voxel=1)).report
     assert math.isclose(report.voxel_mm, 1, rel_tol=0.01)
 
 
@@ -112,10 +112,10 @@ def test_all_bodies_are_kept_or_the_largest_which_then_has_the_size():
 
 def test_dust_is_dropped():
     small = 4 / 3 * math.pi * (0.3 * 40 / 3.3) ** 3
-    assert make_mesh(TWO, MeshJob(resolution=64, dust_mm3=small * 0.9)).report.mesh.components == 2
-    assert make_mesh(TWO, MeshJob(resolution=64, dust_mm3=small * 1.1)).report.mesh.components == 1
+    assert make_mesh(TWO, MeshJob(resolution=64, dust=small * 0.9)).report.mesh.components == 2
+    assert make_mesh(TWO, MeshJob(resolution=64, dust=small * 1.1)).report.mesh.components == 1
     with pytest.raises(SceneError, match="dust 1000000000 mm3: expected at most the object's volume"):
-        make_mesh(TWO, MeshJob(resolution=64, dust_mm3=1e9))
+        make_mesh(TWO, MeshJob(resolution=64, dust=1e9))
 
 
 def test_cavities_are_kept_or_filled():
@@ -146,13 +146,13 @@ def test_a_base_higher_than_the_object_is_refused():
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"voxel_mm": 1, "resolution": 64}, "expected one of them"),
+        ({"voxel": 1, "resolution": 64}, "expected one of them"),
         ({"resolution": 4}, "resolution=4: expected a number >= 8 and <= 16384"),
         ({"resolution": math.nan}, "resolution=nan: expected a number"),
-        ({"voxel_mm": 0}, "voxel_mm=0: expected a length above zero"),
-        ({"size_mm": -1}, "size_mm=-1: expected a length"),
-        ({"dust_mm3": -1}, "dust_mm3=-1: expected a number >= 0"),
-        ({"voxel_mm": 30}, "voxel 30mm: expected 0.002441mm to 5mm for an object of 40mm"),
+        ({"voxel": 0}, "voxel=0: expected a length above zero"),
+        ({"size": -1}, "size=-1: expected a length"),
+        ({"dust": -1}, "dust=-1: expected a number >= 0"),
+        ({"voxel": 30}, "voxel 30mm: expected 0.002441mm to 5mm for an object of 40mm"),
     ],
 )
 def test_impossible_jobs_are_refused(values, message):

@@ -25,7 +25,7 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
         "fracslice.formulas.node",
         "fracslice.mesh.model",
         "fracslice.common.messages",
-        "fracslice.scene.lengths",
+        "fracslice.common.parameters",
         "fracslice.scene.model",
     ],
 )

@@ -37,7 +37,7 @@ def test_a_second_job_evaluates_nothing_and_makes_the_same(tmp_path: Path) -> No
 def test_what_does_not_change_the_samples_does_not_make_them_again(tmp_path: Path) -> None:
     work = Work(store=Store(tmp_path))
     make_mesh(BULB, MeshJob(resolution=48), work)
-    larger = make_mesh(BULB, MeshJob(resolution=48, size_mm=70, dust_mm3=1), work)
+    larger = make_mesh(BULB, MeshJob(resolution=48, size=70, dust=1), work)
     assert larger.report.evaluations == 0
     assert larger.mesh.size.max() == pytest.approx(70, rel=0.02)
     finer = make_mesh(BULB, MeshJob(resolution=49), work)

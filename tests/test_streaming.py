@@ -57,7 +57,7 @@ JOBS = {
     "plain": MeshJob(resolution=64),
     "largest": MeshJob(resolution=48, printing=Print(keep="largest")),
     "filled": MeshJob(resolution=48, printing=Print(cavities="fill")),
-    "dust": MeshJob(resolution=48, dust_mm3=900),
+    "dust": MeshJob(resolution=48, dust=900),
     "base": MeshJob(resolution=48, printing=Print(base=2, raft=2)),
 }
 CASES = [

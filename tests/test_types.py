@@ -23,12 +23,13 @@ how = Print(cavities="fill", keep="largest", bridge=0, gap="0.1mm", thickness="1
 ball = Scene(sphere(), size_mm="40mm", name="ball", view=View(), printing=how, animation=None,
              tracks=(), unit_mm=None)
 unit = Scene(sphere(), None, unit_mm="1cm")
-job = MeshJob(size_mm="4cm", voxel_mm="0.5mm", resolution=None, dust_mm3=1, printing=how,
-              chord_mm="10um", simplify_mm="0.1mm", up=[0, 0, 1], scale="102%",
+job = MeshJob(size="4cm", voxel="0.5mm", resolution=None, dust=1, printing=how,
+              chord="10um", simplify="0.1mm", up=[0, 0, 1], scale="102%",
               colour="point", proved=False)
-layers = SliceJob("40mm", layer="0.1mm", pixel=("0.1mm", 0.1), up=(0, 0, 1), printing=how,
-                  scale=(1, 1, 1.02), unit="1mm")
-held: tuple[float | None, float, float] = ball.size_mm, how.gap, layers.pixel[0]
+layers = SliceJob(size="40mm", layer="0.1mm", pixel=("0.1mm", 0.1), up=(0, 0, 1), printing=how,
+                  scale=(1, 1, 1.02), printer=None, compensation="50um", gamma=1, mirror=None, levels=8,
+                  blur=1, sections=2)
+held: tuple[float | None, float, float] = ball.size_mm, how.gap, layers.pixels[0]
 mesh = make_mesh(scene(sphere(), size="40mm"), voxel="2mm", thickness="3mm", scale="102%,102%,101%")
 slices = slice_layers(sphere(), ("0.1mm", 0.2), size="1cm", pixel="0.1mm", bridge=1)
 """
@@ -36,7 +37,7 @@ REFUSED = """
 from fracslice import MeshJob, Scene, sphere
 
 Scene(sphere(), b"4")
-MeshJob(size_mm=[4])
+MeshJob(size=[4])
 """
 RECORDS: list[Any] = [Print, Scene, MeshJob, SliceJob]
 

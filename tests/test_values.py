@@ -14,11 +14,11 @@ import pytest
 
 from fracslice import MeshJob, Work
 from fracslice.bench.measurements import BenchmarkTask
+from fracslice.common.parameters import AUTO, REQUIRED, Count, Number, Vector
 from fracslice.errors import FracsliceError
 from fracslice.export.resins import Resin
 from fracslice.formulas import Node, names, sphere
 from fracslice.formulas import get as formula
-from fracslice.formulas.parameters import AUTO, REQUIRED, Count, Number, Vector
 from fracslice.formulas.registry import Formula
 from fracslice.kernel.devices import choose_device
 from fracslice.mesh.simplify import simplify
@@ -44,14 +44,14 @@ STACK = plan_stack(sphere(), SliceJob(size=20, layer=5, pixel=1))
 CUBE = shapes.cube()
 
 LENGTHS: dict[str, Callable[[Any], Any]] = {
-    "MeshJob.size_mm": lambda v: MeshJob(size_mm=v).size_mm,
-    "MeshJob.voxel_mm": lambda v: MeshJob(voxel_mm=v).voxel_mm,
-    "MeshJob.chord_mm": lambda v: MeshJob(chord_mm=v).chord_mm,
-    "MeshJob.simplify_mm": lambda v: MeshJob(simplify_mm=v).simplify_mm,
-    "SliceJob.size": lambda v: SliceJob(v).size,
-    "SliceJob.layer": lambda v: SliceJob(20, layer=v).layer,
-    "SliceJob.pixel": lambda v: SliceJob(20, pixel=v).pixel[0],
-    "SliceJob.pixel, two": lambda v: SliceJob(20, pixel=(0.1, v)).pixel[1],
+    "MeshJob.size": lambda v: MeshJob(size=v).size,
+    "MeshJob.voxel": lambda v: MeshJob(voxel=v).voxel,
+    "MeshJob.chord": lambda v: MeshJob(chord=v).chord,
+    "MeshJob.simplify": lambda v: MeshJob(simplify=v).simplify,
+    "SliceJob.size": lambda v: SliceJob(size=v).size,
+    "SliceJob.layer": lambda v: SliceJob(size=20, layer=v).layer[0],
+    "SliceJob.pixel": lambda v: SliceJob(size=20, pixel=v).pixels[0],
+    "SliceJob.pixel, two": lambda v: SliceJob(size=20, pixel=(0.1, v)).pixels[1],
     "Screen.compensation": lambda v: Screen(STACK, compensation=v).compensation,
     "Limits.wall": lambda v: Limits(wall=v).wall,
     "Limits.floor": lambda v: Limits(floor=v).floor,
@@ -68,9 +68,9 @@ LENGTHS: dict[str, Callable[[Any], Any]] = {
 
 NUMBERS: dict[str, Callable[[Any], Any]] = {
     "MeshJob.resolution": lambda v: MeshJob(resolution=v),
-    "MeshJob.dust_mm3": lambda v: MeshJob(dust_mm3=v),
-    "SliceJob.up": lambda v: SliceJob(20, up=(v, 0, v)),
-    "SliceJob.up, all": lambda v: SliceJob(20, up=v),
+    "MeshJob.dust": lambda v: MeshJob(dust=v),
+    "SliceJob.up": lambda v: SliceJob(size=20, up=(v, 0, v)),
+    "SliceJob.up, all": lambda v: SliceJob(size=20, up=v),
     "Screen.gamma": lambda v: Screen(STACK, gamma=v),
     "Screen.levels": lambda v: Screen(STACK, levels=v),
     "Screen.blur": lambda v: Screen(STACK, blur=v),
@@ -130,9 +130,9 @@ def test_what_is_no_number_is_refused_in_one_line(name: str) -> None:
 
 
 def test_numbers_of_numpy_are_numbers() -> None:
-    job = MeshJob(resolution=np.int64(64), dust_mm3=np.float32(0.5))
-    assert (job.resolution, job.dust_mm3) == (64.0, 0.5)
-    assert (type(job.resolution), type(job.dust_mm3)) == (float, float)
+    job = MeshJob(resolution=np.int64(64), dust=np.float32(0.5))
+    assert (job.resolution, job.dust) == (64.0, 0.5)
+    assert (type(job.resolution), type(job.dust)) == (float, float)
     assert Work(threads=np.int32(2)).threads == 2
     assert Film(width=np.int64(64)) == Film(width=64)
     ball = formula("transform")(sphere(radius=np.float32(0.5)), translate=np.array([1, 2, 3]))

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from ..common.cache import key, program
+from ..common.parameters import Number, validate_value
 from ..errors import RenderError
 from ..export import application
 from ..export.images import encoded_image
-from ..formulas.parameters import Number, validate_value
 from ..formulas.registry import Node
 from ..kernel.depth import resolve_depths
 from ..kernel.devices import choose_device

@@ -17,8 +17,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.parameters import Number, Vector
 from ..errors import SceneError
-from ..formulas.parameters import Number, Vector
 from ..formulas.registry import Node
 from ..kernel.depth import resolve_depths
 from ..scene.animation import Animation, Track

@@ -7,9 +7,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..common.parameters import AUTO
 from ..errors import SceneError
 from ..formulas import Node
-from ..formulas.parameters import AUTO
 from ..volume import with_depths
 from ..work import Work, chunks
 

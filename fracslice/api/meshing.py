@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 from ..common.messages import format_count
 from ..jobs.mesh import make_mesh as make_mesh_job
 from ..jobs.report import MeshResult
 from ..mesh import Mesh
-from ..meshjob import MeshJob
-from ..scene import parse_length
-from ..scene.lengths import AnyLength, AnyScale
+from ..records import MeshJob
+from ..scene import Print
 from ..work import Work
-from .options import Options, Source, as_scene, keywords, print_of, work_of
+from .options import MeshKeywords, Source, as_scene, job_of, keywords, work_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -107,24 +106,14 @@ class Result(Mesh):
         return bricks
 
 
-@keywords
+@keywords(MeshJob, Print)
 def make_mesh(
     shape: Source,
-    what: MeshJob | None = None,
+    job: MeshJob | None = None,
     work: Work | None = None,
     *,
-    size: AnyLength | None = None,
-    up: Sequence[float] | None = None,
-    scale: AnyScale | None = None,
-    resolution: float | None = None,
-    voxel: AnyLength | None = None,
-    chord: AnyLength | None = None,
-    simplify: AnyLength | None = None,
-    dust: float | None = None,
-    colour: Literal["material", "point", "axes", "planes", "sphere", "steps", "direction"] | None = None,
-    proved: bool | None = None,
     path: str | Path | None = None,
-    **options: Unpack[Options],
+    **options: Unpack[MeshKeywords],
 ) -> Result:
     """Make a printable mesh of a shape.
 
@@ -136,44 +125,14 @@ def make_mesh(
     shape : Node, Scene, str or path
         A shape such as ``sphere(0.5) - box()``, a scene, a scene file, or the name of a shipped scene or a
         formula.
-    what : MeshJob, optional
+    job : MeshJob, optional
         Settings of the mesh, as a record.
     work : Work, optional
         Threads, progress, cancellation, store and device, as a record.
-    size : float or str, optional
-        Longest side. A scene has its own; for a shape the default is one millimetre per scene unit.
-    up : three numbers, optional
-        Direction of the shape that is up in the print.
-    scale : float, str or three factors, optional
-        Compensation of shrinkage: 1.02, "102%", or "102%,102%,101%" along x, y and z.
-    resolution : float, optional
-        Voxels along the longest side; 256 if neither this nor `voxel` is given.
-    voxel : float or str, optional
-        Voxel size.
-    chord : float or str, optional
-        Split triangles farther than this from the surface.
-    simplify : float or str, optional
-        Remove triangles within this tolerance.
-    dust : float, optional
-        Drop connected components of less volume, mm3; 1e-5 of the whole by default.
-    colour : str, optional
-        Colours and scalars of the vertices: those of the scene's materials, or a property of the orbit.
-    proved : bool, optional
-        Skip no space by a measured bound, only by a proof.
     path : str or path, optional
         The file to write, in the format of its extension. An .stl file may be larger than memory: the mesh
         is then only in that file, and access to its vertices raises `TooLargeError`.
-    cavities, keep, bridge, gap, thickness, hollow, drain, base, raft : optional
-        Print preparation: the fields of `Print`.
-    threads : int, optional
-        Number of threads; one for each core by default.
-    progress : callable, optional
-        Called repeatedly as ``progress(stage, share)`` with the completed share from 0 to 1.
-    cancel : threading.Event, optional
-        Setting it stops the work with `Cancelled`.
-    device : {"cpu", "cuda", "auto"}, optional
-        Device that samples the field.
-
+    {options}
     Returns
     -------
     Result
@@ -203,20 +162,7 @@ def make_mesh(
     >>> make_mesh("menger-sponge", size="2cm", resolution=27).size.round(3).tolist()
     [20.0, 20.0, 20.0]
     """
-    lengths = {"size": size, "voxel": voxel, "chord": chord, "simplify": simplify}
-    given: dict[str, Any] = {
-        f"{name}_mm": parse_length(value, name) for name, value in lengths.items() if value is not None
-    }
-    others = {
-        "resolution": resolution,
-        "dust_mm3": dust,
-        "up": up,
-        "scale": scale,
-        "colour": colour,
-        "proved": proved,
-    }
-    given |= {name: value for name, value in others.items() if value is not None}
-    job, how = replace(what or MeshJob(), **given), work_of(options, work)
     scene = as_scene(shape)
-    printing = print_of(replace(scene, printing=job.how(scene)), options)
-    return Result(make_mesh_job(scene, replace(job, printing=printing), how, path))
+    given = job or MeshJob()
+    edited = replace(scene, printing=given.edits(scene))
+    return Result(make_mesh_job(scene, job_of(given, edited, options), work_of(options, work), path))

@@ -4,28 +4,30 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import wraps
 from inspect import Parameter, signature
 from pathlib import Path
+from textwrap import indent
 from typing import Any, Literal, ParamSpec, TypeAlias, TypedDict, TypeVar, get_type_hints
 
 from ..common.messages import hint
+from ..common.parameters import REQUIRED, AnyLength, AnyScale, Record, parameter_lines, short_repr
 from ..errors import SceneError
 from ..formulas import Formula, Node, get
 from ..formulas import names as formula_names
-from ..formulas.parameters import REQUIRED, short_repr
 from ..kernel.devices import choose_device
+from ..records import Colour, MeshJob, SliceJob
 from ..scene import Print, Scene, library, read, scene
-from ..scene.lengths import AnyLength
 from ..work import Work
 
 P = ParamSpec("P")
 R = TypeVar("R")
+J = TypeVar("J", MeshJob, SliceJob)
 
 
-class WorkOptions(TypedDict, total=False):
+class WorkKeywords(TypedDict, total=False):
     """Execution: fields of `Work`."""
 
     threads: int | None
@@ -34,7 +36,7 @@ class WorkOptions(TypedDict, total=False):
     device: Literal["cpu", "cuda", "auto"] | None
 
 
-class PrintOptions(TypedDict, total=False):
+class PrintKeywords(TypedDict, total=False):
     """Print preparation: the fields of `Print`."""
 
     cavities: Literal["keep", "fill"] | None
@@ -48,16 +50,45 @@ class PrintOptions(TypedDict, total=False):
     raft: AnyLength | None
 
 
-class Options(PrintOptions, WorkOptions, total=False):
-    """Print preparation and execution."""
+class MeshKeywords(PrintKeywords, WorkKeywords, total=False):
+    """A mesh: the fields of `MeshJob`, print preparation and execution."""
+
+    size: AnyLength | None
+    up: Sequence[float] | None
+    scale: AnyScale | None
+    voxel: AnyLength | None
+    resolution: float | None
+    chord: AnyLength | None
+    simplify: AnyLength | None
+    dust: float | None
+    colour: Colour | None
+    proved: bool | None
 
 
-def work_of(options: WorkOptions | Options, work: Work | None = None) -> Work:
+class LayerKeywords(PrintKeywords, WorkKeywords, total=False):
+    """Layers: fields of `SliceJob`, print preparation and execution."""
+
+    size: AnyLength | None
+    up: Sequence[float] | None
+    scale: AnyScale | None
+    pixel: AnyLength | Sequence[AnyLength] | None
+
+
+WORK = {
+    "threads": ("int", "number of threads; one for each core by default"),
+    "progress": ("callable", "called repeatedly as ``progress(stage, share)``, the share from 0 to 1"),
+    "cancel": ("threading.Event", "setting it stops the work with `Cancelled`"),
+    "device": ('{"cpu", "cuda", "auto"}', "device that evaluates the field"),
+}
+"""Type and meaning of the fields of `WorkKeywords`."""
+
+
+def work_of(options: Mapping[str, Any], work: Work | None = None) -> Work:
     """Work record with the given options.
 
     Parameters
     ----------
-    options : WorkOptions or Options
+    options : mapping
         Fields to override; None keeps the field of `work`.
     work : Work, optional
         Base record; the defaults of `Work` without it.
@@ -67,7 +98,7 @@ def work_of(options: WorkOptions | Options, work: Work | None = None) -> Work:
     TypeError
         If progress is not callable, or cancel is not an event.
     """
-    given = _given_options(options, WorkOptions)
+    given = _given_options(options, WORK)
     if "device" in given:
         given["device"] = choose_device(given["device"])
     if not callable(given.get("progress", print)):
@@ -77,50 +108,78 @@ def work_of(options: WorkOptions | Options, work: Work | None = None) -> Work:
     return replace(work or Work(), **given)
 
 
-def print_of(scene: Scene, options: Options) -> Print:
+def print_of(scene: Scene, options: Mapping[str, Any]) -> Print:
     """Print record of a scene with the given options.
 
     Parameters
     ----------
     scene : Scene
         The scene with its own print settings.
-    options : Options
+    options : mapping
         Fields to override; None keeps the field of the scene.
     """
-    return replace(scene.printing, **_given_options(options, PrintOptions))
+    return replace(scene.printing, **_given_options(options, Print.kinds()))
 
 
-def _given_options(options: Any, kind: type) -> dict[str, Any]:
-    return {name: options[name] for name in kind.__annotations__ if options.get(name) is not None}
+def job_of(job: J, scene: Scene, options: Mapping[str, Any]) -> J:
+    """Job of a scene with the given options.
 
-
-def keywords(function: Callable[P, R]) -> Callable[P, R]:
-    """Decorate a function whose ``**options`` are a typed dictionary: list them in its signature.
-
-    Returns
-    -------
-    callable
-        The function with its full signature. Called with an unknown keyword, it raises a `TypeError` that
-        names the nearest known one.
+    Parameters
+    ----------
+    job : MeshJob or SliceJob
+        The base record.
+    scene : Scene
+        The scene with its own print settings.
+    options : mapping
+        Fields of the job and of `Print` to override; None keeps the field.
     """
-    own = signature(function)
-    listed = [p for p in own.parameters.values() if p.kind is not Parameter.VAR_KEYWORD]
-    for rest in (p for p in own.parameters.values() if p.kind is Parameter.VAR_KEYWORD):
-        kind = get_type_hints(function)[rest.name].__args__[0]
-        for name, annotation in get_type_hints(kind).items():
-            listed.append(Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=annotation))
-    known = [p.name for p in listed]
+    return replace(job, **_given_options(options, job.kinds()), printing=print_of(scene, options))
 
-    @wraps(function)
-    def call(*args: P.args, **kwargs: P.kwargs) -> R:
-        for name in kwargs:
-            if name not in known:
-                near = hint(name, known)
-                raise TypeError(f"{function.__name__}() has no argument {name!r}; {near}")
-        return function(*args, **kwargs)
 
-    call.__signature__ = own.replace(parameters=listed)  # type: ignore[attr-defined]
-    return call
+def _given_options(options: Mapping[str, Any], names: Iterable[str]) -> dict[str, Any]:
+    return {name: options[name] for name in names if options.get(name) is not None}
+
+
+def keywords(*records: type[Record]) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Decorate a function whose ``**options`` are a typed dictionary: list them in its signature, and in its
+    docstring in place of ``{options}``.
+
+    Called with an unknown keyword, the function raises a `TypeError` that names the nearest known one.
+    """
+
+    def decorated(function: Callable[P, R]) -> Callable[P, R]:
+        own = signature(function)
+        listed = [p for p in own.parameters.values() if p.kind is not Parameter.VAR_KEYWORD]
+        for rest in (p for p in own.parameters.values() if p.kind is Parameter.VAR_KEYWORD):
+            kind = get_type_hints(function)[rest.name].__args__[0]
+            for name, annotation in get_type_hints(kind).items():
+                listed.append(Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=annotation))
+        known = [p.name for p in listed]
+        options = set(known) - own.parameters.keys()
+
+        @wraps(function)
+        def call(*args: P.args, **kwargs: P.kwargs) -> R:
+            for name in kwargs:
+                if name not in known:
+                    near = hint(name, known)
+                    raise TypeError(f"{function.__name__}() has no argument {name!r}; {near}")
+            return function(*args, **kwargs)
+
+        lines = _option_lines(records, options)
+        call.__signature__ = own.replace(parameters=listed)  # type: ignore[attr-defined]
+        call.__doc__ = (function.__doc__ or "").replace("    {options}\n", indent("\n".join(lines), 4 * " "))
+        return call
+
+    return decorated
+
+
+def _option_lines(records: Iterable[type[Record]], known: Container[str]) -> Iterator[str]:
+    """Known keywords in numpydoc style: those of records, then those of `Work`."""
+    for record in records:
+        yield from parameter_lines({name: kind for name, kind in record.kinds().items() if name in known})
+    for name, (kind, doc) in WORK.items():
+        yield from (f"{name} : {kind}, optional", f"    {doc}")
+    yield ""
 
 
 Source: TypeAlias = Node | Scene | str | os.PathLike[str]

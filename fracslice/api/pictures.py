@@ -9,14 +9,14 @@ from typing import Any, Unpack
 
 import numpy as np
 
+from ..common.parameters import validate_value
 from ..errors import RenderError
 from ..formulas import Node
-from ..formulas.parameters import validate_value
 from ..kernel.devices import for_picture
 from ..rendering import Renderer
 from ..rendering.progressive import SIZE
 from ..scene.view import Camera, Film, Light, View
-from .options import Source, WorkOptions, keywords, resolve, work_of
+from .options import Source, WorkKeywords, keywords, resolve, work_of
 
 FILM = Film(width=640, height=480, samples=16)
 """Film of a shape without a scene, for a quick picture."""
@@ -35,7 +35,7 @@ class Picture(np.ndarray):
         return file.getvalue()
 
 
-@keywords
+@keywords()
 def render(
     shape: Source,
     *,
@@ -43,7 +43,7 @@ def render(
     samples: int | None = None,
     camera: Camera | None = None,
     lights: Sequence[Light] | None = None,
-    **options: Unpack[WorkOptions],
+    **options: Unpack[WorkKeywords],
 ) -> Picture:
     """Render a picture of a shape.
 
@@ -59,15 +59,7 @@ def render(
         The camera, in scene units; by default the scene's, or one that shows the whole shape.
     lights : sequence of Light, optional
         The lights; by default the scene's, or a sun and a sky.
-    threads : int, optional
-        Number of threads; one for each core by default.
-    progress : callable, optional
-        Called as ``progress("rendering", share)`` after every pass.
-    cancel : threading.Event, optional
-        Setting it stops the work with `Cancelled`.
-    device : {"cpu", "cuda", "auto"}, optional
-        Device that traces the rays; by default the GPU, if there is one and starting it pays.
-
+    {options}
     Returns
     -------
     Picture

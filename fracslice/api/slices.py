@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.messages import format_count, lacking
+from ..common.parameters import AnyLength
 from ..errors import SliceError
-from ..scene import parse_length
-from ..scene.lengths import AnyLength, AnyScale
-from ..slicing import Contours, Layer, SliceJob, Slicer, Stack, adapted, plan_stack
+from ..scene import Print
+from ..slicing import Contours, Layer, SliceJob, Slicer, Stack, plan_layers
 from ..volume.sizing import sizing
 from ..work import Work
-from .options import Options, Source, as_scene, keywords, print_of, work_of
+from .options import LayerKeywords, Source, as_scene, job_of, keywords, work_of
 
 if TYPE_CHECKING:
     from shapely import MultiPolygon
@@ -127,16 +127,11 @@ class Slices(Layers[NDArray[np.uint8]]):
         return Layers(self.stack, self.chosen, _contours, self.work)
 
 
-@keywords
+@keywords(SliceJob, Print)
 def slice_layers(
     shape: Source,
-    layer: AnyLength | tuple[AnyLength, AnyLength] = "0.05mm",
-    *,
-    size: AnyLength | None = None,
-    pixel: AnyLength | tuple[AnyLength, AnyLength] = "0.05mm",
-    up: Sequence[float] = (0.0, 0.0, 1.0),
-    scale: AnyScale = 1.0,
-    **options: Unpack[Options],
+    layer: AnyLength | Sequence[AnyLength] = "0.05mm",
+    **options: Unpack[LayerKeywords],
 ) -> Slices:
     """Slice a shape into the layers of a print, directly from its field.
 
@@ -149,19 +144,7 @@ def slice_layers(
     layer : float or str, or two of them
         Layer height; or its minimum and maximum, for adaptive layers that are thick where the surface is
         steep.
-    size : float or str, optional
-        Longest side. A scene has its own; for a shape the default is one millimetre per scene unit.
-    pixel : float or str, or two of them
-        Width and height of a pixel, or one length for both.
-    up : three numbers
-        Direction of the shape that is up in the print.
-    scale : float, str or three factors, optional
-        As for `make_mesh`.
-    cavities, keep, bridge, gap, thickness, hollow, drain, base, raft : optional
-        Print preparation: the fields of `Print`.
-    threads, progress, cancel, device : optional
-        As for `make_mesh`.
-
+    {options}
     Returns
     -------
     Slices
@@ -188,15 +171,9 @@ def slice_layers(
     12.57
     """
     work = work_of(options)
-    scene = as_scene(shape, size)
-    low, high = layer if isinstance(layer, (tuple, list)) and len(layer) == 2 else (layer, None)
-    longest = None if size is None else parse_length(size, "size")
-    given = sizing(scene, longest, work=work)
-    how = print_of(scene, options), scale, given.unit
-    job = SliceJob(given.side, low, pixel, up, *how)
-    stack = plan_stack(scene.root, job, work)
-    if high is not None:
-        stack = adapted(stack, parse_length(high, "layer"), work)
+    scene = as_scene(shape, options.get("size"))
+    job = job_of(SliceJob(layer=layer), scene, options)
+    stack = plan_layers(scene.root, job, work, sizing(scene, job.size, job.scale, work))
     return Slices(stack, range(len(stack.z)), _coverage, work)
 
 

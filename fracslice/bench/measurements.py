@@ -23,8 +23,8 @@ from ..cluster import Shard
 from ..common.cache import key, program
 from ..common.memory import MAXRSS, own_peak_mb, peak_rss_mb
 from ..common.messages import format_count
+from ..common.parameters import Count, Number, attribute, validate, validate_value
 from ..errors import BenchError, FracsliceError, SharedError
-from ..formulas.parameters import Count, Number, attribute, validate, validate_value
 from ..work import Work
 from .methods import METHODS, WORKLOADS
 

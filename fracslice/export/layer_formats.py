@@ -20,8 +20,8 @@ from PIL import Image, ImageOps
 
 from .._slices import Encoding
 from ..common.files import flushing, replacing, write_small_file
+from ..common.parameters import printable
 from ..errors import ExportError
-from ..formulas.parameters import printable
 from ..slicing import Layer
 from ..slicing.layers import Pictures
 from ..slicing.printers import Printer

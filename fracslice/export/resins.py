@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.parameters import REQUIRED, Count, Label, Number, attribute, from_table, validate
 from ..common.settings import read_table, read_text
 from ..errors import ExportError
-from ..formulas.parameters import REQUIRED, Count, Label, Number, attribute, from_table, validate
 from ..slicing.printers import PRINTERS, Printer
 
 

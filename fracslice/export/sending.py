@@ -23,9 +23,9 @@ from pathlib import Path
 from urllib.parse import quote, urlsplit
 
 from ..common.files import reporting_errors
+from ..common.parameters import printable
 from ..common.settings import read_text
 from ..errors import ExportError
-from ..formulas.parameters import printable
 from ..work import Work
 
 PACKET = 1 << 20

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from ..common.cache import key, program
 from ..errors import SliceError
 from ..kernel.host import toolchain
+from ..records import SECTIONS
 from ..slicing import Slicer, Stack
-from ..slicing.layers import COUNTS, MeanSlicer
+from ..slicing.layers import MeanSlicer
 from ..slicing.raster import Screen
 from ..work import Work
 from .layer_tasks import Recipe
@@ -48,8 +49,8 @@ class SliceRun:
     recipe: Recipe | None = None  # plans the same run in another process; a cluster needs it
 
     def __post_init__(self) -> None:
-        if self.sections not in COUNTS:
-            raise SliceError(f"sections={self.sections}: expected one of {', '.join(map(str, COUNTS))}")
+        if self.sections not in SECTIONS:
+            raise SliceError(f"sections={self.sections}: expected one of {', '.join(map(str, SECTIONS))}")
 
     @cached_property
     def slicer(self) -> Slicer:

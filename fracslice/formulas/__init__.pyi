@@ -2,13 +2,13 @@
 from collections.abc import Sequence
 from typing import Literal, Union
 
+from ..common.parameters import Axis as Axis
+from ..common.parameters import Choice as Choice
+from ..common.parameters import Count as Count
+from ..common.parameters import Number as Number
+from ..common.parameters import Vector as Vector
 from .box import Box as Box
 from .orbits import orbit as orbit
-from .parameters import Axis as Axis
-from .parameters import Choice as Choice
-from .parameters import Count as Count
-from .parameters import Number as Number
-from .parameters import Vector as Vector
 from .registry import Fixed as Fixed
 from .registry import Formula as Formula
 from .registry import Node as Node

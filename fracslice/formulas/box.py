@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any, Literal
 
-Triple = tuple[float, float, float]
+from ..common.parameters import Triple as Triple
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from ..common.parameters import Count, Number
 from . import power_maps
 from .orbits import LENGTHS, orbit, positive, turn
-from .parameters import Count, Number
 from .powers import calm_power, power_length, square, square_length
 from .powers import power as raised
 from .registry import Node

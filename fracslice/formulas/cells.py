@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from ..common.parameters import Count, Vector
 from .box import Box
-from .parameters import Count, Vector
 from .registry import Fixed, Node, shape
 from .vocabulary import absolute, floor, maximum, minimum, orbit
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
+from ..common.parameters import REQUIRED, Number, Vector
 from .box import Box
 from .field import Bounds
-from .parameters import REQUIRED, Number, Vector
 from .registry import Fixed, Node, always_keeps_sign, domain_operator
 from .vocabulary import absolute, any_of, floor, maximum, minimum
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from functools import reduce
 from typing import Any
 
+from ..common.parameters import REQUIRED, SMALLEST, Number
 from .box import Box
-from .parameters import REQUIRED, SMALLEST, Number
 from .registry import Node, csg_operator
 from .vocabulary import absolute, maximum, minimum
 

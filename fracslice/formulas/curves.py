@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from ..common.parameters import Count, Number
 from .box import Box
-from .parameters import Count, Number
 from .registry import Fixed, Node, shape
 from .vocabulary import absolute, atan2, cos, floor, maximum, minimum, sin, sqrt, where
 

@@ -21,13 +21,13 @@ from typing import Any, Literal, NoReturn
 import numpy as np
 
 from ..common.messages import hint
+from ..common.parameters import Parameter
 from ..errors import KernelError, SceneError
 from ..providers import provider
 from . import orbits, vocabulary
 from .box import Box, Triple
 from .orbits import HOOKS, LIPSCHITZ, OWN, orbit_step
 from .orbits import NAMES as VERBS
-from .parameters import Parameter
 from .registry import Formula, Hook, Node, names
 from .vocabulary import NAMES
 

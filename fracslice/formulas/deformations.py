@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 
+from ..common.parameters import REQUIRED, SMALLEST, Axis, Number
 from .box import Box
-from .parameters import REQUIRED, SMALLEST, Axis, Number
 from .registry import Node, always_keeps_sign, domain_operator
 from .transforms import chosen_axis
 from .vocabulary import absolute, any_of, atan2, cos, maximum, minimum, sin, sqrt, where

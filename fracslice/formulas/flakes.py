@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
+from ..common.parameters import Choice, Count
 from .box import Box
 from .orbits import mirror
-from .parameters import Choice, Count
 from .registry import Fixed, Node, shape
 from .vocabulary import orbit
 

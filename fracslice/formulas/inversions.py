@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from ..common.parameters import Choice, Count, Number, Vector
 from .box import Box
-from .parameters import Choice, Count, Number, Vector
 from .registry import Fixed, Node, shape
 from .vocabulary import absolute, maximum, minimum, orbit, ratio, rsqrt, sqrt, where
 

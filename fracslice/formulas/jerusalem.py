@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from ..common.parameters import Count
 from .box import Box
-from .parameters import Count
 from .registry import Fixed, Node, shape
 from .vocabulary import absolute, maximum, minimum, orbit
 

@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from ..common.parameters import Number, Vector
 from .box import Box
 from .escape import CORE, enclosing_radius, levels, potential_distance, stop
 from .orbits import ITERATIONS, REPEAT, Stepped, escape_sign, rounds, single
-from .parameters import Number, Vector
 from .powers import square
 from .registry import Fixed, Node, shape
 from .vocabulary import any_of, maximum, orbit, where

@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from ..common.parameters import Number
 from .flakes import CORNERS, MIRRORS, folded
 from .orbits import mirror, orbit, turn
-from .parameters import Number
 
 
 def turned(scale: float) -> dict[str, Any]:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from ..common.parameters import Number, Vector
 from . import power_maps
 from .orbits import ITERATIONS, REPEAT, orbit
-from .parameters import Number, Vector
 from .powers import calm_power
 from .registry import Node
 

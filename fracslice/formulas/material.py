@@ -7,8 +7,8 @@ through in a circle, so maps that do not end as they begin go there and back.
 
 from __future__ import annotations
 
+from ..common.parameters import Choice, File, Number, Vector
 from .box import Box
-from .parameters import Choice, File, Number, Vector
 from .registry import Node, always_keeps_sign, domain_operator
 
 OWN = "colours"

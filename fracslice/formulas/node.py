@@ -7,16 +7,15 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from inspect import Parameter, Signature
-from keyword import iskeyword
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, cast
 
 from ..common.messages import hint
+from ..common.parameters import REQUIRED, Choice, Count, Vector, parameter_lines, python_name
 from ..errors import SceneError
 from ..providers import provider
 from .box import Axis, Box, direction, three
 from .field import Bounds, Cells, Device, Field, Kernel, Loops, Precision
-from .parameters import REQUIRED, Choice, Count, Vector
 
 if TYPE_CHECKING:
     import numpy as np
@@ -307,11 +306,6 @@ def _elements(name: str, shape: Operators) -> tuple[Node, ...]:
     return node.children if same else (node,)
 
 
-def python_name(name: str) -> str:
-    """Name of a parameter in Python; a keyword such as ``from`` becomes ``from_`` (PEP 8)."""
-    return f"{name}_" if iskeyword(name) else name
-
-
 def ordered_parameters(formula: Formula) -> dict[str, Any]:
     """Parameters of a formula by name; Python requires parameters without a default to come first."""
     return dict(sorted(formula.parameters.items(), key=lambda item: item[1].default is not REQUIRED))
@@ -380,15 +374,6 @@ def docstring(formula: Formula) -> str:
     return "\n".join(
         [*lines, *parameter_lines(ordered_parameters(formula)), "", "Returns", "-------", "Node"]
     )
-
-
-def parameter_lines(parameters: Mapping[str, Any]) -> list[str]:
-    """Describe parameters in numpydoc style."""
-    lines = []
-    for name, parameter in parameters.items():
-        default = "" if parameter.default in (REQUIRED, None) else f", default {parameter.default!r}"
-        lines += [f"{python_name(name)} : {parameter.expects}{default}", f"    {parameter.doc}"]
-    return lines
 
 
 _ELEMENTS = {True: "What it is applied to; several are a union.", False: "What it is made of."}

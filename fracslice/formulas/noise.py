@@ -7,9 +7,9 @@ precisions give the same foam.
 
 from __future__ import annotations
 
+from ..common.parameters import Choice, Count, Number
 from .box import Box
 from .confining import beyond, frame
-from .parameters import Choice, Count, Number
 from .registry import Fixed, Node, domain_operator, shape
 from .vocabulary import absolute, floor, maximum, minimum, sqrt, where
 

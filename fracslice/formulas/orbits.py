@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from ..common.parameters import AUTO, Count, Parameter, Vector
 from ..providers import provider
 from .algebra import inverse, product, stretches
 from .box import Box
-from .parameters import AUTO, Count, Parameter, Vector
 from .powers import (
     calm_length,
     calm_majorant,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from ..common.parameters import Number, Vector
 from .box import Box
-from .parameters import Number, Vector
 from .registry import Node, shape
 from .vocabulary import absolute, maximum, minimum, sqrt, where
 

@@ -16,11 +16,11 @@ from inspect import Signature
 from types import MappingProxyType
 from typing import Any, Literal, TypeVar
 
+from ..common.parameters import REQUIRED, Parameter, python_name, validate_value
 from ..errors import SceneError
 from .box import Box
-from .node import FORMULAS, bind_arguments, docstring, ordered_parameters, python_name, signature
+from .node import FORMULAS, bind_arguments, docstring, ordered_parameters, signature
 from .node import Node as Node
-from .parameters import REQUIRED, Parameter, validate_value
 
 Hook = Callable[..., Any]
 

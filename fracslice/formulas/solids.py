@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from ..common.parameters import Count, Number, Vector
 from .box import Box
-from .parameters import Count, Number, Vector
 from .registry import Node, shape
 from .vocabulary import absolute, atan2, cos, exp, floor, log, maximum, minimum, sin, sqrt
 

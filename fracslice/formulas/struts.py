@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from ..common.parameters import Choice, Number
 from .box import Box
-from .parameters import Choice, Number
 from .registry import Fixed, Node, shape
 from .vocabulary import absolute, floor, maximum, minimum, sqrt
 

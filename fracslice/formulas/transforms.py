@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..common.parameters import REQUIRED, SMALLEST, Axis, Vector
 from .algebra import inverse, length, product, stretches
 from .box import Box
-from .parameters import REQUIRED, SMALLEST, Axis, Vector
 from .registry import Fixed, Node, always_keeps_sign, domain_operator
 from .vocabulary import absolute
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..mesh.pieces import gather_rows
-from ..meshjob import PIECES
+from ..records import PIECES
 from ..scene import Print
 from ..work import Work, in_background
 from .report import Clock, Placement

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import SceneError
 from ..formulas import Node
 from ..formulas.box import Box
-from ..meshjob import MeshJob
+from ..records import MeshJob
 from ..scene import Print, Scene
 from ..work import Work
 from .planning import plan_mesh
@@ -43,9 +43,9 @@ def make_implicit(
     from .mesh_writing import metadata
 
     what, clock = what or MeshJob(), Clock(work or Work())
-    _refuse(what.how(scene))
+    _refuse(what.edits(scene))
     check_target(path)
-    size = sizing(scene, what.size_mm, what.scale, clock.work)
+    size = sizing(scene, what.size, what.scale, clock.work)
     made = plan_mesh(scene, what, size, clock)
     plan = made.planned
     assert plan.root.tree is not None

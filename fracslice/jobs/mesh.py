@@ -15,7 +15,7 @@ import numpy as np
 
 from ..common.memory import peak_rss_mb
 from ..errors import SceneError, SharedError, TooLargeError, keeping
-from ..meshjob import MeshJob
+from ..records import MeshJob
 from ..scene import Scene
 from ..version import __version__
 from ..work import Work, in_background
@@ -106,7 +106,7 @@ class _Job:
         """Size of the object."""
         from ..volume.sizing import sizing
 
-        return sizing(self.scene, self.what.size_mm, self.what.scale, self.clock.work)
+        return sizing(self.scene, self.what.size, self.what.scale, self.clock.work)
 
     def made(self) -> tuple[MeshResult, _Job | None]:
         """Result, and the job of finer samples that has the object if this one lost it; None if there is no
@@ -117,7 +117,7 @@ class _Job:
         voxels = cure * self.what.voxels(self.size.longest)
         if cure == 1 or voxels > RAISED or self.clock.work.cluster is not None:
             return result, None
-        return result, replace(self, what=replace(self.what, voxel_mm=None, resolution=voxels))
+        return result, replace(self, what=replace(self.what, voxel=None, resolution=voxels))
 
     def refuse(self) -> None:
         """Raise the errors of invalid arguments before any work is done."""
@@ -150,7 +150,7 @@ class _Job:
 
     def needing_all(self) -> Iterator[tuple[str, float]]:
         """Names and lengths of changes that need a mesh in one piece."""
-        for name, length in (("chord", self.what.chord_mm), ("simplify", self.what.simplify_mm)):
+        for name, length in (("chord", self.what.chord), ("simplify", self.what.simplify)):
             if length is not None:
                 yield name, length
 
@@ -159,7 +159,7 @@ class _Job:
 
         Samples of walls thinner than a voxel do not tell bodies from crumbs: the field then chooses.
         """
-        sized, how = plan_mesh(self.scene, self.what, self.size, self.clock), self.what.how(self.scene)
+        sized, how = plan_mesh(self.scene, self.what, self.size, self.clock), self.what.edits(self.scene)
         with in_mm(self.size):
             signs = self.signs(sized.planned, False)
         thin = how.sorts and surfaces.has_thin_walls(signs)
@@ -218,12 +218,12 @@ class _Job:
 
         what, clock, scale, refined = self.what, self.clock, sized.scale, None
         planned, signs, thin = surface.planned, surface.signs, surface.thin
-        if what.chord_mm is not None:
-            surface, done = surfaces.refine_surface(surface, what.chord_mm / scale, clock)
+        if what.chord is not None:
+            surface, done = surfaces.refine_surface(surface, what.chord / scale, clock)
             refined = done.scaled(scale)
         with clock("finishing"):
-            finish = Finish(surface, sized.left, what.dust, scale, clock)
-        whole = what.how(self.scene).bodies is None
+            finish = Finish(surface, sized.left, what.dust_limit, scale, clock)
+        whole = what.edits(self.scene).bodies is None
         measure = partial(mesh_amount, planned, finish.volume, scale, whole, clock.work)
         with in_background(measure, clock.work.threads) as measured:
             made = Writing(self.scene, what, clock, self.path).made(surface, finish)

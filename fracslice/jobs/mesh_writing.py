@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..meshjob import MeshJob
+from ..records import MeshJob
 from ..scene import Scene
 from ..work import ahead
 from .finishing import Check, Finish
@@ -88,12 +88,12 @@ class Writing:
         from ..mesh.tips import tips_last
 
         finished, simplified, mesh = finish.finished(), None, None
-        if self.what.simplify_mm is not None:
+        if self.what.simplify is not None:
             from ..mesh.simplify import simplify
 
             (piece,) = finished
             with self.clock("simplifying"):
-                mesh, simplified = simplify(piece.mesh, self.what.simplify_mm, self.clock.work)
+                mesh, simplified = simplify(piece.mesh, self.what.simplify, self.clock.work)
             finished = iter([Finished.whole(mesh)])
         meshes = ahead(check.passing(finished))
         if several := len(finish.pieces) > 1:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from ..common.messages import significant
 from ..errors import GridError, VolumeError
-from ..meshjob import MeshJob
+from ..records import MeshJob
 from ..scene import Print, Scene
 from .report import Clock
 
@@ -32,7 +32,7 @@ def plan_mesh(scene: Scene, what: MeshJob, size: Sizing, clock: Clock) -> Sized:
     from ..volume import plan
     from ..volume.sizing import orient_field
 
-    how = what.how(scene)
+    how = what.edits(scene)
     with clock("planning"):
         root = orient_field(scene.root, what.up, size.stretch, clock.work)
         made = plan(root, what.voxels(size.longest), clock.work)
@@ -58,7 +58,7 @@ def apply_edits(made: Plan, scene: Scene, what: MeshJob, size: Sizing, clock: Cl
     """Make all edits for printing."""
     from ..printing import printable
 
-    how = what.how(scene)
+    how = what.edits(scene)
     with clock("changing"):
         changed, scale = printable(made, size, how, clock.work)
     # Walls thinner than a voxel are crumbs in the mesh: choose bodies in the field where it can tell.

@@ -27,7 +27,7 @@ from ..mesh.shells import Nesting, components, groups, levels, survey
 from ..mesh.tips import Pointed, at_tips, pointed_in, with_tips
 from ..mesh.topology import Shells
 from ..mesh.touching import NearBodies
-from ..meshjob import MeshJob
+from ..records import MeshJob
 from ..scene.reader import reads
 from ..volume import Plan, SignBricks
 from ..volume.exploration import Evaluate, brick_signs
@@ -65,7 +65,7 @@ class MeshRecipe:
     def plan(self) -> Plan:
         """Plan the field."""
         scene, clock = reads(self.scene, self.name), Clock(Work(threads=1))
-        size = sizing(scene, self.what.size_mm, self.what.scale, clock.work)
+        size = sizing(scene, self.what.size, self.what.scale, clock.work)
         sized = plan_mesh(scene, self.what, size, clock)
         return (apply_edits(sized.planned, scene, self.what, size, clock) if self.edited else sized).planned
 

@@ -10,20 +10,18 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import slicing
 from ..export.layer_files import FORMATS
 from ..export.layer_tasks import Encode
 from ..export.resins import Resin
 from ..export.slice_run import EPOCH, SliceRun
 from ..formulas import Node
-from ..meshjob import COARSEST, RESOLUTION, MeshJob
+from ..records import COARSEST, RESOLUTION, MeshJob
 from ..scene import Scene
 from ..scene.reader import reads
 from ..scene.view import Film, View
-from ..slicing import SliceJob
-from ..slicing.printers import Printer
+from ..slicing import SliceJob, plan_layers
 from ..slicing.raster import Screen
-from ..volume.sizing import orient_field
+from ..volume.sizing import orient_field, sizing
 from ..work import Work
 
 if TYPE_CHECKING:
@@ -54,18 +52,18 @@ class StackModel:
         """
         from .mesh import make_mesh  # of 3MF files only
 
-        job = self.job
-        longest = job.sizing.longest
-        voxel = max(*job.pixel, longest / RESOLUTION)
+        job, pixel = self.job, self.job.pixels
+        longest = sizing(self.scene, job.size, job.scale, self.work).longest
+        voxel = max(*pixel, longest / RESOLUTION)
         what = MeshJob(
-            voxel_mm=min(voxel, longest / COARSEST),
+            size=job.size,
+            voxel=min(voxel, longest / COARSEST),
             printing=job.printing,
-            simplify_mm=min(job.pixel) / 4,
+            simplify=min(pixel) / 4,
             up=job.up,
             scale=job.scale,
         )
-        scene = replace(self.scene, size_mm=None if job.unit else job.size, unit_mm=job.unit)
-        return make_mesh(scene, what, self.work).mesh
+        return make_mesh(self.scene, what, self.work).mesh
 
     def picture(self) -> NDArray[np.uint8]:
         """Render the scene as it stands on the printer, without its print preparation.
@@ -87,32 +85,20 @@ class SliceRecipe:
 
     scene: str  # XML and name of the scene
     name: str
-    job: slicing.SliceJob  # size, layers and pixels
-    most: float | None = None  # greatest layer height of adaptive layers, mm
+    job: SliceJob  # size, layers and pixels
     form: str = "png"  # name of the format
-    printer: Printer | None = None  # printer whose screen the layers are for
-    compensation: float = 0.0  # as for `Screen`
-    gamma: float = 1.0
-    mirror: bool | None = None
     resin: Resin | None = None  # as for `SliceRun`
     created: datetime = EPOCH
-    sections: int = 1
-    levels: int = 255
-    blur: int = 0
 
     def run(self, work: Work, scene: Scene | None = None) -> SliceRun:
         """Plan the layers; see `Recipe.run`."""
-        scene = scene or reads(self.scene, self.name)
-        stack = slicing.plan_stack(scene.root, self.job, work)
-        if self.most is not None:
-            stack = slicing.adapted(stack, self.most, work)
-        screen = Screen(
-            stack, self.printer, self.compensation, self.gamma, self.mirror, self.levels, self.blur
-        )
+        scene, job = scene or reads(self.scene, self.name), self.job
+        size = sizing(scene, job.size, job.scale, work)
+        stack = plan_layers(scene.root, job, work, size)
         about = {"Title": self.name, "scene_hash": scene.hash}
-        model = StackModel(scene, self.job, replace(work, cluster=None))
+        model = StackModel(scene, job, replace(work, cluster=None))
         files = about, model.mesh, model.picture, self.created
-        return SliceRun(stack, screen, work, self.resin, *files, self.sections, self)
+        return SliceRun(stack, Screen.of(stack, job), work, self.resin, *files, job.sections, self)
 
     def encoder(self, run: SliceRun) -> Encode:
         """Return the function that encodes the layers of a run in this format; see `Recipe.encoder`."""

@@ -74,8 +74,8 @@ def has_thin_walls(signs: SignBricks) -> bool:
     """True if walls thinner than a voxel hold too much of the material for the samples to distinguish
     bodies.
     """
-    from ..meshjob import PIECES
     from ..printing.components import thin_share
+    from ..records import PIECES
 
     return thin_share(signs) >= PIECES
 

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from ..common.arrays import quantile
+from ..common.parameters import AUTO, Count
 from ..errors import EmptyError
 from ..formulas.algebra import stretches
-from ..formulas.parameters import AUTO, Count
 from ..formulas.registry import Node
 from ..formulas.transforms import affine
 from .boxes import possible_cells

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from ..common.parameters import Choice, validate_value
 from ..errors import DeviceError
 from ..formulas.field import Device
-from ..formulas.parameters import Choice, validate_value
 
 DEVICES = Choice("auto", "what computes", ("cpu", "cuda", "auto"))
 """Parameter of the device to compute on."""

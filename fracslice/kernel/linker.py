@@ -22,8 +22,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ..common.parameters import AUTO
 from ..errors import KernelError
-from ..formulas.parameters import AUTO
 from ..formulas.registry import Fixed, Node
 from . import functions, source
 from .language import CHILD, parse, parse_expression

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from ..common.parameters import AUTO, REQUIRED
 from ..errors import SceneError
 from ..formulas.orbits import growth_of, orbit_select, steps
-from ..formulas.parameters import AUTO, REQUIRED
 from ..formulas.registry import Formula, Node, get
 from .cpu import compile_scene
 from .orbits import function_of_text

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from .._native import nesting as _nesting
 from ..errors import MeshError
-from ..meshjob import PIECES
+from ..records import PIECES
 from ..work import ahead
 from .model import Mesh
 from .pieces import Pieces, gather_rows, near_plane, rows

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._native import Reduction, connected_components
+from ..common.parameters import Number, validate_value
 from ..errors import MeshError
-from ..formulas.parameters import Number, validate_value
 from ..scene import parse_length
 from ..work import Work, chunks
 from .model import Mesh

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .._native import near_bodies
 from ..kernel.depth import WIDE
-from ..meshjob import JOINING
+from ..records import JOINING
 from .shells import WholeShells
 
 REACH = 2

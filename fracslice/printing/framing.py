@@ -9,7 +9,7 @@ import numpy as np
 from ..formulas import box as box_node
 from ..formulas import transform
 from ..kernel import Field
-from ..meshjob import PIECES
+from ..records import PIECES
 from ..volume import Plan, extent
 from ..volume.sizing import Sizing, box_of_the_rest
 from ..work import Work

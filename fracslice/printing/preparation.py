@@ -16,7 +16,7 @@ import numpy as np
 from ..errors import VolumeError
 from ..formulas import Box, box, plane, transform
 from ..kernel import Field
-from ..meshjob import DUST, PIECES
+from ..records import DUST, PIECES
 from ..scene import Print
 from ..volume import Bricks, Plan, extent, sample_scene
 from ..volume.sizing import Sizing

@@ -12,9 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..common.messages import place
+from ..common.parameters import Length, Number, attribute, validate
 from ..errors import SceneError
-from ..formulas.parameters import Number, attribute, validate
-from ..scene.lengths import Length
 
 SUPPORTS = "supports in the slicer"
 

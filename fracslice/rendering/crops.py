@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..common.parameters import Vector, validate_value
 from ..errors import RenderError
-from ..formulas.parameters import Vector, validate_value
 from .accumulator import CHANNELS, COARSE
 
 BYTES = 4 * (CHANNELS + 4 + 3)

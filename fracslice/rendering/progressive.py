@@ -16,8 +16,8 @@ import numpy as np
 
 from ..common.cache import key, program
 from ..common.memory import available_bytes
+from ..common.parameters import Number, Vector, validate_value
 from ..errors import ClusterError, RenderError
-from ..formulas.parameters import Number, Vector, validate_value
 from ..formulas.registry import Node
 from ..kernel.devices import choose_device
 from ..scene import Scene

@@ -1,8 +1,8 @@
 """Scenes: read from files, built in Python, validated and written."""
 
-from .lengths import parse_length
+from ..common.parameters import parse_length
+from ..records import Print
 from .model import Scene, scene
-from .printing import Print
 from .reader import read, reads
 from .writer import to_xml
 

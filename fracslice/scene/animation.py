@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from ..formulas.parameters import REQUIRED, Choice, Count, Number, Parameter, attribute, finite
-from .element import Part
-from .lengths import NUMBER
+from ..common.parameters import NUMBER, REQUIRED, Choice, Count, Number, Parameter, attribute, finite
+from ..records import Part
 
 LONGEST = 1e5
 """Longest time, seconds."""

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator, Mapping
 from math import isfinite
 from typing import Any
 
+from ..common.parameters import Number, Parameter, Vector
 from ..errors import SceneError
 from ..formulas.definitions import Defined, Definition, formula
-from ..formulas.parameters import Number, Parameter, Vector
 from .layout import DEFINE, PARAMETER, SECTIONS, Element
 
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
 
+from ..common.parameters import REQUIRED, Choice, Length, Number, Parameter, Vector
 from ..formulas import get, names
-from ..formulas.parameters import REQUIRED, Choice, Number, Parameter, Vector
+from ..formulas.definitions import is_name
 from ..formulas.plugins import load_installed
 from ..formulas.registry import Formula
+from ..records import Part, Print
 from .animation import Animation, Track
-from .element import Identifier, Part
-from .lengths import Length
-from .printing import Print
 from .view import PARTS
 
 
@@ -30,6 +30,20 @@ class TopElement:
 
 
 Element = Formula | TopElement
+
+
+@dataclass(frozen=True)
+class Identifier(Parameter):
+    """A name of lower-case letters, digits and underscores that begins with a letter."""
+
+    @property
+    def expects(self) -> str:
+        return "a name of at most 40 lower-case letters, digits and _, not one of a function"
+
+    def check(self, value: Any) -> Any:
+        if not isinstance(value, str) or not is_name(value):
+            raise ValueError(self.expects)
+        return value
 
 
 VERSION = "1"

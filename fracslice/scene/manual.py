@@ -11,10 +11,10 @@ from typing import Any
 
 from .. import formulas as formula_package
 from ..common.messages import hint
+from ..common.parameters import REQUIRED
 from ..errors import SceneError
 from ..formulas import vocabulary
 from ..formulas.node import docstring, signature
-from ..formulas.parameters import REQUIRED
 from ..formulas.plugins import origin
 from ..formulas.registry import Formula, Node, get, names
 from .layout import LISTED, PARAMETER, SCENE, SECTIONS, Element, formulas
@@ -122,7 +122,9 @@ def stub() -> str:
     lines = [_HEAD]
     for node in imports:
         exported = sorted(vocabulary.NAMES) if node.module == "vocabulary" else [a.name for a in node.names]
-        lines += [f"from .{node.module} import {name} as {name}" for name in exported if node.level]
+        lines += [
+            f"from {'.' * node.level}{node.module} import {name} as {name}" for name in exported if node.level
+        ]
     imported = {alias.name for node in imports for alias in node.names}
     made = [name for name in _shipped_formulas() if name not in imported]
     return "\n".join([*lines, *(f"\n{_function(get(name))}" for name in made)]) + "\n"

@@ -9,13 +9,12 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from ..common.parameters import AUTO, AnyLength, parse_length
 from ..errors import SceneError
 from ..formulas import Node, get
 from ..formulas.definitions import definitions
-from ..formulas.parameters import AUTO
+from ..records import Print
 from .animation import Animation, Track
-from .lengths import AnyLength, parse_length
-from .printing import Print
 from .view import View
 
 

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..common.messages import hint
+from ..common.parameters import Count, Number, Vector
 from ..errors import FracsliceError, SceneError
 from ..formulas import Node
-from ..formulas.parameters import Count, Number, Vector
-from .element import Part
+from ..records import Part
 from .layout import PICTURE, PRINT, SECTIONS, SOLID, Element
 from .view import View
 

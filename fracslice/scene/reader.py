@@ -14,13 +14,13 @@ from typing import Any
 from xml.parsers import expat
 
 from ..common.messages import hint
+from ..common.parameters import REQUIRED, File, Parameter, printable
 from ..errors import SceneError
 from ..formulas import Node
-from ..formulas.parameters import REQUIRED, File, Parameter, printable
 from ..formulas.registry import DEEPEST, TOO_DEEP
+from ..records import Part, Print
 from .animation import Animation, Track
 from .definitions import make_definition, parameter
-from .element import Part
 from .layout import (
     DEFINE,
     LISTED,
@@ -34,7 +34,6 @@ from .layout import (
     registered_formulas,
 )
 from .model import Scene, computing, scene
-from .printing import Print
 from .view import View
 
 LARGEST_FILE = 16 << 20

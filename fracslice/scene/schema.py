@@ -12,11 +12,9 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as Tree
 
-from ..formulas.parameters import REQUIRED, Axis, Choice, Count, File, Number, Vector
+from ..common.parameters import MILLIMETRES, REQUIRED, Axis, Choice, Count, File, Length, Number, Vector
 from .animation import AttributePath, Keys, Seconds
-from .element import Identifier
-from .layout import DEFINE, PARAMETER, SCENE, SECTIONS, Element, formulas
-from .lengths import MILLIMETRES, Length
+from .layout import DEFINE, PARAMETER, SCENE, SECTIONS, Element, Identifier, formulas
 
 PATH = Path(__file__).with_name("scene.rng")
 """The shipped schema."""

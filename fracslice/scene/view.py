@@ -7,9 +7,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from ..common.parameters import Choice, Count, File, Number, Vector, attribute, validate_value
 from ..formulas.box import Box
-from ..formulas.parameters import Choice, Count, File, Number, Vector, attribute, validate_value
-from .element import Part
+from ..records import Part
 
 if TYPE_CHECKING:
     import numpy as np

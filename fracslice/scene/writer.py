@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from ..common.parameters import short_repr
 from ..errors import SceneError
 from ..formulas import Node
 from ..formulas.definitions import definitions
-from ..formulas.parameters import short_repr
+from ..records import Part, Print
 from .definitions import attributes, write_definition
-from .element import Part
 from .layout import SCENE, SECTIONS, SOLID, VERSION
-from .printing import Print
 
 if TYPE_CHECKING:
     from .model import Scene

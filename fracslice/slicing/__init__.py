@@ -1,8 +1,9 @@
 """Slicing: from a field to the layers of a printer, without a mesh."""
 
-from .adaptive import adapted
+from ..records import SliceJob
+from .adaptive import adapted, plan_layers
 from .contours import Contours
 from .layers import SLAB, Layer, Slicer
-from .stack import SliceJob, Stack, plan_stack
+from .stack import Stack, plan_stack
 
-__all__ = ["SLAB", "Contours", "Layer", "SliceJob", "Slicer", "Stack", "adapted", "plan_stack"]
+__all__ = ["SLAB", "Contours", "Layer", "SliceJob", "Slicer", "Stack", "adapted", "plan_layers", "plan_stack"]

@@ -7,18 +7,26 @@ from dataclasses import replace
 import numpy as np
 
 from ..common.arrays import quantile
+from ..common.parameters import Length, validate_value
 from ..errors import SliceError
-from ..formulas.parameters import validate_value
-from ..scene.lengths import Length
+from ..kernel import Field
+from ..records import SliceJob
+from ..volume.sizing import Sizing
 from ..work import Work
 from .layers import Layer, Slicer
-from .stack import Stack
+from .stack import Stack, plan_stack
 
 ACROSS = 128
 """Pixels along the longer side of the coarse layers on which slopes are measured."""
 
 SHARE = 0.9
 """Quantile of the slope along an outline that limits the layer; the rest of a rough outline is ignored."""
+
+
+def plan_layers(root: Field, job: SliceJob, work: Work | None = None, size: Sizing | None = None) -> Stack:
+    """Plan the layers of a job, of one height or adaptive; see `plan_stack`."""
+    stack, most = plan_stack(root, job, work, size), job.layer[1]
+    return stack if most is None else adapted(stack, most, work)
 
 
 def adapted(stack: Stack, most: float, work: Work | None = None) -> Stack:

@@ -339,15 +339,11 @@ class Slicer:
             group = group[len(sampled) :]
 
 
-COUNTS = tuple(n for n in (1, 2, 4, 8) if SLAB % n == 0)
-"""Possible numbers of sections: all of a layer are in one slab."""
-
-
 @dataclass(frozen=True, eq=False)
 class MeanSlicer(Slicer):
     """Slicer whose layers have the mean coverage of several sections."""
 
-    sections: int = 1  # sections per layer, one of `COUNTS`
+    sections: int = 1  # sections per layer, one of `SECTIONS`
 
     def map(
         self,

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..common.parameters import REQUIRED, Count, Label, Number, Vector, attribute, from_table, validate
 from ..common.settings import read_table
 from ..errors import SliceError
-from ..formulas.parameters import REQUIRED, Count, Label, Number, Vector, attribute, from_table, validate
 
 
 @dataclass(frozen=True)

@@ -3,42 +3,34 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .._slices import Encoding, encoded
+from ..common.parameters import record
 from ..errors import SliceError
-from ..formulas.parameters import Count, Number, attribute, validate
-from ..scene.lengths import Shift
+from ..records import RasterOptions
 from .layers import Layer, Pictures, ScreenView
 from .printers import Printer
 from .stack import Stack
 
 
-@dataclass(frozen=True, eq=False)
-class Screen:
+@record
+class Screen(RasterOptions):
     """Turns layers into pictures."""
 
-    stack: Stack  # the planned layers
-    printer: Printer | None = None  # its screen is shown; None shows the object alone
-    # distance by which outlines move outwards (negative: inwards), for resin that cures beyond its pixels or
-    # shrinks; mm, or text such as "50um"
-    compensation: float = attribute(Shift, 0.0, "how far outlines move")
-    # exponent of the grey levels
-    gamma: float = attribute(Number, 1.0, "of the grey levels", above=0, most=10)
-    mirror: bool | None = None  # overrides the printer's
-    # grey levels above black; 1 for black and white
-    levels: int = attribute(Count, 255, "grey levels above black", least=1, most=255)
-    # radius of the blur of outlines, pixels
-    blur: int = attribute(Count, 0, "radius of the blur, pixels", least=0, most=16)
+    stack: Stack = field(kw_only=False)  # the planned layers
+
+    @classmethod
+    def of(cls, stack: Stack, job: RasterOptions) -> Screen:
+        """Screen of a stack with the options of a job."""
+        return cls(stack, **{f.name: getattr(job, f.name) for f in fields(RasterOptions)})
 
     def __post_init__(self) -> None:
-        validate(self, SliceError)
-        if not abs(self.compensation) <= 1:
-            raise SliceError(f"compensation {self.compensation:g} mm: expected at most 1 mm")
+        super().__post_init__()
         if -2 * self.compensation >= (width := min(self.stack.size[:2])):
             raise SliceError(
                 f"compensation {self.compensation:g} mm: nothing is left of an object {width:.3g} mm wide"

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import SceneError, SliceError
-from ..formulas.box import Box, Triple
-from ..formulas.parameters import REQUIRED, Vector, attribute, validate
+from ..errors import SliceError
+from ..formulas.box import Box
 from ..kernel import Field
 from ..printing import printable
-from ..scene import Print
-from ..scene.lengths import AnyLength, AnyScale, Length, Pair, Percent
+from ..records import SliceJob
 from ..volume import Drain, plan
-from ..volume.sizing import SAME, UP, Sizing, orient_field
+from ..volume.sizing import Sizing, orient_field
 from ..work import Work
 
 MOST_LAYERS = 100_000
@@ -25,72 +21,6 @@ MOST_PIXELS = 65_536
 
 FLOAT_STEPS = 8
 """Minimum number of float32 numbers between two samples."""
-
-
-@dataclass(frozen=True)
-class SliceJob:
-    """Parameters of a job. Lengths are numbers of mm, or text such as "0.05mm"; the attributes hold mm.
-
-    Attributes
-    ----------
-    size : float
-        Longest side of the object, before anything is cut off or added; approximate if `unit` is given.
-    layer : float
-        Layer height.
-    pixel : tuple of float
-        Width and height of a pixel, or one length for both.
-    up : tuple of float
-        Direction of the scene that is up in the print.
-    printing : Print
-        Changes that make the object printable.
-    scale : tuple of float
-        Compensation of shrinkage along x, y and z; one factor or percentage for all, or three.
-    unit : float, optional
-        Length of a scene unit, mm, which then determines the size.
-
-    Raises
-    ------
-    SceneError
-        For an invalid value.
-    SliceError
-        For layers or pixels as large as the object.
-    """
-
-    size: float = attribute(Length, REQUIRED, "the longest side")
-    layer: float = attribute(Length, 0.05, "the layer height")
-    pixel: tuple[float, float] = attribute(Pair, (0.05, 0.05), "width and height")
-    up: Triple = attribute(Vector, UP, "a direction", nonzero=True)
-    printing: Print = field(default_factory=Print)
-    scale: Triple = attribute(Percent, SAME, "compensation of shrinkage")
-    unit: float | None = attribute(Length, None, "a scene unit")
-
-    if TYPE_CHECKING:  # what it takes is more than what it holds
-
-        def __init__(
-            self,
-            size: AnyLength,
-            layer: AnyLength = 0.05,
-            pixel: AnyLength | Sequence[AnyLength] = 0.05,
-            up: Sequence[float] = UP,
-            printing: Print = ...,
-            scale: AnyScale = 1.0,
-            unit: AnyLength | None = None,
-        ) -> None: ...
-
-    def __post_init__(self) -> None:
-        validate(self, SceneError)
-        if self.layer >= self.size:
-            raise SliceError(
-                f"a layer of {self.layer:g} mm is as high as the object: {self.size:g} mm; "
-                "expected a lower layer or a larger object"
-            )
-        if max(self.pixel) >= self.size:
-            raise SliceError(f"a pixel of {max(self.pixel):g} mm is as large as the object: {self.size:g} mm")
-
-    @property
-    def sizing(self) -> Sizing:
-        """Size of the object."""
-        return Sizing(self.size, self.unit, self.scale)
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,8 +87,8 @@ class Stack:
         return np.array([*self.corner, self.pixel[0] / self.scale, self.pixel[1] / self.scale])
 
 
-def plan_stack(root: Field, job: SliceJob, work: Work | None = None) -> Stack:
-    """Find the object's size and depths, make it printable, and place layers and pixels.
+def plan_stack(root: Field, job: SliceJob, work: Work | None = None, size: Sizing | None = None) -> Stack:
+    """Find the object's size and depths, make it printable, and place layers of one height and pixels.
 
     Parameters
     ----------
@@ -168,6 +98,8 @@ def plan_stack(root: Field, job: SliceJob, work: Work | None = None) -> Stack:
         The job.
     work : Work, optional
         Threads, progress and cancellation.
+    size : Sizing, optional
+        Size of the object; by default that of the job.
 
     Returns
     -------
@@ -183,30 +115,44 @@ def plan_stack(root: Field, job: SliceJob, work: Work | None = None) -> Stack:
     Cancelled
         When the work is cancelled.
     """
-    upright = orient_field(root, job.up, job.sizing.stretch, work)
-    planned = plan(upright, job.sizing.longest / min(job.pixel), work)
+    if size is None:
+        size = Sizing.of(job.size, job.scale)
+    layer, pixel = job.layer[0], job.pixels
+    _refuse_coarse(layer, max(pixel), size.side)
+    planned = plan(orient_field(root, job.up, size.stretch, work), size.longest / min(pixel), work)
     if job.printing.bodies is not None:
         from ..printing.framing import frame_bodies
 
-        planned = frame_bodies(planned, job.sizing, job.printing.bodies, work or Work())
-    planned, scale = printable(planned, job.sizing, job.printing, work)
+        planned = frame_bodies(planned, size, job.printing.bodies, work or Work())
+    planned, scale = printable(planned, size, job.printing, work)
     box, outer = planned.box, planned.outer
     mm = tuple(s * scale for s in box.size)
     shape, corner = [0, 0], [0.0, 0.0]
     for axis in range(2):
-        step = job.pixel[axis] / scale
+        step = pixel[axis] / scale
         shape[1 - axis] = 2 * math.ceil(outer.size[axis] / step / 2 + 1)
         corner[axis] = box.centre[axis] - step * shape[1 - axis] / 2
-    tops = _tops(mm[2], job.layer)
+    tops = _tops(mm[2], layer)
     if max(shape) > MOST_PIXELS:
         most = f"at most {MOST_PIXELS} along a side; expected larger pixels or a smaller object"
         raise SliceError(f"{shape[1]} x {shape[0]} pixels, {most}")
-    _check_precision(outer, scale, min(*job.pixel, job.layer))
+    _check_precision(outer, scale, min(*pixel, layer))
     z = box.lo[2] + (tops - np.diff(tops, prepend=0.0) / 2) / scale
-    size, at = (mm[0], mm[1], mm[2]), (corner[0], corner[1])
+    sides, at = (mm[0], mm[1], mm[2]), (corner[0], corner[1])
     pixels, notes = (shape[0], shape[1]), (*planned.notes, *_rounding_note(mm[2], float(tops[-1])))
-    where = at, job.pixel, pixels, z, tops
-    return Stack(planned.root, scale, *where, size, outer, notes, planned.drains, side=job.size)
+    where = at, pixel, pixels, z, tops
+    return Stack(planned.root, scale, *where, sides, outer, notes, planned.drains, side=size.side)
+
+
+def _refuse_coarse(layer: float, pixel: float, size: float) -> None:
+    """Refuse layers or pixels, mm, as large as the object."""
+    if layer >= size:
+        raise SliceError(
+            f"a layer of {layer:g} mm is as high as the object: {size:g} mm; "
+            "expected a lower layer or a larger object"
+        )
+    if pixel >= size:
+        raise SliceError(f"a pixel of {pixel:g} mm is as large as the object: {size:g} mm")
 
 
 def _check_precision(outer: Box, scale: float, finest: float) -> None:

@@ -12,9 +12,9 @@ from typing import Any, Literal
 import numpy as np
 
 from ..common.messages import lacking
+from ..common.parameters import Choice, Vector, validate_value
 from ..errors import RenderError
 from ..export import replacing
-from ..formulas.parameters import Choice, Vector, validate_value
 from ..mesh.model import Mesh
 from . import plotter
 

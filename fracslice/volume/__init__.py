@@ -13,7 +13,7 @@ from ..formulas.box import Box, Triple
 from ..formulas.registry import Node
 from ..kernel import Field
 from ..kernel.depth import depth_notes, resolve_depths, visible, with_depth_advice
-from ..meshjob import RESOLUTION
+from ..records import RESOLUTION
 from ..work import Work
 from .extent import Extent, extent, reached
 from .lattice import Lattice

@@ -12,7 +12,7 @@ from ..formulas.algebra import length
 from ..formulas.field import Bounds
 from ..kernel import Field, Kernel
 from ..kernel.boxes import possible_cells
-from ..meshjob import DUST
+from ..records import DUST
 from ..work import Work, chunks
 from .lattice import values_at
 

@@ -14,13 +14,11 @@ from ..formulas.algebra import length
 from ..formulas.box import Box, Triple
 from ..formulas.transforms import affine
 from ..kernel import Field
+from ..records import SAME, UP
 from ..scene import Scene
 from ..work import Work
 from . import Plan, with_depths
 from .extent import extent, reached
-
-SAME: Triple = (1.0, 1.0, 1.0)
-UP: Triple = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -30,6 +28,13 @@ class Sizing:
     side: float  # longest side before compensation, mm; approximate if `unit` is given
     unit: float | None = None  # mm per scene unit before compensation; None if `side` determines it
     factors: Triple = SAME  # compensation of shrinkage along x, y and z of the print
+
+    @classmethod
+    def of(cls, side: float | None, factors: Triple = SAME) -> Sizing:
+        """Size of an object whose longest side is given, mm."""
+        if side is None:
+            raise SliceError("size: expected a length, for an object without a scene")
+        return cls(side, None, factors)
 
     @property
     def longest(self) -> float:

@@ -14,7 +14,7 @@ import pytest
 import trimesh
 
 from fracslice import Mesh, MeshJob, Result, Work, box, make_mesh, read, sphere, to_xml, torus
-from fracslice.api.options import PrintOptions, WorkOptions
+from fracslice.api.options import MeshKeywords, PrintKeywords, WorkKeywords
 from fracslice.errors import Cancelled, ExportError, SceneError
 from fracslice.jobs.mesh import make_mesh as make_mesh_job
 from fracslice.mesh.reading import read_mesh
@@ -93,8 +93,8 @@ def test_what_is_no_shape_is_named(source: object, message: str) -> None:
         ),
         ({"thicknes": 1}, TypeError, r"did you mean thickness\?"),
         ({"res": 8}, TypeError, r"did you mean resolution\?"),
-        ({"size": "8 bananas"}, SceneError, "size '8 bananas': expected a length"),
-        ({"voxel": -1}, SceneError, "voxel -1: expected a length above zero"),
+        ({"size": "8 bananas"}, SceneError, "size='8 bananas': expected a length"),
+        ({"voxel": -1}, SceneError, "voxel=-1: expected a length above zero"),
         ({"voxel": 1, "resolution": 64}, SceneError, "voxel and resolution: expected one of them"),
         ({"thickness": "thick"}, SceneError, "thickness='thick': expected 0, or a length"),
         ({"threads": 0}, SceneError, "threads=0: expected"),
@@ -110,8 +110,12 @@ def test_keywords_that_cannot_be_are_named(options: dict, error: type, message: 
 
 def test_the_signature_lists_every_keyword() -> None:
     names = set(inspect.signature(make_mesh).parameters)
-    assert set(Print.kinds()) == set(PrintOptions.__annotations__) <= names
-    assert set(WorkOptions.__annotations__) <= {f.name for f in fields(Work)} & names
+    assert set(Print.kinds()) == set(PrintKeywords.__annotations__) <= names
+    assert {*MeshJob.kinds(), *Print.kinds(), *WorkKeywords.__annotations__} == {
+        *MeshKeywords.__annotations__
+    }
+    assert set(MeshKeywords.__annotations__) <= names and "triangles are removed" in str(make_mesh.__doc__)
+    assert set(WorkKeywords.__annotations__) <= {f.name for f in fields(Work)} & names
 
 
 def test_progress_is_reported_and_work_is_cancelled() -> None:

@@ -11,10 +11,9 @@ import pytest
 
 import fracslice
 from fracslice import capsule, formulas, sphere, torus
+from fracslice.common.parameters import REQUIRED, python_name
 from fracslice.errors import SceneError
 from fracslice.formulas import get, names
-from fracslice.formulas.node import python_name
-from fracslice.formulas.parameters import REQUIRED
 from fracslice.scene.manual import package_stub, stub
 
 SHIPPED = [name for name in names() if get(name).function.__module__.startswith("fracslice.")]

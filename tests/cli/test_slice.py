@@ -39,8 +39,8 @@ def test_printers_are_listed_without_a_scene(command: str, capsys: pytest.Captur
     ("options", "reported"),
     [
         (["--layer", "0.4mm..0.2mm"], "expected a range from the lowest to the highest"),
-        (["--layer", "0.2mm..thick"], "'thick'"),
-        (["--layer", "..0.2mm"], "''"),
+        (["--layer", "0.2mm..thick"], "'0.2mm..thick': expected a length, or two"),
+        (["--layer", "..0.2mm"], "'..0.2mm': expected a length, or two"),
         (["--layer", "30mm"], "as high as the object"),
         (["--format", "gcode"], "known are"),
     ],

@@ -25,7 +25,7 @@ from fracslice.jobs import shared_mesh
 from fracslice.jobs.mesh import make_mesh
 from fracslice.jobs.slices import SliceRecipe
 from fracslice.mesh import shells
-from fracslice.meshjob import MeshJob
+from fracslice.records import MeshJob
 from fracslice.rendering import Renderer, progressive
 from fracslice.scene import Scene, scene
 from fracslice.scene.reader import reads
@@ -41,7 +41,9 @@ pytestmark = pytest.mark.once
 
 pytest.importorskip("distributed")
 ROOT = mandelbulb(iterations=4)
-RECIPE = SliceRecipe(to_xml(scene(ROOT, size="20mm")), "bulb", SliceJob(20.0, 0.1, (0.05, 0.05)), None, "cli")
+RECIPE = SliceRecipe(
+    to_xml(scene(ROOT, size="20mm")), "bulb", SliceJob(size=20.0, layer=0.1, pixel=(0.05, 0.05)), "cli"
+)
 MESHED = scene(mandelbulb(iterations=4) | sphere(radius=0.1).translate((-1.5, 0.0, 0.0)), size="20mm")
 VIEW = View(camera=Camera(eye=(2.0, -2.0, 1.0)))
 SIZE, SAMPLES = (96, 72), 6
@@ -68,7 +70,7 @@ def rendered(work: Work, folder: Path) -> bytes:
 
 def meshed(work: Work, folder: Path) -> bytes:
     """STL file of a mesh with dust that is removed."""
-    make_mesh(MESHED, MeshJob(resolution=40, dust_mm3=5.0), work, folder / "a.stl")
+    make_mesh(MESHED, MeshJob(resolution=40, dust=5.0), work, folder / "a.stl")
     return (folder / "a.stl").read_bytes()
 
 

@@ -20,7 +20,7 @@ from fracslice.formulas import box, cone, flake, sphere
 from fracslice.jobs import shared_files, shared_mesh
 from fracslice.jobs.mesh import MeshResult, make_mesh
 from fracslice.mesh import shells
-from fracslice.meshjob import MeshJob
+from fracslice.records import MeshJob
 from fracslice.rendering import progressive
 from fracslice.scene import scene
 from fracslice.volume import exploration
@@ -107,7 +107,7 @@ def test_shards_of_a_mesh_make_one_file(tmp_path: Path, monkeypatch: pytest.Monk
     )
     shape = cone(radius=0.5, height=2.0) | sphere(radius=0.05).translate((0.8, 0.0, 0.0))
     turned = scene(shape.rotate(70.0, (0.0, 1.0, 0.2)), size="20mm")
-    job = MeshJob(resolution=32, dust_mm3=2.0)
+    job = MeshJob(resolution=32, dust=2.0)
     shards = [Shard(ResultFolder(str(tmp_path / "pieces")), number, 2) for number in (1, 2)]
     paths = {number: tmp_path / f"{number}.stl" for number in (0, 1, 2)}
 
@@ -186,7 +186,7 @@ def test_what_needs_the_whole_mesh_is_sampled_by_all(tmp_path: Path, monkeypatch
     """Chord and simplification are of the whole mesh, so shard 1 makes them of the shared samples."""
     monkeypatch.setattr(exploration, "MANY", 1)
     monkeypatch.setattr(shared_mesh, "BRICKS", 8)
-    ball, job = scene(sphere(), size="20mm"), MeshJob(resolution=16, chord_mm=0.2, simplify_mm=0.3)
+    ball, job = scene(sphere(), size="20mm"), MeshJob(resolution=16, chord=0.2, simplify=0.3)
     pieces, made = ResultFolder(str(tmp_path / "pieces")), list[str]()
     write = ResultFolder.write
     monkeypatch.setattr(

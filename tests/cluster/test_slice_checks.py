@@ -29,7 +29,7 @@ THING = scene(
     (box(size=(2.0, 1.0, 1.2)) - CAVITY - WELL) | sphere(radius=0.2).translate((1.4, 0.0, 0.0)), size="20mm"
 )
 """A sealed cavity and a well that cross borders of ranges, and a body that begins in the middle."""
-RECIPE = SliceRecipe(to_xml(THING), "thing", SliceJob(20.0, 0.25, (0.2, 0.2)), None, "cli")
+RECIPE = SliceRecipe(to_xml(THING), "thing", SliceJob(size=20.0, layer=0.25, pixel=(0.2, 0.2)), "cli")
 
 
 def test_components_are_joined_over_the_borders_of_ranges(tmp_path: Path) -> None:

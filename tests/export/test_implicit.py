@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from fracslice.cli.main import run
 
+from fracslice.common.parameters import AUTO
 from fracslice.errors import KernelError, MeshError, SceneError
 from fracslice.export.implicit import write_implicit
 from fracslice.formulas import Node, mandelbulb, menger, sphere, transform, twist, union
-from fracslice.formulas.parameters import AUTO
 from fracslice.jobs.implicit import make_implicit
 from fracslice.kernel import graph as graphs
 from fracslice.kernel.reference import reference
 from fracslice.mesh.reading import read_mesh
-from fracslice.meshjob import MeshJob
+from fracslice.records import MeshJob
 from fracslice.scene import Print, library, read, scene
 from tests.scene.trees import OTHERS, SHAPES
 
@@ -116,7 +116,7 @@ def test_lib3mf_reads_them_in_strict_mode(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["mandelbulb", "mandelbox", "quaternion-julia", "hybrid", "twisted-vase"])
 def test_shipped_scenes_are_their_field_at_100_000_points(name: str, tmp_path: Path) -> None:
     """In mm, placed as a mesh is; the field over its Lipschitz bound."""
-    job = MeshJob(size_mm=50, up=(0, 1, 0), printing=Print(base=2))
+    job = MeshJob(size=50, up=(0, 1, 0), printing=Print(base=2))
     made = make_implicit(read(library.path(name)), job, tmp_path / "model.3mf")
     function = Read(made.path)
     points = points_in(function.corners, 100_000)

@@ -78,7 +78,7 @@ def run(version: int = 1, most: float | None = None, compensation: float = 0.0) 
     stack = plan_stack(ROOT, JOB)
     if most is not None:
         stack = adapted(stack, most)
-    screen = Screen(stack, replace(MACHINE, version=version), compensation=compensation)
+    screen = Screen(stack, printer=replace(MACHINE, version=version), compensation=compensation)
     return SliceRun(stack, screen, resin=RESIN, metadata={"Title": "test"}, picture=picture)
 
 
@@ -113,7 +113,9 @@ def printed(machine: Printer, layer: float, path: Path) -> Path:
     """A file of a ball that touches no side, for a machine; checked to be that machine's."""
     job = SliceJob(size=12, layer=layer, pixel=machine.pixel)
     stack = plan_stack(sphere(), job)
-    one = SliceRun(stack, Screen(stack, machine), resin=RESIN, metadata={"Title": "test"}, picture=picture)
+    one = SliceRun(
+        stack, Screen(stack, printer=machine), resin=RESIN, metadata={"Title": "test"}, picture=picture
+    )
     form = slice_format(write_slices(one, path))
     read, level = READERS[form]
     result = read(path.read_bytes())
@@ -209,7 +211,7 @@ def test_photon_by_pyphotonfile(tmp_path: Path) -> None:
     pyphotonfile = pytest.importorskip("pyphotonfile")
     machine = PRINTERS["photon"]
     stack = plan_stack(sphere(), SliceJob(size=12, layer=3, pixel=machine.pixel))
-    job = SliceRun(stack, Screen(stack, machine), resin=RESIN, picture=picture)
+    job = SliceRun(stack, Screen(stack, printer=machine), resin=RESIN, picture=picture)
     result = pyphotonfile.Photon(str(write_slices(job, tmp_path / "part.photon")))
     assert (result.layer_height, result.exposure_time, result.exposure_time_bottom) == (3, 2.5, 30)
     pictures = [decoders.picture(decoders.rle1(layer._data), (2560, 1440)) for layer in result.layers]

@@ -83,7 +83,10 @@ def test_svg_by_librsvg(run: SliceRun, layers: np.ndarray, tmp_path: Path) -> No
 @pytest.mark.skipif(not shutil.which("prusa-slicer"), reason="needs prusa-slicer")
 def test_3mf_by_prusaslicer(tmp_path: Path) -> None:
     """It reads no slices; the mesh beside them is the object, not its box."""
-    root, job = difference(menger(level=1), sphere(radius=0.9)), SliceJob(12, 0.5, (0.3, 0.3))
+    root, job = (
+        difference(menger(level=1), sphere(radius=0.9)),
+        SliceJob(size=12, layer=0.5, pixel=(0.3, 0.3)),
+    )
     stack, mesh = plan_stack(root, job), StackModel(scene(root, size=12), job, Work()).mesh
     path = write_slices(SliceRun(stack, Screen(stack), mesh=mesh), tmp_path / "part.3mf")
     command = ["prusa-slicer", "--info", path]

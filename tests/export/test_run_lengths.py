@@ -55,7 +55,7 @@ def test_layers_are_encoded_from_their_tiles(encoding: Encoding, portrait: bool,
     machine = Printer("test", "Test", (97, 83), (24.25, 20.75), 30, mirror=mirror, portrait=portrait)
     root = difference(menger(level=1), sphere(radius=0.9))
     stack = plan_stack(root, SliceJob(size=12, layer=1, pixel=machine.pixel))
-    screen = Screen(stack, machine)
+    screen = Screen(stack, printer=machine)
 
     def both(layer: Layer) -> tuple[bytes, bytes]:
         return screen.encoded(layer, encoding), encoded(screen.picture(layer), encoding)

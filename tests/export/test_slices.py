@@ -42,7 +42,7 @@ ROOT = difference(menger(level=1), sphere(radius=0.9))
 def run(work: Work | None = None, layer: float = 0.5, root: Node = ROOT) -> SliceRun:
     job = SliceJob(size=12, layer=layer, pixel=MACHINE.pixel)
     stack = plan_stack(root, job)
-    how, work = Screen(stack, MACHINE), work or Work()
+    how, work = Screen(stack, printer=MACHINE), work or Work()
     mesh = StackModel(scene(root, size=12), job, Work()).mesh
     return SliceRun(stack, how, work, Resin(2, 20), {"Title": "test"}, mesh)
 

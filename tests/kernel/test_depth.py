@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from fracslice import MeshJob, make_mesh
+from fracslice.common.parameters import AUTO
 from fracslice.errors import EmptyError
 from fracslice.formulas import (
     Box,
@@ -24,7 +25,6 @@ from fracslice.formulas import (
     union,
 )
 from fracslice.formulas.node import FORMULAS
-from fracslice.formulas.parameters import AUTO
 from fracslice.formulas.vocabulary import sqrt
 from fracslice.kernel import depth
 from fracslice.kernel.depth import (
@@ -94,7 +94,7 @@ def depths(root: Node) -> list[int]:
 def test_an_automatic_depth_is_the_objects_own_whatever_it_is_made_for(root):
     """Meshes of 48 and 512 voxels, and layers, were of other solids: 2.32 and 2.22 cm3."""
     known = depths(with_depths(root))
-    job = SliceJob(20, 0.1, (0.05, 0.05))
+    job = SliceJob(size=20, layer=0.1, pixel=(0.05, 0.05))
     stacks = [plan_stack(root, replace(job, up=up)).root for up in ((0, 0, 1), (1, 1, 1))]
     assert all(depths(plan(root, n).root) == known for n in (9, 48, 512))
     assert all(depths(stack) == known for stack in stacks)

@@ -122,7 +122,7 @@ def test_curved_sharp_edges_are_followed() -> None:
 
 def test_what_is_left_is_reported() -> None:
     bulb = scene(mandelbulb(iterations=4), size="20mm", name="bulb")
-    report = make_mesh(bulb, MeshJob(resolution=24, chord_mm=0.02)).report
+    report = make_mesh(bulb, MeshJob(resolution=24, chord=0.02)).report
     assert report.refined is not None and report.refined.left > 0 and report.refined.off_mm > 0.02
     assert any("farther off than the chord" in note for note in report.notes)
 
@@ -156,7 +156,7 @@ def test_a_rough_surface_stays_a_solid() -> None:
 def test_the_job_takes_it_in_mm() -> None:
     ball = scene(sphere(), size="20mm", name="ball")
     plain = make_mesh(ball, MeshJob(resolution=32)).report.mesh
-    fine = make_mesh(ball, MeshJob(resolution=32, chord_mm=0.001)).report.mesh
+    fine = make_mesh(ball, MeshJob(resolution=32, chord=0.001)).report.mesh
     truth = 4000 / 3 * np.pi
     assert fine.printable
     assert abs(fine.volume_mm3 / truth - 1) < abs(plain.volume_mm3 / truth - 1) / 5

@@ -6,9 +6,9 @@ from typing import Any
 
 from hypothesis import strategies as st
 
+from fracslice.common.parameters import AUTO, REQUIRED, SMALLEST, Axis, Choice, Count, File, Number, Vector
 from fracslice.errors import SceneError
 from fracslice.formulas import Node
-from fracslice.formulas.parameters import AUTO, REQUIRED, SMALLEST, Axis, Choice, Count, File, Number, Vector
 from fracslice.scene import scene
 from fracslice.scene.layout import formulas
 from fracslice.scene.model import computing

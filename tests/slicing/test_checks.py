@@ -185,7 +185,7 @@ def test_a_cone_on_its_point_needs_supports_or_a_base(radius: float, height: flo
 
     def problems(root: Node) -> list[Problem]:
         size = max(extent(root).box.size)
-        return check_layers(plan_stack(root, SliceJob(size, 0.1, (0.1, 0.1)))).problems
+        return check_layers(plan_stack(root, SliceJob(size=size, layer=0.1, pixel=(0.1, 0.1)))).problems
 
     assert verdict(problems(cut)) == "would print with supports"
     assert [p.kind for p in problems(cut)] == ["necks"]

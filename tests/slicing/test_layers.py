@@ -369,7 +369,7 @@ def test_any_direction_can_be_up() -> None:
 )
 def test_impossible_jobs(job: dict[str, Any], message: str) -> None:
     with pytest.raises((SceneError, SliceError), match=message):
-        SliceJob(**{"size": 20.0, **job})
+        plan_stack(sphere(), SliceJob(**{"size": 20.0, **job}))
 
 
 def test_too_many_layers_or_pixels() -> None:
@@ -412,7 +412,7 @@ def test_a_large_bailout_takes_nothing_off_the_outline(bailout: float, mixed: bo
 def test_whole_layers_of_another_height_are_reported() -> None:
     """A cylinder 17.4 layers high is cut into 17, and that is 2 % of it."""
     of = cylinder(radius=0.75, height=0.5431)
-    low, fine = (plan_stack(of, SliceJob(50, layer, (0.5, 0.5))) for layer in (1.04, 0.01))
+    low, fine = (plan_stack(of, SliceJob(size=50, layer=layer, pixel=(0.5, 0.5))) for layer in (1.04, 0.01))
     assert low.notes == ("whole layers are 17.68 mm high, the object 18.1 mm; expected lower layers",)
     assert fine.notes == ()
 

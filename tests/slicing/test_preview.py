@@ -19,7 +19,7 @@ PLATE = union(box(size=(4, 2, 0.5)), transform(box(size=(1, 1, 1)), translate=(1
 
 @pytest.mark.parametrize("pixel", [(0.1, 0.1), (0.1, 0.2), (0.2, 0.1), (0.005, 0.01)])
 def test_thumbnails_have_the_proportions_of_the_object(pixel: tuple[float, float]) -> None:
-    stack = plan_stack(PLATE, SliceJob(4, 0.25, pixel))
+    stack = plan_stack(PLATE, SliceJob(size=4, layer=0.25, pixel=pixel))
     low, *_, high = Slicer(stack).map(thumbnail)
     rows, columns = np.nonzero(np.asarray(low)[..., 0] > 200)
     assert max(low.size) <= 200
@@ -31,6 +31,6 @@ def test_thumbnails_have_the_proportions_of_the_object(pixel: tuple[float, float
 @pytest.mark.parametrize("write", [contact_sheet, animation, lambda *of: worst_layers(of[0], [0], of[1])])
 def test_one_layer_is_a_preview(write: Callable[..., None]) -> None:
     file = io.BytesIO()
-    write(plan_stack(box(size=(4, 2, 0.2)), SliceJob(4, 0.5, (0.1, 0.2))), file)
+    write(plan_stack(box(size=(4, 2, 0.2)), SliceJob(size=4, layer=0.5, pixel=(0.1, 0.2))), file)
     with Image.open(file) as picture:
         picture.load()

@@ -47,14 +47,14 @@ def test_the_back_is_up_and_the_right_is_right_unless_mirrored() -> None:
     stack = stack_of(ELL)
     assert heavy(picture(Screen(stack))) == (True, True)
     assert heavy(picture(Screen(stack, mirror=True))) == (True, False)
-    assert heavy(picture(Screen(stack, SMALL))) == (True, False)
-    assert heavy(picture(Screen(stack, SMALL, mirror=False))) == (True, True)
+    assert heavy(picture(Screen(stack, printer=SMALL))) == (True, False)
+    assert heavy(picture(Screen(stack, printer=SMALL, mirror=False))) == (True, True)
 
 
 def test_portrait_screens_have_the_bed_s_x_upwards() -> None:
     """As PrusaSlicer 2.5 writes it for the SL1; compared by hand, pixel by pixel."""
     tall = Printer("tall", "Tall", (120, 100), (12.0, 10.0), 30, portrait=True)
-    image = picture(Screen(stack_of(ELL), tall))
+    image = picture(Screen(stack_of(ELL), printer=tall))
     assert image.shape == (120, 100)
     assert heavy(image) == (False, False)
 
@@ -65,7 +65,7 @@ def test_portrait_screens_have_the_bed_s_x_upwards() -> None:
 def test_objects_lie_in_the_middle_of_every_screen(name: str) -> None:
     machine = printer(name)
     stack = plan_stack(sphere(), SliceJob(size=10, layer=2, pixel=machine.pixel))
-    image = picture(Screen(stack, machine))
+    image = picture(Screen(stack, printer=machine))
     pixels = machine.pixels[::-1] if not machine.portrait else machine.pixels
     assert image.shape == pixels
     assert image.dtype == np.uint8
@@ -79,16 +79,16 @@ def test_objects_lie_in_the_middle_of_every_screen(name: str) -> None:
 
 
 def test_an_object_as_large_as_the_bed_fits() -> None:
-    image = picture(Screen(stack_of(box(size=(12, 10, 1)), 12.0), SMALL))
+    image = picture(Screen(stack_of(box(size=(12, 10, 1)), 12.0), printer=SMALL))
     assert image.shape == (100, 120)
     assert (image[1:-1, 1:-1] == 255).all()
 
 
 def test_too_large_for_the_printer() -> None:
     with pytest.raises(SliceError, match=r"12\.002 mm along x, the Small has 12 mm"):
-        Screen(stack_of(box(size=(12.002, 1, 1)), 12.002), SMALL)
+        Screen(stack_of(box(size=(12.002, 1, 1)), 12.002), printer=SMALL)
     with pytest.raises(SliceError, match="13 mm along x, the Small has 12 mm"):
-        Screen(stack_of(box(size=(13, 1, 1)), 13.0), SMALL)
+        Screen(stack_of(box(size=(13, 1, 1)), 13.0), printer=SMALL)
 
 
 @pytest.mark.parametrize("machine", [None, SMALL, replace(SMALL, portrait=True)])
@@ -109,7 +109,7 @@ def test_deflated_pictures_are_the_pictures(
 ) -> None:
     """As the library zlib reads them, whatever way they are turned; larger layers are cropped."""
     for size in (6.1, 9.9 - 2 * options.get("compensation", 0)):
-        screen = Screen(stack_of(root, size), machine, **options)
+        screen = Screen(stack_of(root, size), printer=machine, **options)
         rows, columns = screen.shape
 
         def made(layer: Layer, screen: Screen = screen) -> tuple[bytes, np.ndarray]:
@@ -160,17 +160,17 @@ def test_compensation_moves_outlines(by: float) -> None:
 @pytest.mark.parametrize("machine", [None, SMALL, replace(SMALL, portrait=True)])
 def test_outlines_move_beyond_the_pixels_of_the_object(machine: Printer | None) -> None:
     stack = stack_of(box(size=(6, 4, 3)))
-    image = picture(Screen(stack, machine, compensation=0.9, blur=2))
+    image = picture(Screen(stack, printer=machine, compensation=0.9, blur=2))
     sides = [0.1 * (np.ptp(at) + 1) for at in np.nonzero(image > 127)]
     assert sorted(sides) == pytest.approx([5.8, 7.8])
-    assert picture(Screen(stack, machine, blur=16)).sum() / 25500 == pytest.approx(24, rel=0.01)
+    assert picture(Screen(stack, printer=machine, blur=16)).sum() / 25500 == pytest.approx(24, rel=0.01)
 
 
 def test_outlines_that_move_beyond_the_bed_are_refused() -> None:
     stack = stack_of(box(size=(11.9, 9, 1)), 11.9)
-    Screen(stack, SMALL, compensation=0.05)
+    Screen(stack, printer=SMALL, compensation=0.05)
     with pytest.raises(SliceError, match=r"is 12\.1 mm along x"):
-        Screen(stack, SMALL, compensation=0.1)
+        Screen(stack, printer=SMALL, compensation=0.1)
 
 
 def test_a_compensation_that_leaves_nothing_is_refused() -> None:
@@ -213,7 +213,7 @@ def test_blur_is_the_mean_over_a_square() -> None:
     assert (blur(dot, 1) == expected).all()
     machine = Printer("s", "S", (200, 200), (20.0, 20.0), 30)
     stack = stack_of(box(size=(6, 6, 6)))
-    sharp, soft = (picture(Screen(stack, machine, blur=b)).astype(int) for b in (0, 3))
+    sharp, soft = (picture(Screen(stack, printer=machine, blur=b)).astype(int) for b in (0, 3))
     assert soft.sum() == pytest.approx(sharp.sum(), rel=0.01)
     assert (soft > 0).any(0).sum() == (sharp > 0).any(0).sum() + 6
 

@@ -15,7 +15,7 @@ from fracslice.slicing.printers import printer
 from fracslice.slicing.raster import Screen
 for root in (mandelbulb(), difference(box(), sphere(radius=0.6))):
     stack = plan_stack(root, SliceJob(size=20, layer=1.5, pixel=(0.1, 0.1)))
-    screen = Screen(stack, printer("sl1"), gamma=1.5)
+    screen = Screen(stack, printer=printer("sl1"), gamma=1.5)
     def made(layer):
         picture = screen.encoded(layer, Encoding.PNG)
         return zlib.crc32(layer.coverage.tobytes()), zlib.crc32(picture), layer.evaluations

@@ -53,7 +53,7 @@ def examined(root: Node, layer: float | None = None, **printing: float) -> Print
     """One scene unit is 1 mm."""
     size = max(extent(root).box.size)
     height = layer or size / 100
-    job = SliceJob(size, height, (height, height), printing=Print(**printing))  # type: ignore[arg-type]
+    job = SliceJob(size=size, layer=height, pixel=(height, height), printing=Print(**printing))  # type: ignore[arg-type]
     return check_layers(plan_stack(root, job))
 
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from fracslice.common.parameters import AUTO, Count, Number, Vector
 from fracslice.errors import FracsliceError
 from fracslice.formulas import Node
-from fracslice.formulas.parameters import AUTO, Count, Number, Vector
 
 DEEPEST = 12
 """Depths beyond it change nothing that a grid can show."""

@@ -7,9 +7,7 @@ from itertools import product
 
 import numpy as np
 
-from fracslice.errors import SceneError
-from fracslice.formulas import Node
-from fracslice.formulas.parameters import (
+from fracslice.common.parameters import (
     LARGEST,
     SMALLEST,
     Axis,
@@ -20,6 +18,8 @@ from fracslice.formulas.parameters import (
     Parameter,
     Vector,
 )
+from fracslice.errors import SceneError
+from fracslice.formulas import Node
 
 
 def ends(kind: Parameter) -> list[object]:

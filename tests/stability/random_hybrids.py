@@ -6,10 +6,10 @@ from contextlib import suppress
 
 import numpy as np
 
+from fracslice.common.parameters import REQUIRED, Choice, Count, Number, Vector
 from fracslice.errors import SceneError, VolumeError
 from fracslice.formulas import Formula, Node, orbit, transform
 from fracslice.formulas.orbits import ITERATIONS
-from fracslice.formulas.parameters import REQUIRED, Choice, Count, Number, Vector
 from fracslice.kernel import compile_scene, reference
 from fracslice.scene.layout import formulas
 from fracslice.volume import Plan, plan, sample_scene

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from fracslice.common.parameters import AUTO, REQUIRED, Axis, Choice, Count, Number, Vector
 from fracslice.errors import FracsliceError
 from fracslice.formulas import Formula, Node, bounds, orbit
-from fracslice.formulas.parameters import AUTO, REQUIRED, Axis, Choice, Count, Number, Vector
 from fracslice.kernel import reference
 from fracslice.scene.layout import formulas
 

@@ -62,7 +62,7 @@ def volumes(root: Node, resolution: float) -> Volumes:
     assert amount is not None
     if abs(amount.object / unit - volume) > 5 * np.hypot(error, amount.error / unit):
         faults.append(f"by the report the volume is {amount.object / unit:.4g}, not {volume:.4g}")
-    stack = plan_stack(root, SliceJob(SIZE, report.voxel_mm, (report.voxel_mm,) * 2), work)
+    stack = plan_stack(root, SliceJob(size=SIZE, layer=report.voxel_mm, pixel=(report.voxel_mm,) * 2), work)
     areas = np.array(list(Slicer(stack, work).map(lambda layer: layer.area)))
     of_layers = float(areas @ stack.heights) / stack.scale**3
     of_stack, note, lost, _ = layers_amount(Slicer(stack, work), work)

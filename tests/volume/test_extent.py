@@ -131,7 +131,7 @@ def test_walls_are_meshed_and_sliced_alike(seed: int) -> None:
     root = thing(seed)
     own, voxel = extent(root).box, 0.4
     size = max(own.size)
-    mesh = make_mesh(scene(root, size=f"{size}mm"), MeshJob(voxel_mm=voxel)).mesh
+    mesh = make_mesh(scene(root, size=f"{size}mm"), MeshJob(voxel=voxel)).mesh
     assert np.abs(mesh.size - own.size).max() < 2 * voxel
     stack = plan_stack(root, SliceJob(size=size, layer=voxel, pixel=(voxel, voxel)))
     assert stack.scale == pytest.approx(1, rel=1e-5) and stack.size == pytest.approx(own.size, rel=1e-4)

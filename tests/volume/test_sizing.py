@@ -21,7 +21,7 @@ from fracslice.formulas import (
     union,
 )
 from fracslice.jobs.mesh import make_mesh as mesh_of
-from fracslice.meshjob import MeshJob
+from fracslice.records import MeshJob
 from fracslice.scene import Print, Scene, scene
 from fracslice.scene.reader import reads
 from fracslice.scene.writer import to_xml
@@ -41,7 +41,7 @@ def ring() -> Node:
 
 def bore(made: Scene, voxel: float = 0.4, **job: object) -> tuple[float, float]:
     """Diameters of the bore along x and y in a mesh, mm."""
-    result = mesh_of(made, MeshJob(voxel_mm=voxel, **job))  # type: ignore[arg-type]
+    result = mesh_of(made, MeshJob(voxel=voxel, **job))  # type: ignore[arg-type]
     points = result.place.units(result.mesh.vertices)
     inner = (np.hypot(points[:, 0], points[:, 1]) < BORE / 2 + 0.1) & (np.abs(points[:, 2]) < 1.9)
     x, y, _ = np.ptp(result.mesh.vertices[inner], axis=0).tolist()
@@ -103,7 +103,7 @@ def test_a_unit_of_the_scene_is_as_long_in_every_mesh_and_layer(root: Node) -> N
     part, expected = scene(root, size=30), 30 / max(extent(root).box.size)
     for resolution, dust in ((32, None), (64, 0.0), (64, None)):
         _kept.clear()
-        made = mesh_of(part, MeshJob(resolution=resolution, dust_mm3=dust))
+        made = mesh_of(part, MeshJob(resolution=resolution, dust=dust))
         assert made.place.scale == pytest.approx(expected, rel=1e-6)
         size, report = np.array(extent(root).box.size) * expected, made.report
         assert np.array(report.lost_mm) == pytest.approx(np.maximum(size - made.mesh.size, 0), abs=1e-4)
@@ -117,7 +117,7 @@ def test_a_unit_of_the_scene_is_as_long_in_every_mesh_and_layer(root: Node) -> N
 def test_a_speck_that_is_removed_changes_no_size() -> None:
     """The ball stays at its place and size, and the note says that the speck reached farther."""
     two = scene(union(sphere(), transform(sphere(radius=0.02), translate=(1.98, 0, 0))), size=30)
-    with_speck, without = (mesh_of(two, MeshJob(resolution=150, dust_mm3=dust)) for dust in (0.0, 1.0))
+    with_speck, without = (mesh_of(two, MeshJob(resolution=150, dust=dust)) for dust in (0.0, 1.0))
     assert without.place.scale == pytest.approx(10, rel=1e-6) == with_speck.place.scale
     assert without.mesh.size == pytest.approx([20] * 3, abs=5e-3)
     assert without.mesh.vertices[:, 0].min() == pytest.approx(with_speck.mesh.vertices[:, 0].min())

@@ -28,7 +28,7 @@ from fracslice.formulas import mandelbulb
 from fracslice.jobs import shared_mesh
 from fracslice.jobs.mesh import make_mesh
 from fracslice.jobs.slices import SliceRecipe
-from fracslice.meshjob import MeshJob
+from fracslice.records import MeshJob
 from fracslice.rendering import Renderer
 from fracslice.scene import scene
 from fracslice.scene.animation import Animation
@@ -132,7 +132,9 @@ def jobs(
 ) -> dict[str, Job]:
     """A job of each kind."""
     size = 80 / pixels
-    recipe = SliceRecipe(to_xml(SCENE), "bulb", SliceJob(80.0, 80 / layers, (size, size)), None, "cli")
+    recipe = SliceRecipe(
+        to_xml(SCENE), "bulb", SliceJob(size=80.0, layer=80 / layers, pixel=(size, size)), "cli"
+    )
     shape = width, width * 9 // 16
 
     def rendered(work: Work, _: Path) -> None:

@@ -59,7 +59,7 @@ def rows(run: Run, layers: int = 0) -> Iterator[Row]:
     whole = plan_stack(mandelbulb(), SliceJob(size=80, layer=0.05, pixel=machine.pixel))
     count = min(layers or len(whole.z), len(whole.z))
     stack = part(whole, range((len(whole.z) - count) // 2, (len(whole.z) + count) // 2))
-    job, work = SliceRun(stack, Screen(stack, machine)), Work(run.threads[0])
+    job, work = SliceRun(stack, Screen(stack, printer=machine)), Work(run.threads[0])
     acts = {
         "job": lambda: written(job),
         "sampling": lambda: list(Slicer(stack).map(lambda layer: layer.evaluations)),

@@ -46,7 +46,12 @@ def rows(run: Run, layers: int = 2000) -> Iterator[Row]:
     stack = part(whole, range((len(whole.z) - count) // 2, (len(whole.z) + count) // 2))
     picture = StackModel(scene(mandelbulb(), size=100), job, Work()).picture()
     one = SliceRun(
-        stack, Screen(stack, MACHINE), Work(run.threads[0]), Resin(2.5, 30), {}, picture=lambda: picture
+        stack,
+        Screen(stack, printer=MACHINE),
+        Work(run.threads[0]),
+        Resin(2.5, 30),
+        {},
+        picture=lambda: picture,
     )
     measured = run.interleaved({form: partial(written, one, name) for form, name in FORMS.items()})
     for form in FORMS:

@@ -69,7 +69,7 @@ def of_mesh(root: Node, resolution: float, work: Work) -> Made:
 
 def of_layers(root: Node, resolution: float, work: Work) -> Made:
     step = SIZE / resolution
-    stack = plan_stack(root, SliceJob(SIZE, step, (step, step)), work)
+    stack = plan_stack(root, SliceJob(size=SIZE, layer=step, pixel=(step, step)), work)
     found: Completeness = layers_amount(Slicer(stack, work), work)
     said = bool(found.notes or found.problems or stack.notes)
     return stack.scale, found.amount.made / found.amount.object, said

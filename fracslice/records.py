@@ -1,0 +1,390 @@
+"""Records of what a job makes: the options of meshes and layers, and the edits that make an object printable.
+
+An option is a field here and nowhere else: commands, Python signatures, the schema and the documentation are
+made from it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, ClassVar, Literal, TypeAlias, get_args
+
+from .common.messages import significant
+from .common.parameters import (
+    AnyLength,
+    AnyScale,
+    Choice,
+    Count,
+    Flag,
+    Given,
+    Heights,
+    Length,
+    Listed,
+    Number,
+    Pair,
+    Percent,
+    Record,
+    Shift,
+    Triple,
+    Vector,
+    attribute,
+    described,
+    record,
+    validate,
+)
+from .errors import SceneError, SliceError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from .scene import Scene
+    from .slicing.printers import Printer
+
+RESOLUTION = 256.0
+"""Default number of voxels along the longest side, and the detail that automatic depths resolve."""
+
+Colour: TypeAlias = Literal["material", "point", "axes", "planes", "sphere", "steps", "direction"]
+"""What the colours of vertices show: the materials of the scene, or a property of the orbit."""
+
+COARSEST, FINEST = 8, 16384
+"""Limits of the voxels along the longest side."""
+
+TOLERANCE = 0.25
+"""Maximum tolerance of simplification, relative to the longest side."""
+
+DUST = 1e-5
+"""Default maximum volume of dust, relative to the whole object: crumbs at the rim of a fractal of finite
+depth. No strut is built to dust either.
+"""
+
+JOINING = 3
+"""Diameter of struts and minimum thickness of walls that join bodies at any position in the grid, voxels."""
+
+PIECES = 0.05
+"""Minimum fraction of the material in bodies thinner than a voxel for a note on thin walls."""
+
+PIXEL = 0.05
+"""Default width and height of a pixel, mm."""
+
+SECTIONS = 1, 2, 4, 8
+"""Numbers of sections of a layer."""
+
+UP: Triple = (0.0, 0.0, 1.0)
+SAME: Triple = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Part(Record):
+    """Base of the records of a scene file.
+
+    Attributes
+    ----------
+    element : str
+        Element name.
+    many : bool
+        True if the element may be repeated.
+    place : str or None
+        Position in the file, "file:line".
+
+    Raises
+    ------
+    SceneError
+        If a value is invalid.
+    """
+
+    element: ClassVar[str]
+    many: ClassVar[bool] = False
+    place: str | None = field(default=None, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        validate(self, self.fail)
+        self.validate()
+
+    def validate(self) -> None:
+        """Raise `SceneError` for values that are invalid in combination."""
+
+    def fail(self, message: str) -> SceneError:
+        """Return the error to raise about this element.
+
+        Parameters
+        ----------
+        message : str
+            The message.
+
+        Returns
+        -------
+        SceneError
+            The error.
+        """
+        return SceneError(f"{self.place + ': ' if self.place else ''}<{self.element}> {message}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Print(Part):
+    """Changes that make the object printable, applied in this order.
+
+    Lengths are those of the finished object, in mm. The size of the solid is measured on the connected
+    components that are kept, before anything is cut off or added.
+    """
+
+    element = "print"
+    cavities: Literal["keep", "fill"] = attribute(
+        Choice, "keep", "sealed cavities stay or are filled", ("keep", "fill")
+    )
+    keep: int | Literal["all", "largest"] = attribute(
+        Count,
+        "all",
+        "all bodies stay, or the largest, or this number of the largest",
+        1,
+        1_000_000,
+        ("all", "largest"),
+    )
+    bridge: Given[AnyLength, float] = attribute(
+        Length, 0.0, "loose bodies are joined where they are nearest, by struts this thick", zero=True
+    )
+    gap: Given[AnyLength, float] = attribute(Length, 0.0, "gaps up to this width are closed", zero=True)
+    thickness: Given[AnyLength, float] = attribute(
+        Length, 0.0, "thinner walls are thickened to this", zero=True
+    )
+    hollow: Given[AnyLength, float] = attribute(
+        Length, 0.0, "the object is hollowed out, leaving walls this thick", zero=True
+    )
+    drain: Given[AnyLength, float] = attribute(
+        Length, 3.0, "diameter of the two holes that let the resin out of the hollow", zero=True
+    )
+    base: Given[AnyLength, float] = attribute(
+        Length, 0.0, "height that is cut off at the bottom, to stand flat", zero=True
+    )
+    raft: Given[AnyLength, float] = attribute(
+        Length, 0.0, "the object stands on a plate of this height", zero=True
+    )
+
+    def validate(self) -> None:
+        """Raise `SceneError` for `keep` combined with `bridge`."""
+        if self.bodies == 1 and self.bridge:
+            raise self.fail("keep and bridge: expected one of them; where one body stays, none is loose")
+
+    @property
+    def bodies(self) -> int | None:
+        """Number of bodies that stay at most, the largest ones; None for all."""
+        if isinstance(self.keep, int):
+            return self.keep
+        return 1 if self.keep == "largest" else None
+
+    @property
+    def sorts(self) -> bool:
+        """True if connected components or cavities may be removed."""
+        return self.bodies is not None or self.cavities == "fill"
+
+    @property
+    def whole(self) -> bool:
+        """True if connected components and cavities are only kept or removed as a whole."""
+        return not any((self.bridge, self.gap, self.thickness, self.hollow, self.base, self.raft))
+
+
+@record
+class Placed(Record):
+    """Size and orientation of the object in a print."""
+
+    size: Given[AnyLength | None, float | None] = attribute(
+        Length,
+        None,
+        "the longest side, such as 80mm, 8cm or 3.1in; by default the scene's, or a millimetre for each "
+        "unit of a shape",
+    )
+    up: Given[Sequence[float], Triple] = attribute(
+        Vector, UP, "the object's direction that is up in the print", nonzero=True
+    )
+    scale: Given[AnyScale, Triple] = attribute(
+        Percent, SAME, "compensation of shrinkage: 102%, or 102%,102%,101% along x, y and z"
+    )
+
+
+@record
+class MeshJob(Placed):
+    """Parameters of a mesh.
+
+    Lengths are numbers in mm, or text with a unit, for example "0.5mm"; the fields hold mm.
+
+    Raises
+    ------
+    SceneError
+        For invalid values.
+    """
+
+    voxel: Given[AnyLength | None, float | None] = attribute(Length, None, "size of a voxel, such as 0.25mm")
+    resolution: float | None = attribute(
+        Number,
+        None,
+        "voxels along the longest side, instead of a voxel; by default 256",
+        least=COARSEST,
+        most=FINEST,
+    )
+    chord: Given[AnyLength | None, float | None] = attribute(
+        Length, None, "triangles farther than this from a smooth surface are split, such as 0.001mm"
+    )
+    simplify: Given[AnyLength | None, float | None] = attribute(
+        Length, None, "triangles are removed within this tolerance, such as 0.02mm"
+    )
+    dust: float | None = attribute(
+        Number,
+        None,
+        "bodies of less volume are dropped; by default below 1e-5 of the whole, and at least half a voxel",
+        least=0,
+        unit="mm3",
+    )
+    colour: Colour | None = attribute(
+        Choice,
+        None,
+        "colours and scalars of the vertices of a .ply, .glb or .3mf file: those of the materials, or a "
+        "property of the orbit",
+        get_args(Colour),
+    )
+    proved: bool = attribute(
+        Flag, False, "space is skipped by proofs only, not by the measured bounds of fractals"
+    )
+    printing: Print | None = described(
+        None, "changes that make the object printable; by default those of the scene"
+    )
+
+    def __post_init__(self) -> None:
+        if self.voxel is not None and self.resolution is not None:
+            raise SceneError("voxel and resolution: expected one of them")
+        validate(self, SceneError)
+
+    def edits(self, scene: Scene) -> Print:
+        """Changes for printing.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene to mesh.
+
+        Returns
+        -------
+        Print
+            Those of the job, or else of the scene.
+        """
+        return scene.printing if self.printing is None else self.printing
+
+    def dust_limit(self, volume: float, crumb: float = 0.0) -> float:
+        """Volume below which a body is removed.
+
+        Parameters
+        ----------
+        volume : float
+            Volume of the object, mm3.
+        crumb : float, optional
+            Volume of the largest crumb, which is dust by default, mm3.
+
+        Returns
+        -------
+        float
+            Limit, mm3.
+
+        Raises
+        ------
+        SceneError
+            If the limit exceeds the volume of the object.
+        """
+        dust = max(DUST * volume, crumb) if self.dust is None else self.dust
+        if dust > volume:
+            most = significant(volume)
+            raise SceneError(
+                f"dust {significant(dust)} mm3: expected at most the object's volume, {most} mm3"
+            )
+        return dust
+
+    def voxels(self, size: float) -> float:
+        """Voxels along the longest side.
+
+        Parameters
+        ----------
+        size : float
+            Longest side, mm.
+
+        Returns
+        -------
+        float
+            Voxels.
+
+        Raises
+        ------
+        SceneError
+            If the voxel is too coarse or too fine for the size, or the tolerance of simplification too large.
+        """
+        if self.simplify is not None and self.simplify > (most := TOLERANCE * size):
+            raise SceneError(
+                f"simplify {self.simplify:g}mm: expected at most {most:.4g}mm for an object of {size:g}mm"
+            )
+        if self.voxel is None:
+            return RESOLUTION if self.resolution is None else self.resolution
+        if not COARSEST <= size / self.voxel <= FINEST:
+            low, high = size / FINEST, size / COARSEST
+            raise SceneError(
+                f"voxel {self.voxel:g}mm: expected {low:.4g}mm to {high:.4g}mm for an object of {size:g}mm"
+            )
+        return size / self.voxel
+
+
+@record
+class RasterOptions(Record):
+    """What a printer's screen shows of a layer."""
+
+    printer: Printer | None = described(
+        None, "the printer whose screen is shown; None shows the object alone"
+    )
+    compensation: Given[AnyLength, float] = attribute(
+        Shift, 0.0, "all outlines move outwards by this, or inwards if it is negative; at most 1mm"
+    )
+    gamma: float = attribute(Number, 1.0, "gamma of grey levels", above=0, most=10)
+    mirror: bool | None = described(None, "mirrors along x; None as the printer needs it")
+    levels: int = attribute(
+        Count, 255, "anti-aliasing: grey levels above black, 1 for black and white", least=1, most=255
+    )
+    blur: int = attribute(Count, 0, "radius of the blur of outlines, in pixels", least=0, most=16)
+
+    def __post_init__(self) -> None:
+        validate(self, SliceError)
+        if not abs(self.compensation) <= 1:
+            raise SliceError(f"compensation {self.compensation:g} mm: expected at most 1 mm")
+
+
+@record
+class SliceJob(Placed, RasterOptions):
+    """Parameters of the layers of a print.
+
+    Lengths are numbers of mm, or text such as "0.05mm"; the attributes hold mm.
+
+    Raises
+    ------
+    SceneError, SliceError
+        For an invalid value.
+    """
+
+    layer: Given[AnyLength | Sequence[AnyLength], tuple[float, float | None]] = attribute(
+        Heights,
+        (0.05, None),
+        "height of a layer; or a range, 0.05mm..0.2mm: thick where the surface is steep",
+    )
+    pixel: Given[AnyLength | Sequence[AnyLength] | None, tuple[float, float] | None] = attribute(
+        Pair, None, "size of a pixel, or its width and height; by default the printer's, or 0.05mm"
+    )
+    sections: int = attribute(
+        Listed,
+        1,
+        "sections per layer, for grey from z: the share of the layer's height that is inside",
+        SECTIONS,
+    )
+    printing: Print = described(Print(), "changes that make the object printable")
+
+    def __post_init__(self) -> None:
+        if self.pixel is not None and self.printer is not None:
+            raise SliceError("pixel and printer: expected one of them")
+        validate(self, SceneError)
+        super().__post_init__()
+
+    @property
+    def pixels(self) -> tuple[float, float]:
+        """Width and height of a pixel, mm."""
+        return self.pixel or (self.printer.pixel if self.printer else (PIXEL, PIXEL))
