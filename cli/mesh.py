@@ -30,7 +30,7 @@ from .summary import DENSITIES, of_mesh, summary
 from .sweeps import MOST, TABLE, families, going_on, is_table, with_suffix
 
 if TYPE_CHECKING:
-    from fracslice.jobs.report import MeshResult, Report
+    from fracslice.jobs.report import Report, Result
     from fracslice.scene import Scene
     from fracslice.store import Store
     from fracslice.work import Work
@@ -183,7 +183,7 @@ def store_in(folder: str | None) -> Store | None:
     return Store(Path(folder))
 
 
-def make_and_write(scene: Scene, given: MeshFileOptions, work: Work) -> MeshResult:
+def make_and_write(scene: Scene, given: MeshFileOptions, work: Work) -> Result:
     """Make the mesh and write it, or its samples, and the picture."""
     from fracslice.export import write
     from fracslice.jobs.mesh import make_mesh
@@ -221,7 +221,7 @@ def check_outputs(given: MeshFileOptions) -> None:
         need_pyvista()
 
 
-def write_grid(result: MeshResult, path: str, about: dict[str, str]) -> None:
+def write_grid(result: Result, path: str, about: dict[str, str]) -> None:
     """Write the samples, in mm, as an OpenVDB file."""
     import shutil
     import tempfile

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from fracslice.export.slice_run import SliceRun
-    from fracslice.jobs.report import MeshResult, Report
+    from fracslice.jobs.report import Report, Result
     from fracslice.mesh.checks import MeshReport
     from fracslice.slicing.layer_checks import PrintReport
     from fracslice.volume import Drain
@@ -106,7 +106,7 @@ def duration(seconds: float) -> str:
     return f"{minutes // 60} h {minutes % 60} min" if minutes >= 60 else f"{minutes} min"
 
 
-def of_mesh(result: MeshResult, material: str, price: float | None) -> Closing:
+def of_mesh(result: Result, material: str, price: float | None) -> Closing:
     """Closing figures of a mesh."""
     report = result.report
     mesh, grams = report.mesh, report.mesh.volume_mm3 / 1000 * DENSITIES[material]

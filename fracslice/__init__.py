@@ -76,7 +76,7 @@ _WHERE = {
     "Picture": "api.pictures",
     "Print": "scene",
     "Report": "jobs.report",
-    "Result": "api.meshing",
+    "Result": "jobs.report",
     "Scene": "scene",
     "Slices": "api.slices",
     "Work": "work",

@@ -1,5 +1,4 @@
 # Made from the registry of formulas by `python docs/generate.py`; do not edit.
-from .api.meshing import Result as Result
 from .api.meshing import make_mesh as make_mesh
 from .api.pictures import Picture as Picture
 from .api.pictures import render as render
@@ -73,6 +72,7 @@ from .formulas import twist as twist
 from .formulas import union as union
 from .formulas import voronoi as voronoi
 from .jobs.report import Report as Report
+from .jobs.report import Result as Result
 from .mesh import Mesh as Mesh
 from .records import MeshJob as MeshJob
 from .scene import Print as Print

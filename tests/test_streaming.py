@@ -166,7 +166,7 @@ def test_defects_are_counted_at_seams_too(tmp_path: Path, monkeypatch: pytest.Mo
     assert not reported.watertight and reported.genus is None
 
 
-@pytest.mark.parametrize(("name", "job"), [("chord", {"chord_mm": 0.1}), ("simplify", {"simplify_mm": 0.1})])
+@pytest.mark.parametrize(("name", "job"), [("chord", {"chord": 0.1}), ("simplify", {"simplify": 0.1})])
 def test_what_needs_the_whole_is_refused(name: str, job: dict, pieces: None, tmp_path: Path) -> None:
     with pytest.raises(SceneError, match=rf"{name} 0\.1mm needs the whole mesh: a voxel of .* .* fits$"):
         make_mesh(SCENES["corners"], MeshJob(resolution=48, **job), path=tmp_path / "x.stl")

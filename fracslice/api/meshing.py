@@ -2,108 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import Unpack
 
-from ..common.messages import format_count
 from ..jobs.mesh import make_mesh as make_mesh_job
-from ..jobs.report import MeshResult
-from ..mesh import Mesh
+from ..jobs.report import Result
 from ..records import MeshJob
 from ..scene import Print
 from ..work import Work
 from .options import MeshKeywords, Source, as_scene, job_of, keywords, work_of
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from ..formulas.field import Field
-    from ..jobs.report import Placement, Report
-    from ..volume import Bricks
-
-
-@dataclass(frozen=True, eq=False, repr=False, init=False)
-class Result(Mesh):
-    """A mesh in mm, standing on z = 0, with its report.
-
-    A mesh larger than memory is only in the file that was written; its vertices raise `TooLargeError`.
-
-    Attributes
-    ----------
-    made : MeshResult
-        Result of the mesh job.
-    """
-
-    made: MeshResult  # type: ignore[misc]
-
-    def __init__(self, made: MeshResult) -> None:
-        object.__setattr__(self, "made", made)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return Result, (self.made,)
-
-    def __repr__(self) -> str:
-        if self.made.whole is not None:
-            return super().__repr__()
-        made = self.report.mesh
-        counts = (
-            f"{format_count(made.triangles, 'triangle')}, {format_count(made.vertices, 'vertex', 'vertices')}"
-        )
-        return f"<Result of {counts}, only in its file>"
-
-    def _repr_png_(self) -> bytes | None:
-        return None if self.made.whole is None else super()._repr_png_()
-
-    @property
-    def mesh(self) -> Mesh:
-        """The mesh without its report."""
-        return self.made.mesh
-
-    @property  # type: ignore[misc]
-    def vertices(self) -> NDArray[np.float64]:
-        """Vertices, float64 [n, 3], mm."""
-        return self.mesh.vertices
-
-    @property  # type: ignore[misc]
-    def colours(self) -> NDArray[np.uint8] | None:
-        """Colours of the vertices, sRGB, uint8 [n, 3]; None without `colour`."""
-        return self.mesh.colours
-
-    @property  # type: ignore[misc]
-    def scalars(self) -> Mapping[str, NDArray[np.float32]]:
-        """Named numbers of the vertices, float32 [n]."""
-        return self.mesh.scalars
-
-    @property  # type: ignore[misc]
-    def triangles(self) -> NDArray[np.int32]:
-        """Triangles, int32 [m, 3], counter-clockwise seen from outside."""
-        return self.mesh.triangles
-
-    @property
-    def report(self) -> Report:
-        """Settings, accuracy, problems, run time and memory of the mesh job."""
-        return self.made.report
-
-    @property
-    def root(self) -> Field:
-        """The field that was meshed."""
-        return self.made.root
-
-    @property
-    def place(self) -> Placement:
-        """Transform from scene coordinates to mesh coordinates."""
-        return self.made.place
-
-    @property
-    def bricks(self) -> Bricks:
-        """Samples of the field near the surface, in scene units, read-only; computed on first access."""
-        bricks = self.made.bricks
-        for array in (bricks.ijk, bricks.values, bricks.index):
-            array.flags.writeable = False
-        return bricks
 
 
 @keywords(MeshJob, Print)
@@ -165,4 +73,4 @@ def make_mesh(
     scene = as_scene(shape)
     given = job or MeshJob()
     edited = replace(scene, printing=given.edits(scene))
-    return Result(make_mesh_job(scene, job_of(given, edited, options), work_of(options, work), path))
+    return make_mesh_job(scene, job_of(given, edited, options), work_of(options, work), path)

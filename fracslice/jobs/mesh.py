@@ -23,7 +23,7 @@ from . import surfaces
 from .finishing import Finish
 from .mesh_writing import STL, Writing
 from .planning import Sized, apply_edits, in_mm, plan_mesh
-from .report import Clock, MeshResult, Report, SurfaceError, SurfaceToMesh
+from .report import Clock, Report, Result, SurfaceError, SurfaceToMesh
 
 if TYPE_CHECKING:
     from ..volume import Plan, SignBricks
@@ -37,7 +37,7 @@ COLOURED = (".ply", ".glb", ".3mf")
 
 def make_mesh(
     scene: Scene, what: MeshJob | None = None, work: Work | None = None, path: str | Path | None = None
-) -> MeshResult:
+) -> Result:
     """Sample, mesh, clean, scale and check a scene.
 
     Parameters
@@ -54,7 +54,7 @@ def make_mesh(
 
     Returns
     -------
-    MeshResult
+    Result
         The mesh and its report. A mesh that is not printable is returned, too; its report lists the problems.
 
     Raises
@@ -72,7 +72,15 @@ def make_mesh(
             if finer is None:
                 break
             result, finer = finer.made()
-    return result if result is first else result.instead_of(first)
+    return result if result is first else noted(result, first)
+
+
+def noted(result: Result, coarse: Result) -> Result:
+    """A result with a note that it was made in place of a coarser one, and why."""
+    report, asked = result.report, coarse.report
+    text = f"voxel {report.voxel_mm:.3g} mm instead of {asked.voxel_mm:.3g} mm: {', '.join(asked.lost)}"
+    report = replace(report, notes=(text, *report.notes))
+    return Result(report, result.place, result.planned, result.whole, result.work)
 
 
 LATER = "cleaning", "checks", "spatial", "tips", "topology", "touching"
@@ -108,7 +116,7 @@ class _Job:
 
         return sizing(self.scene, self.what.size, self.what.scale, self.clock.work)
 
-    def made(self) -> tuple[MeshResult, _Job | None]:
+    def made(self) -> tuple[Result, _Job | None]:
         """Result, and the job of finer samples that has the object if this one lost it; None if there is no
         need, or it would be too large.
         """
@@ -210,7 +218,7 @@ class _Job:
         folder = aside() if aside and most < len(signs) else None
         return sized, surfaces.surface_of(sized.planned, signs, most, folder, self.clock)
 
-    def result(self, sized: Sized, surface: Surface) -> tuple[MeshResult, int]:
+    def result(self, sized: Sized, surface: Surface) -> tuple[Result, int]:
         """Finished mesh and report, and the refinement of the samples that does not lose the object."""
         from ..kernel.depth import shallower
         from ..mesh.touching import touching_note
@@ -271,4 +279,4 @@ class _Job:
             ),  # sums over pieces differ in the last digit
             lost=complete.problems,
         )
-        return MeshResult(report, finish.place, planned, made.whole, clock.work), complete.cure
+        return Result(report, finish.place, planned, made.whole, clock.work), complete.cure

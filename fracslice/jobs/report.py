@@ -14,12 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import quantile
+from ..common.messages import format_count
 from ..errors import TooLargeError
+from ..mesh import Mesh
 from ..work import Work
 
 if TYPE_CHECKING:
     from ..kernel import Field
-    from ..mesh import Mesh
     from ..mesh.checks import MeshReport
     from ..mesh.refine import Refined
     from ..mesh.simplify import Simplified
@@ -204,44 +205,100 @@ class Placement:
         return scene
 
 
-@dataclass(frozen=True, eq=False)
-class MeshResult:
-    """Result of `make_mesh`."""
+@dataclass(frozen=True, eq=False, repr=False, init=False)
+class Result(Mesh):
+    """A mesh in mm, standing on z = 0, quantised to float32, with its report.
 
-    report: Report  # measures, checks and costs
-    place: Placement  # map from the scene to the mesh
-    planned: Plan  # sampled field
-    whole: Mesh | None  # the mesh; None if it is larger than memory and only in the file
-    work: Work = field(default_factory=Work)  # threads, progress and cancellation of the job
+    A mesh larger than memory is only in the file that was written; its vertices raise `TooLargeError`.
+
+    Attributes
+    ----------
+    report : Report
+        Settings, accuracy, problems, run time and memory of the job.
+    place : Placement
+        Map from the scene to the mesh.
+    planned : Plan
+        The field that was sampled.
+    whole : Mesh or None
+        The mesh without its report; None if it is only in the file.
+    work : Work
+        Threads, progress and cancellation of the job.
+    """
+
+    report: Report  # type: ignore[misc]
+    place: Placement  # type: ignore[misc]
+    planned: Plan  # type: ignore[misc]
+    whole: Mesh | None  # type: ignore[misc]
+    work: Work  # type: ignore[misc]
+
+    def __init__(
+        self, report: Report, place: Placement, planned: Plan, whole: Mesh | None, work: Work | None = None
+    ) -> None:
+        values = {
+            "report": report,
+            "place": place,
+            "planned": planned,
+            "whole": whole,
+            "work": work or Work(),
+        }
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle and copy all but the threads and callbacks of the job."""
-        return MeshResult, (self.report, self.place, self.planned, self.whole)
+        return Result, (self.report, self.place, self.planned, self.whole)
 
-    def instead_of(self, coarse: MeshResult) -> MeshResult:
-        """The result with a note that it was made in place of a coarser one, and why."""
-        report, asked = self.report, coarse.report
-        text = f"voxel {report.voxel_mm:.3g} mm instead of {asked.voxel_mm:.3g} mm: {', '.join(asked.lost)}"
-        return replace(self, report=replace(report, notes=(text, *report.notes)))
+    def __repr__(self) -> str:
+        if self.whole is not None:
+            return super().__repr__()
+        made = self.report.mesh
+        vertices = format_count(made.vertices, "vertex", "vertices")
+        return f"<Result of {format_count(made.triangles, 'triangle')}, {vertices}, only in its file>"
+
+    def _repr_png_(self) -> bytes | None:
+        return None if self.whole is None else super()._repr_png_()
 
     @property
     def mesh(self) -> Mesh:
-        """The mesh in mm, standing on z = 0, quantised to float32."""
+        """The mesh without its report."""
         if self.whole is None:
             raise TooLargeError("the mesh does not fit in memory; it is in the file that was written")
         return self.whole
 
+    @property  # type: ignore[misc]
+    def vertices(self) -> NDArray[np.float64]:
+        """Vertices, float64 [n, 3], mm."""
+        return self.mesh.vertices
+
+    @property  # type: ignore[misc]
+    def colours(self) -> NDArray[np.uint8] | None:
+        """Colours of the vertices, sRGB, uint8 [n, 3]; None without `colour`."""
+        return self.mesh.colours
+
+    @property  # type: ignore[misc]
+    def scalars(self) -> Mapping[str, NDArray[np.float32]]:
+        """Named numbers of the vertices, float32 [n]."""
+        return self.mesh.scalars
+
+    @property  # type: ignore[misc]
+    def triangles(self) -> NDArray[np.int32]:
+        """Triangles, int32 [m, 3], counter-clockwise seen from outside."""
+        return self.mesh.triangles
+
     @property
     def root(self) -> Field:
-        """Field that was meshed."""
+        """The field that was meshed."""
         return self.planned.root
 
     @cached_property
     def bricks(self) -> Bricks:
-        """Samples of the field around the surface, scene units; computed on first access."""
+        """Samples of the field near the surface, in scene units, read-only; computed on first access."""
         from ..volume import sample_scene
 
-        return sample_scene(self.planned, self.work)
+        bricks = sample_scene(self.planned, self.work)
+        for array in (bricks.ijk, bricks.values, bricks.index):
+            array.flags.writeable = False
+        return bricks
 
     @property
     def bricks_mm(self) -> Bricks:

@@ -18,7 +18,7 @@ from fracslice.export import packages
 from fracslice.export.layer_files import write_slices
 from fracslice.formulas import box, cone, flake, sphere
 from fracslice.jobs import shared_files, shared_mesh
-from fracslice.jobs.mesh import MeshResult, make_mesh
+from fracslice.jobs.mesh import Result, make_mesh
 from fracslice.mesh import shells
 from fracslice.records import MeshJob
 from fracslice.rendering import progressive
@@ -111,7 +111,7 @@ def test_shards_of_a_mesh_make_one_file(tmp_path: Path, monkeypatch: pytest.Monk
     shards = [Shard(ResultFolder(str(tmp_path / "pieces")), number, 2) for number in (1, 2)]
     paths = {number: tmp_path / f"{number}.stl" for number in (0, 1, 2)}
 
-    def made(shard: Shard | None) -> MeshResult | None:
+    def made(shard: Shard | None) -> Result | None:
         number = shard.number if shard else 0
         try:
             return make_mesh(turned, job, Work(1, cluster=shard), paths[number])
