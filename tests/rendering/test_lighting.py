@@ -123,6 +123,19 @@ def test_a_thin_gap_under_glass_is_not_passed() -> None:
     assert image.reshape(4, 4, 9, 4).mean((1, 3)).min() > 0.3
 
 
+def test_an_edge_of_glass_is_no_line() -> None:
+    """A block on its edge under a sky that hardly changes: an edge as wide as a pixel was 12 % darker."""
+    block = material(
+        transform(box(size=(2, 2, 2)), rotate=(0, 0, 1, 45)), colour=(0, 0, 0), specular=0, clear=1
+    )
+    half, white = (0.5, 0.5, 0.5), (1.0, 1.0, 1.0)
+    sky = Light(kind="sky", colour=white, horizon=half, ground=(0, 0, 0))
+    camera = Camera(eye=(0.4, -6, 0.6), target=(0, 0, 0.1), fov=12)
+    view = View(camera=camera, lights=(sky,), shading=Shading(bounces=6))
+    columns = rendered(block, view, 64).image.mean((0, 2))
+    assert np.ptp(columns) < 0.03 * columns.mean()
+
+
 @pytest.mark.parametrize(("height", "error"), [(6, 0.2), (18, 0.05)])
 def test_a_glowing_ball_is_as_bright_in_parallel_rays(height: int, error: float) -> None:
     """L (r / d)^2 cos, the mean over four pixels, but for the height at which rays go on, 1.5 pixels.
