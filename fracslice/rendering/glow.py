@@ -81,7 +81,7 @@ def bind(linker: Linker, bodies: list[tuple[float, ...]]) -> list[str]:
     for function in (glowing.sent_share, glowing.towards_body, glowing.body_density):
         linker.bind(f"{function.__name__}_", function, values)
     linker.share(glowing.mixed_density)
-    start = [f"v{a} = {a} + 3.0 * h * n{a}" for a in AXES]  # of the ray that continues
+    start = [f"v{a} = {a} + 0.1 * h * n{a}" for a in AXES]  # above bodies that end at the surface
     return [*start, "sent = sent_share_(vx, vy, vz, nx, ny, nz, P)"]
 
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..formulas.registry import Fixed, Node
+from ..formulas.vocabulary import maximum, minimum
 from ..kernel.linker import Linked, Linker
 from ..scene.view import Camera, View
 from .glow import Drawn
@@ -101,6 +102,8 @@ CIRCLE = 1.4143 * 1.02
 """Radius of the circle around a pixel, half sides, with 2 % for the film's perspective."""
 
 
+SHARPER = 16.0
+"""Ratio of a pixel to the width over which normals of glass are taken: a wider edge is seen as a hairline."""
 FAINTEST = 0.002
 """Sum of the throughputs up to which a ray of mirrors and glass ends."""
 
@@ -193,6 +196,8 @@ class _Frame:
         self.linker.bind("step_ray", march.advance, stepping)
         self.linker.bind("step_cone", march.widen, {"steepness": steepness})
         self.linker.bind("width_at", _width, width)
+        if self.inside:
+            self.linker.bind("sharp_width", _sharp_width, {"rounding": seen.rounding})
 
     @property
     def inside(self) -> bool:
@@ -217,7 +222,8 @@ class _Frame:
         lines = ["h = width_at(path + t, P)"]
         if mode in ("light", "normal") or (mode == "albedo" and look.textured):
             self.linker.share(normal)
-            lines.append("nx, ny, nz = normal(x, y, z, h, P)")
+            width = "sharp_width(h, P)" if self.inside and mode == "light" else "h"
+            lines.append(f"nx, ny, nz = normal(x, y, z, {width}, P)")
         if mode == "light":
             lines += look.lines() + self.lighting.lines(look)
             if self.bounces:
@@ -249,3 +255,8 @@ class _Frame:
 def _width(t, cone, least):  # type: ignore[no-untyped-def]
     """Hit tolerance at distance t."""
     return cone * t + least
+
+
+def _sharp_width(h, rounding):  # type: ignore[no-untyped-def]
+    """Half width over which a normal is taken where rays are bent, at least that of rounding's noise."""
+    return minimum(h, maximum(h / SHARPER, 32.0 * rounding))

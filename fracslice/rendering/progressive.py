@@ -394,7 +394,7 @@ class Renderer:
             The new camera.
         """
         setup = self.setup
-        seen = optics(camera, setup.optics.size, setup.root, setup.optics.least)
+        seen = optics(camera, setup.optics.size, setup.root, setup.optics.rounding)
         seen = replace(seen, origin=setup.optics.origin)
         self.setup = replace(setup, camera=camera, optics=seen)
         self._frame, self._prepasses = self._linked(), 0

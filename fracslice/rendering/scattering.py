@@ -6,7 +6,8 @@ from ..kernel.linker import Linker
 from . import glow
 from .glow import Drawn
 from .materials import Look
-from .units import glossy, lights, shade, weights
+from .setup import ray_bound
+from .units import glossy, lights, march, shade, weights
 
 CHANNELS = "rgb"
 
@@ -58,7 +59,16 @@ def onward(linker: Linker, drawn: Drawn, look: Look, weighted: bool) -> list[str
         out = "out * "
         lines += _refraction_lines(u, look.glossy)
         lines += ["eq = where(pane, 0.0, eq)"] * weighted
-    return [*lines, *(f"o{a} = {a} + 3.0 * h * {out}n{a}" for a in "xyz")]
+    lines += [f"o{a} = {a} + 3.0 * h * {out}n{a}" for a in "xyz"]
+    return [*lines, *_start_lines(linker, look)] if look.bodies else lines
+
+
+def _start_lines(linker: Linker, look: Look) -> list[str]:
+    """Lines for the start of a ray that may meet a body that glows: the ray is that of its point."""
+    linker.bind("leave_", march.leave, {"steepness": 1 / ray_bound(look.root)})
+    lines = ["fx, fy, fz = leave_(x, y, z, nx, ny, nz, ex, ey, ez, 3.0 * h, P)"]
+    kept = "where(pane, o{0}, f{0})" if look.inside else "f{0}"
+    return [*lines, *(f"o{a} = {kept.format(a)}" for a in "xyz")]
 
 
 def _reflection_lines(linker: Linker, drawn: Drawn) -> list[str]:

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from fracslice.errors import SceneError
-from fracslice.rendering.live import CameraInput, Live
+from fracslice.rendering import live as module
+from fracslice.rendering.live import CameraInput, Live, Shown
 from fracslice.scene.view import Camera
 from fracslice.viewer.viewer import Controls
 from fracslice.work import Work
@@ -44,10 +45,23 @@ def within(holds: Callable[[], bool], seconds: float = 60) -> None:
         time.sleep(0.005)
 
 
-def sharp(live: Live, camera: Camera) -> np.ndarray:
-    """The picture from there, when it has all of its samples."""
-    within(lambda: live.shown.camera == camera and live.shown.samples == 4)
-    return live.shown.pixels
+def sharp(live: Live, camera: Camera, after: np.ndarray | None = None) -> np.ndarray:
+    """The picture from there, when it has all of its samples and is another than the one before."""
+    made: list[Shown] = []
+
+    def done() -> bool:
+        made[:] = [live.shown]
+        return made[0].camera == camera and made[0].samples == 4 and made[0].pixels is not after
+
+    within(done)
+    return made[0].pixels
+
+
+def save(path: Path, text: str) -> None:
+    """Saves a file in one step: half of it would be a version of its own."""
+    whole = path.with_suffix(".new")
+    whole.write_text(text)
+    whole.replace(path)
 
 
 def test_a_flight_never_gets_there() -> None:
@@ -108,10 +122,12 @@ def test_it_sharpens_and_follows_the_pilot(live: Live) -> None:
 def test_a_moving_picture_is_a_draft_without_noise(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = SCENE.format('<box size="9 9 1"/>').replace("3 -2 1", "3 -2 4")
     path.write_text(scene.replace('samples="4"', 'samples="1000000"'))
-    monkeypatch.setattr("fracslice.rendering.live.READABLE", 1e9)  # nothing but drafts
+    monkeypatch.setattr(module, "READABLE", 1e9)  # nothing but drafts
+    drafts: list[Shown] = []  # the first one is soon replaced by a sharp one
+    monkeypatch.setattr(module, "Shown", lambda *shown: drafts.append(Shown(*shown)) or drafts[-1])
     live = Live(path, size=(48, 32), work=Work(threads=1), device="cpu")
     try:
-        assert live.shown.samples == 0 and live.shown.pixels.shape == (8, 12, 3)
+        assert drafts[0].samples == 0 and drafts[0].pixels.shape == (8, 12, 3)
         within(lambda: live.shown.pixels.shape == (32, 48, 3))
         top = live.shown.pixels[12:20, 16:32].astype(int)
         assert np.ptp(top, axis=(0, 1)).max() <= 2, "one plane, lit evenly"
@@ -141,7 +157,7 @@ def test_a_new_kernel_shows_that_it_compiles(
     ):
         sharp(live, live.first)
         shown, making = live.shown, set[float | None]()
-        path.write_text(SCENE.format(solid))
+        save(path, SCENE.format(solid))
         while live.shown is shown or live.shown.samples < 4:
             making.add(live.making)
             time.sleep(0.005)
@@ -162,15 +178,14 @@ def test_a_saved_file_is_looked_at_from_the_same_place(live: Live, path: Path) -
     live.turn(5, 0)
     turned = live.first.turned(5, 0)
     before = sharp(live, turned)
-    path.write_text(SCENE.format(BOX))
-    within(lambda: live.shown.samples == 0)
-    boxed = sharp(live, turned)
+    save(path, SCENE.format(BOX))
+    boxed = sharp(live, turned, before)
     assert abs(boxed.astype(int) - before).mean() > 3
-    path.write_text(SCENE.format('<sphere radius="x"/>'))
+    save(path, SCENE.format('<sphere radius="x"/>'))
     within(lambda: "ball.xml:1" in live.shown.problem)
     assert "radius" in live.shown.problem and live.running
     np.testing.assert_array_equal(live.shown.pixels, boxed)
-    path.write_text(SCENE.format(SPHERE).replace("3 -2 1", "-3 -2 1"))
+    save(path, SCENE.format(SPHERE).replace("3 -2 1", "-3 -2 1"))
     other = sharp(live, replace(live.first, eye=(-3, -2, 1)))
     assert live.shown.problem == ""
     assert abs(other.astype(int) - first).mean() > 1, "seen from the other side"

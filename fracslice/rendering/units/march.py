@@ -8,6 +8,13 @@ from .intrinsics import blocker, field, transparent
 MOST = 1.8
 """Maximum over-relaxation factor; above 2, balls do not touch."""
 
+TOUCHING = 0.9
+"""Least radius of a ball that touches a surface, relative to its height."""
+LOWER = 2
+"""Lower heights that are tried for such a ball."""
+FLATTEST = 0.05
+"""Sine of the angle to a surface below which a ray starts above it."""
+
 
 def span(ox, oy, oz, dx, dy, dz, lo, hi):
     """Return the interval of a ray in a box by the slab method (Kay and Kajiya 1986).
@@ -81,6 +88,50 @@ def advance(
     after = where(kept, t + step, t - stride + before)
     after = where(hit, t + where(radius < 0.0, ahead, 0.0), after)
     return after, where(kept, radius, before), where(kept, step, before), where(hit, -1.0, 1.0)
+
+
+def touching(x, y, z, nx, ny, nz, lift, P, steepness):
+    """Return height and radius of an empty ball above a surface that about touches it.
+
+    A small body may be nearer than the first height: lower balls are tried. A rough surface is touched by
+    none of them, and keeps the first height.
+
+    `lift`: first height of the centre, scene units.
+    """
+    radius = field(x + lift * nx, y + lift * ny, z + lift * nz, P) * steepness
+    height = lift
+    lower = lift
+    for _ in range(LOWER):
+        apart = radius < TOUCHING * height
+        if not any_of(apart):
+            break
+        lower = 0.25 * lower
+        other = field(x + lower * nx, y + lower * ny, z + lower * nz, P) * steepness
+        apart = apart & (other >= TOUCHING * lower)
+        height = where(apart, lower, height)
+        radius = where(apart, other, radius)
+    return height, radius
+
+
+def leave(x, y, z, nx, ny, nz, ex, ey, ez, lift, P, steepness):
+    """Return the start of a ray that leaves a surface.
+
+    A ball above the surface touches it there. The ray starts where it leaves the ball, and is that of the
+    point. If it passes beside the ball, or almost along the surface, it starts at the ball's centre.
+
+    `ex`, `ey`, `ez`: unit direction of the ray; `lift`: height of the ball's centre, scene units.
+    """
+    height, radius = touching(x, y, z, nx, ny, nz, lift, P, steepness)
+    cosine = nx * ex + ny * ey + nz * ez
+    along = height * cosine
+    inside = radius * radius - height * height + along * along
+    on = along + sqrt(maximum(inside, 0.0))
+    met = (inside > 0.0) & (radius > 0.0) & (cosine > FLATTEST)
+    return (
+        x + where(met, on * ex, height * nx),
+        y + where(met, on * ey, height * ny),
+        z + where(met, on * ez, height * nz),
+    )
 
 
 def widen(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness):
