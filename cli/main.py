@@ -56,6 +56,9 @@ FEWEST = 500_000
 BAD_INPUT = (DeviceError, SceneError, RenderError, VolumeError, ExportError, SliceError, BenchError)
 FAILED, USAGE, INTERRUPTED = 1, 2, 130
 
+LACKS_MEMORY = "can't start new thread", "failed to map segment"
+"""Words of errors where a thread's stack or a library does not fit into the memory."""
+
 
 class Commands(click.Group):
     """Group that imports a command when it runs: importing all takes a tenth of a small job."""
@@ -139,7 +142,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
         return say(str(error), USAGE if isinstance(error, BAD_INPUT) else FAILED)
     except (KeyboardInterrupt, click.Abort):
         return say(f"stopped; {NOTHING}", INTERRUPTED)
-    except MemoryError:
+    except (MemoryError, RuntimeError, ImportError) as error:
+        if not isinstance(error, MemoryError) and not any(words in str(error) for words in LACKS_MEMORY):
+            raise
         return say("out of memory: a coarser voxel or a smaller picture needs less", FAILED)
     except BrokenPipeError:
         # Without it, Python fails to flush stdout at exit.

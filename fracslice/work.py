@@ -31,7 +31,18 @@ def _mark() -> None:
     _HERE.is_worker = True
 
 
-POOL = ThreadPoolExecutor(256, "fracslice", initializer=_mark)
+class _Threads(ThreadPoolExecutor):
+    """Threads as far as the system starts them: where no more fit into the memory, those there are do all."""
+
+    def _adjust_thread_count(self) -> None:
+        try:
+            super()._adjust_thread_count()
+        except RuntimeError as error:
+            if not self._threads:
+                raise MemoryError(str(error)) from None
+
+
+POOL = _Threads(256, "fracslice", initializer=_mark)
 """Worker threads, started on demand and kept: starting a thread takes longer than many tasks."""
 
 _CALLED = 2
@@ -259,18 +270,30 @@ def in_background(task: Callable[[], R], threads: int) -> Iterator[Callable[[], 
         return
     begun = POOL.submit(task)
     try:
-        yield begun.result
+        yield cache(partial(_result, begun, task))
     finally:
-        begun.cancel()
-        wait([begun])
+        if not begun.cancel():
+            wait([begun])
 
 
 def ahead(items: Iterator[T]) -> Iterator[T]:
     """Compute each item in another thread while the consumer uses the one before."""
-    coming = POOL.submit(next, items, None)
+    following = partial(next, items, None)
+    coming = POOL.submit(following)
     try:
-        while (item := coming.result()) is not None:
-            coming = POOL.submit(next, items, None)
+        while (item := _result(coming, following)) is not None:
+            coming = POOL.submit(following)
             yield item
     finally:
-        wait([coming])
+        if not _taken_back(coming):
+            wait([coming])
+
+
+def _result(begun: Future[R], task: Callable[[], R]) -> R:
+    """Result of a task of the pool, or of the same task done here."""
+    return task() if _taken_back(begun) else begun.result()
+
+
+def _taken_back(begun: Future[Any]) -> bool:
+    """Take back, in a worker, a task that no other has begun: workers never wait for workers."""
+    return getattr(_HERE, "is_worker", False) and begun.cancel()

@@ -195,6 +195,34 @@ def test_there_is_memory():
     assert 1 << 20 < memory.available_bytes() < 1 << 60
 
 
+FIRST = ("/sys/fs/cgroup/memory", "memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file")
+SECOND = ("/sys/fs/cgroup", "memory.max", "memory.current", "inactive_file")
+
+
+@pytest.mark.parametrize(("line", "names"), [("4:memory:/job/task", FIRST), ("0::/job/task", SECOND)])
+@pytest.mark.parametrize("limited", ["", "/job", "/job/task"])
+def test_limits_of_control_groups_count_at_every_level(line, names, limited, monkeypatch):
+    """The root's, as a container sees it, that of the job and that of a task in it."""
+    root, most, used, cached = names
+    files = {"/proc/self/cgroup": ["9:name=systemd:/", "3:cpuset:/job", line]}
+    for place in ("", "/job", "/job/task"):
+        files[f"{root}{place}/{used}"] = ["700000"]
+        files[f"{root}{place}/{most}"] = ["1000000"] if place == limited else ["max"]
+        files[f"{root}{place}/memory.stat"] = ["cache 1", f"{cached} 50000"]
+    monkeypatch.setattr(memory, "_lines", lambda path: files.get(path.replace("//", "/").rstrip("/"), []))
+    assert memory.available_bytes() == 350_000
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="needs /proc")
+def test_a_limit_of_addresses_counts():
+    own = (
+        "import resource; resource.setrlimit(resource.RLIMIT_AS, (1 << 30,) * 2);"
+        "from fracslice.common.memory import available_bytes; print(available_bytes())"
+    )
+    left = int(subprocess.run([sys.executable, "-c", own], capture_output=True, text=True).stdout)
+    assert 1 << 29 < left < 1 << 30
+
+
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs /proc")
 def test_peak_memory_is_not_that_of_the_process_that_started_this_one():
     own = "from fracslice.common.memory import peak_rss_mb; print(peak_rss_mb())"

@@ -202,3 +202,30 @@ def test_a_task_beside_ends_before_its_block_does() -> None:
 def test_errors_of_a_task_beside_are_raised_where_its_result_is_wanted() -> None:
     with in_background(lambda: [0][1], 2) as result, pytest.raises(IndexError):
         result()
+
+
+def test_work_goes_on_with_the_threads_that_fit_into_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tasks that wait for others included: nothing waits for a thread that never comes."""
+    start, started = threading.Thread.start, list[threading.Thread]()
+
+    def scarce(thread: threading.Thread) -> None:
+        if started:
+            raise RuntimeError("can't start new thread")
+        started.append(thread)
+        start(thread)
+
+    pool = type(fracslice.work.POOL)(256, initializer=fracslice.work._mark)
+    monkeypatch.setattr(fracslice.work, "POOL", pool)
+    monkeypatch.setattr(threading.Thread, "start", scarce)
+
+    def nested(item: int) -> int:
+        with in_background(lambda: item, 8) as result:
+            return result()
+
+    done: list[int] = []
+    Work(8).map(done.append, range(100))
+    assert sorted(done) == list(range(100))
+    assert list(Work(8).ordered(str, range(50))) == list(map(str, range(50)))
+    assert list(ahead(map(nested, range(1, 9)))) == list(range(1, 9))
+    assert len(started) == 1
+    pool.shutdown()

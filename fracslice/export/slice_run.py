@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
-from datetime import datetime
+from datetime import UTC, datetime
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -26,7 +26,7 @@ from .resins import Resin
 if TYPE_CHECKING:
     from ..mesh.model import Mesh
 
-EPOCH = datetime(1980, 1, 1)
+EPOCH = datetime(1980, 1, 1, tzinfo=UTC)
 """Date of files by default, so that equal jobs give equal bytes."""
 
 

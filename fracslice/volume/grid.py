@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
+from uuid import UUID
 
 import numpy as np
 
@@ -16,6 +18,9 @@ if TYPE_CHECKING:
 
 NAME = "surface"
 """Grid name in a file: OpenVDB's name for the level set of a solid."""
+
+UUID_AT, UUID_SIZE = 21, 36
+"""Place of a file's identifier: after magic number, versions of file and library, and a flag."""
 
 
 def to_grid(bricks: Bricks) -> Grid:
@@ -55,6 +60,16 @@ def write_vdb(
         grid.write(os.fspath(path), dict(metadata or {}))
     except RuntimeError as error:
         raise VolumeError(f"cannot write {error}") from None
+    _identify(path)
+
+
+def _identify(path: str | os.PathLike[str]) -> None:
+    """Make the identifier of a file follow from its contents; OpenVDB draws it at random."""
+    with open(path, "r+b") as file:
+        file.seek(UUID_AT + UUID_SIZE)
+        digest = hashlib.file_digest(file, "sha256").digest()
+        file.seek(UUID_AT)
+        file.write(str(UUID(bytes=digest[:16], version=5)).encode())
 
 
 def read_vdb(path: str | os.PathLike[str], name: str = "") -> Bricks:

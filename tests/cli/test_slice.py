@@ -5,6 +5,8 @@ from __future__ import annotations
 import errno
 import json
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -25,6 +27,23 @@ def test_layers_of_a_range_of_heights(ball: Path, tmp_path: Path) -> None:
     assert {round(layer["height"], 3) for layer in layers} == {0.2, 0.4, 0.6}
     assert sum(layer["height"] for layer in layers) == pytest.approx(20)
     assert layers[-1]["top"] == 20
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="Linux limits addresses")
+def test_layers_are_made_in_few_addresses(ball: Path, tmp_path: Path) -> None:
+    """Threads for which there is no room are not started."""
+    code = (
+        "import resource; resource.setrlimit(resource.RLIMIT_AS, (500 << 20,) * 2);"
+        "from fracslice.cli import main; main()"
+    )
+    files = []
+    for threads, start in ((1, ["-m", "fracslice.cli"]), (64, ["-c", code])):
+        files.append(tmp_path / f"{threads}.cli")
+        how = ["--pixel", "0.2mm", "--layer", "0.1mm", "--threads", str(threads), "-q"]
+        command = [sys.executable, *start, "slice", str(ball), "-o", str(files[-1]), *how]
+        done = subprocess.run(command, capture_output=True, text=True)
+        assert (done.returncode, done.stderr) == (0, "")
+    assert files[0].read_bytes() == files[1].read_bytes()
 
 
 @pytest.mark.parametrize("command", ["slice", "check"])

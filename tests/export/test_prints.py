@@ -6,6 +6,7 @@ import io
 import math
 import shutil
 import subprocess
+import time
 import zipfile
 from collections.abc import Callable
 from dataclasses import replace
@@ -86,6 +87,20 @@ def run(version: int = 1, most: float | None = None, compensation: float = 0.0) 
 def picture() -> np.ndarray:
     """A rendered preview, once for all files."""
     return StackModel(scene(ROOT, size=12), JOB, Work()).picture()
+
+
+@pytest.mark.skipif(not hasattr(time, "tzset"), reason="the time zone cannot be set")
+def test_a_file_is_the_same_in_every_time_zone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def written(zone: str) -> bytes:
+        monkeypatch.setenv("TZ", zone)
+        time.tzset()
+        return write_slices(run(), tmp_path / "part.nanodlp").read_bytes()
+
+    try:
+        assert written("JST-9") == written("UTC0")
+    finally:
+        monkeypatch.undo()
+        time.tzset()
 
 
 @pytest.mark.parametrize("case", CASES)

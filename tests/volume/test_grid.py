@@ -47,6 +47,16 @@ def test_a_file_gives_back_its_bricks_and_text(tmp_path: Path) -> None:
     assert np.array_equal(extract(bricks).triangles, extract(again).triangles)
 
 
+def test_the_same_samples_make_the_same_file(tmp_path: Path) -> None:
+    """OpenVDB draws the identifier of a file at random."""
+    files = [tmp_path / f"{name}.vdb" for name in ("first", "again", "other")]
+    for path, scale in zip(files, (1.0, 1.0, 2.0), strict=True):
+        write_vdb(ball(scale=scale), path, {"creator": "a test"})
+    first, again, other = (path.read_bytes() for path in files)
+    assert first == again
+    assert first[21:57] != other[21:57]
+
+
 @pytest.mark.skipif(not shutil.which("vdb_print"), reason="vdb_print is not installed")
 def test_a_file_is_a_narrow_band_level_set_to_vdb_print(tmp_path: Path) -> None:
     bricks = ball()
