@@ -14,7 +14,7 @@ from ..common.cache import key
 from ..common.files import locked_folder, remove_leftovers, replacing, reporting_errors
 from ..common.messages import format_count
 from ..errors import RenderError, SharedError
-from ..export.resuming import FinishedFiles
+from ..export.resuming import FinishedFiles, sort_finished
 from ..kernel.devices import choose_device
 from ..kernel.host import toolchain
 from ..scene.reader import reads
@@ -106,11 +106,12 @@ def write_frames(job: FilmJob, numbers: Sequence[int], folder: Path, resume: boo
     with reporting_errors(folder):
         folder.mkdir(exist_ok=True)
     with locked_folder(folder):
-        finished = _claim(job, folder, resume)
-        names = {number: job.path(folder, number).name for number in numbers}
-        missing = [number for number in numbers if not (resume and names[number] in finished)]
-        _write(job, missing, folder, finished, work)
-        finished.sort()
+        _claim(job, folder, resume)
+        with FinishedFiles.of(folder / JOURNAL) as finished:
+            names = {number: job.path(folder, number).name for number in numbers}
+            missing = [number for number in numbers if not (resume and names[number] in finished)]
+            _write(job, missing, folder, finished, work)
+        sort_finished(folder / JOURNAL)
     return [job.path(folder, number) for number in numbers]
 
 
@@ -145,10 +146,10 @@ def _write_here(
         work.progress("frames", done / len(numbers))
 
 
-def _claim(job: FilmJob, folder: Path, resume: bool) -> FinishedFiles:
+def _claim(job: FilmJob, folder: Path, resume: bool) -> None:
     """Make a folder this film's; frames of an earlier film are removed, unless it is to be resumed.
 
-    What killed processes were writing is removed. Returns the record of finished frames.
+    What killed processes were writing is removed.
     """
     journal = folder / JOURNAL
     remove_leftovers(folder)
@@ -156,7 +157,7 @@ def _claim(job: FilmJob, folder: Path, resume: bool) -> FinishedFiles:
         if any(folder.iterdir()):
             raise RenderError(f"{folder}: expected an empty folder, or one with the frames of a film")
     elif _film_key(journal) == job.key:
-        return FinishedFiles.of(journal)
+        return
     elif resume:
         raise RenderError(
             f"{folder}: has frames of another film or device: expected those of this one, to resume"
@@ -165,7 +166,6 @@ def _claim(job: FilmJob, folder: Path, resume: bool) -> FinishedFiles:
         path.unlink()
     with replacing(journal) as file:
         file.write(json.dumps({"key": job.key, "fps": job.fps}).encode() + b"\n")
-    return FinishedFiles.of(journal)
 
 
 def _film_key(journal: Path) -> str:

@@ -161,34 +161,37 @@ class FinishedFiles:
     A complete picture of another layer or frame, in the place of a file, is not taken for it.
     """
 
-    journal: Path  # the file that identifies the job
+    journal: BinaryIO  # the file that identifies the job, open for appending, without a buffer
     known: dict[str, str]  # hashes of earlier processes, by the names of files
 
     @classmethod
-    def of(cls, journal: Path) -> FinishedFiles:
-        """Read the hashes of a job."""
-        lines = journal.read_text(encoding="utf-8", errors="replace").splitlines()[1:]
-        return cls(journal, {name: digest for digest, _, name in (line.partition(" ") for line in lines)})
+    @contextmanager
+    def of(cls, journal: Path) -> Iterator[FinishedFiles]:
+        """Open the record of a job."""
+        with open(journal, "ab", buffering=0) as file:
+            yield cls(file, _read_digests(journal))
 
     def __contains__(self, name: str) -> bool:
         """True if a file is what a process of the job has written."""
-        path = self.journal.with_name(name)
+        path = Path(self.journal.name).with_name(name)
         return name in self.known and path.is_file() and self.known[name] == _digest(path.read_bytes())
 
     def add(self, name: str, data: bytes) -> None:
         """Add a file that was written."""
-        handle = os.open(self.journal, os.O_WRONLY | os.O_APPEND | getattr(os, "O_BINARY", 0))
-        try:
-            os.write(handle, f"{_digest(data)} {name}\n".encode())
-        finally:
-            os.close(handle)
+        self.journal.write(f"{_digest(data)} {name}\n".encode())
 
-    def sort(self) -> None:
-        """Order the lines by names, so that they do not depend on the order of work."""
-        first = self.journal.read_bytes().partition(b"\n")[0]
-        known = sorted(self.of(self.journal).known.items())
-        with replacing(self.journal) as file:
-            file.writelines([first + b"\n", *(f"{digest} {name}\n".encode() for name, digest in known)])
+
+def sort_finished(journal: Path) -> None:
+    """Order the lines of a record by names, so that they do not depend on the order of work."""
+    first = journal.read_bytes().partition(b"\n")[0]
+    lines = [f"{digest} {name}\n".encode() for name, digest in sorted(_read_digests(journal).items())]
+    with replacing(journal) as file:
+        file.writelines([first + b"\n", *lines])
+
+
+def _read_digests(journal: Path) -> dict[str, str]:
+    lines = journal.read_text(encoding="utf-8", errors="replace").splitlines()[1:]
+    return {name: digest for digest, _, name in (line.partition(" ") for line in lines)}
 
 
 def _digest(data: bytes) -> str:
@@ -220,8 +223,8 @@ def resumable_folder(
             for layer in sorted(names - {JOB}):
                 (folder / layer).unlink()
             _write_manifest(folder / JOB, job)
-        finished = FinishedFiles.of(folder / JOB)
-        yield next(index for index in count() if name(index) not in finished), finished
+        with FinishedFiles.of(folder / JOB) as finished:
+            yield next(index for index in count() if name(index) not in finished), finished
         (folder / JOB).unlink()
 
 
