@@ -12,7 +12,8 @@ import os
 import signal
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from importlib import import_module
 from typing import Any, NoReturn, TextIO
 
@@ -75,12 +76,26 @@ class Commands(click.Group):
             self.add_command(getattr(module, name))
         return super().get_command(ctx, cmd_name)
 
+    def make_context(
+        self, info_name: str | None, args: list[str], parent: click.Context | None = None, **extra: Any
+    ) -> click.Context:
+        """Read the options, as `invoke` runs a command: help imports all of them."""
+        with stoppable():
+            return super().make_context(info_name, args, parent, **extra)
+
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command; Ctrl-C, also during its imports, raises `StoppedError`."""
-        try:
+        with stoppable():
             return super().invoke(ctx)
-        except KeyboardInterrupt:
-            raise StoppedError(signal.SIGINT, NOTHING) from None
+
+
+@contextmanager
+def stoppable() -> Iterator[None]:
+    """Raise `StoppedError` for Ctrl-C; click would print an empty line."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise StoppedError(signal.SIGINT, NOTHING) from None
 
 
 @click.group(

@@ -224,13 +224,12 @@ def check_outputs(given: MeshFileOptions) -> None:
 def write_grid(result: Result, path: str, about: dict[str, str]) -> None:
     """Write the samples, in mm, as an OpenVDB file."""
     import shutil
-    import tempfile
 
-    from fracslice.export import replacing
+    from fracslice.common.files import replacing, temporary_folder
     from fracslice.volume.grid import write_vdb
 
-    with tempfile.TemporaryDirectory(prefix="fracslice-") as folder, replacing(path) as file:
-        whole = Path(folder) / f"grid{GRID}"
+    with temporary_folder() as folder, replacing(path) as file:
+        whole = folder / f"grid{GRID}"
         write_vdb(result.bricks_mm, whole, about)
         with whole.open("rb") as grid:
             shutil.copyfileobj(grid, file)

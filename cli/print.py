@@ -53,8 +53,7 @@ def print_(given: SlicerOptions) -> int:
     --------
     fracslice print my.xml -o my.gcode --profile my.ini --size 8cm --voxel 0.25mm
     """
-    import tempfile
-
+    from fracslice.common.files import temporary_folder
     from fracslice.export.sending import printer_address, send
     from fracslice.export.slicers import SECONDS, SLICERS
     from fracslice.jobs.mesh import make_mesh
@@ -72,8 +71,8 @@ def print_(given: SlicerOptions) -> int:
     job = given.mesh_job(scene)
     if job.simplify is None:
         job = replace(job, simplify=TOLERANCE)
-    with tempfile.TemporaryDirectory(prefix="fracslice-") as folder, given.working() as work:
-        model = Path(folder) / f"{Path(output).stem}{chosen.model}"
+    with temporary_folder() as folder, given.working() as work:
+        model = folder / f"{Path(output).stem}{chosen.model}"
         report = make_mesh(scene, job, work, path=model).report
         count = report.mesh.triangles
         if report.problems:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ..common.files import temporary_folder
 from ..common.messages import lacking
 from ..errors import ExportError
 from ..export import replacing
@@ -160,8 +161,8 @@ def _encode_film(pictures: Iterator[Any], ending: str, fps: float) -> bytes:
     height, width, _ = first.shape
     source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-framerate", repr(fps)]
     codec, *options = CODECS[ending]
-    with tempfile.TemporaryDirectory(prefix="fracslice-") as folder, tempfile.TemporaryFile() as log:
-        film = Path(folder) / f"film{ending}"
+    with temporary_folder() as folder, tempfile.TemporaryFile() as log:
+        film = folder / f"film{ending}"
         command = [imageio_ffmpeg.get_ffmpeg_exe(), "-loglevel", "error", *source, "-i", "-"]
         command += ["-vf", "scale=out_color_matrix=bt709", "-c:v", codec, *options, *COLOURS, str(film)]
         with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=log) as process:

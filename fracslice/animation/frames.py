@@ -11,9 +11,10 @@ from pathlib import Path
 
 from ..cluster import Shard
 from ..common.cache import key
-from ..common.files import locked_folder, replacing, reporting_errors
+from ..common.files import locked_folder, remove_leftovers, replacing, reporting_errors
 from ..common.messages import format_count
 from ..errors import RenderError, SharedError
+from ..export.resuming import FinishedFiles, sort_finished
 from ..kernel.devices import choose_device
 from ..kernel.host import toolchain
 from ..scene.reader import reads
@@ -27,9 +28,6 @@ AT_ONCE, MOST_PIXELS = 4, 1 << 25
 
 JOURNAL = "film.json"
 """File in the folder with the key of the film."""
-
-UNFINISHED = ".f*.part"
-"""Files of frames, or the journal, that are being written; see `replacing`."""
 
 
 @dataclass(frozen=True)
@@ -109,17 +107,22 @@ def write_frames(job: FilmJob, numbers: Sequence[int], folder: Path, resume: boo
         folder.mkdir(exist_ok=True)
     with locked_folder(folder):
         _claim(job, folder, resume)
-        missing = [number for number in numbers if not (resume and job.path(folder, number).exists())]
-        _write(job, missing, folder, work)
+        with FinishedFiles.of(folder / JOURNAL) as finished:
+            names = {number: job.path(folder, number).name for number in numbers}
+            missing = [number for number in numbers if not (resume and names[number] in finished)]
+            _write(job, missing, folder, finished, work)
+        sort_finished(folder / JOURNAL)
     return [job.path(folder, number) for number in numbers]
 
 
-def _write(job: FilmJob, numbers: Sequence[int], folder: Path, work: Work) -> None:
+def _write(job: FilmJob, numbers: Sequence[int], folder: Path, finished: FinishedFiles, work: Work) -> None:
     """Make frames and write them, by the pool of the work if there is one."""
 
     def write(number: int, data: bytes) -> None:
-        with replacing(job.path(folder, number)) as file:
+        path = job.path(folder, number)
+        with replacing(path) as file:
             file.write(data)
+        finished.add(path.name, data)
 
     if work.cluster is None:
         _write_here(job, numbers, write, work)
@@ -146,30 +149,28 @@ def _write_here(
 def _claim(job: FilmJob, folder: Path, resume: bool) -> None:
     """Make a folder this film's; frames of an earlier film are removed, unless it is to be resumed.
 
-    A process that was killed leaves the unfinished file that it was writing; it is removed.
+    What killed processes were writing is removed.
     """
     journal = folder / JOURNAL
-    if journal.exists():
-        for path in folder.glob(UNFINISHED):
-            path.unlink(missing_ok=True)
-        known = _film_key(journal)
-        if known == job.key:
-            return
-        if resume:
-            raise RenderError(
-                f"{folder}: has frames of another film or device: expected those of this one, to resume"
-            )
-        for path in folder.glob("frame?????.*"):
-            path.unlink()
-    elif any(folder.iterdir()):
-        raise RenderError(f"{folder}: expected an empty folder, or one with the frames of a film")
+    remove_leftovers(folder)
+    if not journal.exists():
+        if any(folder.iterdir()):
+            raise RenderError(f"{folder}: expected an empty folder, or one with the frames of a film")
+    elif _film_key(journal) == job.key:
+        return
+    elif resume:
+        raise RenderError(
+            f"{folder}: has frames of another film or device: expected those of this one, to resume"
+        )
+    for path in folder.glob("frame?????.*"):
+        path.unlink()
     with replacing(journal) as file:
-        file.write(json.dumps({"key": job.key, "fps": job.fps}).encode())
+        file.write(json.dumps({"key": job.key, "fps": job.fps}).encode() + b"\n")
 
 
 def _film_key(journal: Path) -> str:
     """Key of the film whose frames are in a folder."""
     try:
-        return str(json.loads(journal.read_text())["key"])
+        return str(json.loads(journal.read_text().partition("\n")[0])["key"])
     except (ValueError, KeyError, TypeError):
         raise RenderError(f"{journal}: expected the journal of a film") from None

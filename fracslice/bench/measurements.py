@@ -15,12 +15,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from importlib.util import find_spec
-from pathlib import Path
 from statistics import median
 from typing import Any
 
 from ..cluster import Shard
 from ..common.cache import key, program
+from ..common.files import temporary_folder
 from ..common.memory import MAXRSS, own_peak_mb, peak_rss_mb
 from ..common.messages import format_count
 from ..common.parameters import Count, Number, attribute, validate, validate_value
@@ -188,8 +188,8 @@ def _peer(peer: Peer, about: dict[str, Any], work: Work) -> dict[str, float]:
 
     Time and memory are those of its process, unless it reports its own.
     """
-    with tempfile.TemporaryDirectory(prefix="fracslice-") as folder:
-        path = Path(folder) / "mesh.ply"
+    with temporary_folder() as folder:
+        path = folder / "mesh.ply"
         places = {"workload": about["workload"], "resolution": about["resolution"], "output": path}
         command = [word.format(**places) for word in peer.command]
         output, used = _run_command(command, "", work)

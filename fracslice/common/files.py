@@ -13,7 +13,7 @@ import shutil
 import stat
 import tempfile
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -134,6 +134,9 @@ LARGE = 1 << 26
 """Bytes of a replaced file that another thread releases."""
 
 
+TEMPORARY = ".fracslice-"
+"""Begin of the names of files and folders that are there while something is written, and locked."""
+
 FULL = errno.ENOSPC, errno.EDQUOT
 """Errors of a full disk."""
 
@@ -208,19 +211,83 @@ def replacing(path: str | Path, mode: int | None = None) -> Iterator[BinaryIO]:
         For an error of the file system.
     """
     target = check_target(path)
-    with reporting_errors(path):
-        handle, part = tempfile.mkstemp(".part", f".{target.name[:100]}.", target.parent)
+
+    def empty() -> str:
+        handle, part = tempfile.mkstemp(f".{target.name[:100]}.part", TEMPORARY, target.parent)
+        os.close(handle)
+        return part
+
+    with reporting_errors(path), _locked_new(empty, target.parent) as part:
         try:
-            with os.fdopen(handle, "wb", BUFFER) as file:
+            with open(part, "wb", BUFFER) as file:
                 yield file
                 file.flush()
                 os.chmod(part, _permissions(target) if mode is None else mode)
-                os.fsync(handle)
+                os.fsync(file.fileno())
             _replace(part, target)
         except BaseException:
             with suppress(FileNotFoundError):
                 os.unlink(part)
             raise
+
+
+@contextmanager
+def temporary_folder(within: Path | None = None) -> Iterator[Path]:
+    """Make a folder for a block, by default in that of the system.
+
+    A process that is killed leaves it; the next one that writes there removes it.
+    """
+    place = within or Path(tempfile.gettempdir())
+    with _locked_new(lambda: tempfile.mkdtemp(prefix=TEMPORARY, dir=place), place) as folder:
+        try:
+            yield Path(folder)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+@contextmanager
+def _locked_new(make: Callable[[], str], within: Path) -> Iterator[str]:
+    """Make a temporary file or folder and lock it, so that no other process takes it for a leftover."""
+    remove_leftovers(within)
+    path, handle = _make_locked(make)
+    try:
+        yield path
+    finally:
+        if handle is not None:
+            os.close(handle)
+
+
+def _make_locked(make: Callable[[], str]) -> tuple[str, int | None]:
+    """Path and handle; made again if another process removed it before it was locked."""
+    path = make()
+    if not POSIX:  # Windows moves no file that is open
+        return path, None
+    with suppress(FileNotFoundError):
+        handle = os.open(path, os.O_RDONLY)
+        with suppress(ExportError):
+            lock(handle, path)
+            if os.path.exists(path):
+                return path, handle
+        os.close(handle)
+    return _make_locked(make)
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Remove the temporary files and folders of processes that were killed: nobody has locked them."""
+    with suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.name.startswith(TEMPORARY):
+                _remove_unlocked(entry.path)
+
+
+def _remove_unlocked(path: str) -> None:
+    with suppress(OSError, ExportError):
+        handle = os.open(path, os.O_RDONLY | NO_LINK | NO_WAIT)
+        try:
+            if lock(handle, path):
+                shutil.rmtree(path) if os.path.isdir(path) else os.unlink(path)
+        finally:
+            os.close(handle)
 
 
 def link_or_copy(source: str, path: str | Path) -> None:
@@ -341,8 +408,8 @@ def _flush_folder(folder: Path) -> None:
             os.close(handle)
 
 
-def lock(handle: int, path: str | Path) -> None:
-    """Lock an open file or folder until it is closed, where the file system supports it."""
+def lock(handle: int, path: str | Path) -> bool:
+    """Lock an open file or folder until it is closed; false where the file system has no locks."""
     try:
         try:
             import fcntl
@@ -355,7 +422,8 @@ def lock(handle: int, path: str | Path) -> None:
     except (BlockingIOError, PermissionError):
         raise ExportError(f"{path}: another process is writing it") from None
     except OSError:
-        pass  # some file systems have no locks
+        return False
+    return True
 
 
 @contextmanager

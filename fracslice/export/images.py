@@ -7,12 +7,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import BinaryIO
 
 import numpy as np
 
-from ..common.files import replacing
+from ..common.files import replacing, temporary_folder
 from ..errors import ExportError
 from ..work import Work, chunks
 from .png import STRIP, levels, write_png
@@ -21,8 +20,8 @@ from .png import STRIP, levels, write_png
 @contextmanager
 def _named_temporary(file: BinaryIO, folder: Path | None) -> Iterator[Path]:
     """Temporary file, for libraries that only write to named ones; its contents are copied to the file."""
-    with TemporaryDirectory(prefix=".fracslice-", dir=folder) as temporary:
-        yield (path := Path(temporary) / "picture")
+    with temporary_folder(folder) as temporary:
+        yield (path := temporary / "picture")
         with open(path, "rb") as written:
             shutil.copyfileobj(written, file)
 

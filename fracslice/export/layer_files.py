@@ -18,7 +18,6 @@ PRINTS = {form.name: form for form in (*archives.FORMATS, goo.FORMAT, *chitu.FOR
 PNG = FolderFormat(
     "png",
     png.encode_layer,
-    png.is_whole,
     lambda run: {"manifest.json": run.describe()},
     encoding=Encoding.PNG,
 )

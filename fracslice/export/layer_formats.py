@@ -99,25 +99,28 @@ class FolderFormat(LayerFormat):
     """Format of a folder with a file for each layer, 00000.png, ...; the name is their extension.
 
     The folder must be new, empty, or left by an interrupted job, which resumes at its first layer that is
-    missing or incomplete: layers are written by the threads that encode them, in any order.
+    missing, incomplete or another: layers are written by the threads that encode them, in any order.
     """
 
-    is_whole: Callable[[bytes], bool]  # true if the bytes are a complete file of a layer
     others: Callable[[SliceRun], dict[str, bytes]]  # further files of a run by name, written last
 
     def write(self, run: SliceRun, path: Path) -> None:
         encode, name = self.encoder_for(run, path), f"{{:05d}}.{self.name}".format
-        with resumable_folder(path, run.key(self.name), name, self.is_whole) as start:
+        with resumable_folder(path, run.key(self.name), name) as (start, finished):
+
+            def store(index: int, data: bytes) -> None:
+                write_small_file(f"{path}/{name(index)}", data)
+                finished.add(name(index), data)
 
             def make(layer: Layer) -> None:
-                write_small_file(f"{path}/{name(layer.index)}", encode(layer))
+                store(layer.index, encode(layer))
 
             if run.work.cluster is None:
                 for _ in run.slicer.map(make, range(start, run.layers), self.pictures(run)):
                     pass
             else:
                 for index, data in enumerate(encoded_layers(run, self.name, encode, start), start):
-                    write_small_file(f"{path}/{name(index)}", data)
+                    store(index, data)
             for other, data in self.others(run).items():
                 with replacing(path / other) as file:
                     file.write(data)

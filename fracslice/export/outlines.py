@@ -66,12 +66,6 @@ def _checksum(data: bytes) -> bytes:
     return b"<!-- crc32 %08x -->\n" % crc32(data)
 
 
-def _is_whole(data: bytes) -> bool:
-    """True if the bytes are a complete layer, undamaged."""
-    end = len(_checksum(b""))
-    return data[-end:] == _checksum(data[:-end])
-
-
 def _slic3r_head(run: SliceRun) -> bytes:
     return _head(run, ' xmlns:slic3r="http://slic3r.org/namespaces/slic3r"').encode()
 
@@ -161,7 +155,7 @@ def _between(
 
 
 FORMATS = (
-    FolderFormat("svg", _svg, _is_whole, lambda _: {}),
+    FolderFormat("svg", _svg, lambda _: {}),
     _between("slic3r", _slic3r, _slic3r_head, b"</svg>\n"),
     _between(
         "cli", _cli_text, lambda run: _cli_head(run, "ASCII") + b"\n$$GEOMETRYSTART\n", b"$$GEOMETRYEND\n"

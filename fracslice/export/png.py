@@ -43,18 +43,6 @@ def _chunk(kind: bytes, data: bytes) -> tuple[bytes, bytes, bytes, bytes]:
     return struct.pack(">I", len(data)), kind, data, struct.pack(">I", crc32(data, crc32(kind)))
 
 
-def is_whole(data: bytes) -> bool:
-    """True if the bytes are a complete, undamaged file of `encode`."""
-    if len(data) < _BEFORE + _AFTER:
-        return False
-    columns, rows = struct.unpack_from(">II", data, len(SIGNATURE) + 8)
-    return data == _file((rows, columns), data[_BEFORE:-_AFTER])
-
-
-_BEFORE, _AFTER = len(SIGNATURE) + 33, 16
-"""Bytes before and after the encoded rows."""
-
-
 STRIP, LEVEL = 32, 6
 """Rows that are stored as one, and the level of compression of a picture."""
 ZLIB = b"\x78\x9c"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 import struct
@@ -9,7 +10,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from itertools import chain, islice
+from itertools import chain, count, islice
 from pathlib import Path
 from typing import BinaryIO
 
@@ -24,6 +25,7 @@ from ..common.files import (
     lock,
     locked_folder,
     open_private,
+    remove_leftovers,
     replacing,
     reporting_errors,
 )
@@ -34,8 +36,8 @@ JOB = "job.json"
 
 OURS = b'{"application": "fracslice", '
 
-LAYER = re.compile(r"\d{5,}\.(png|svg)")
-"""Names of layer files in a folder."""
+OF_A_JOB = re.compile(r"\d{5,}\.(png|svg)|job\.json|manifest\.json")
+"""Names of files in a folder of layers."""
 
 UNREADABLE = "the finished layers cannot be read back"
 
@@ -135,7 +137,7 @@ def journal(path: str | Path, job: str) -> Iterator[Journal]:
         _remove_foreign(part)
         with open_private(part, "r+b", os.O_CREAT, buffering=BUFFER) as file:
             lock(file.fileno(), path)
-            if _read_job_file(manifest) != _manifest(job):
+            if _read_job_file(manifest).rstrip() != _manifest(job):
                 if os.fstat(file.fileno()).st_size:
                     _warn_discarded(path)
                 manifest.unlink(missing_ok=True)
@@ -152,35 +154,77 @@ def journal(path: str | Path, job: str) -> Iterator[Journal]:
         part.unlink(missing_ok=True)
 
 
+@dataclass(frozen=True)
+class FinishedFiles:
+    """Finished files of a folder, whose hashes are lines of the file that identifies the job.
+
+    A complete picture of another layer or frame, in the place of a file, is not taken for it.
+    """
+
+    journal: BinaryIO  # the file that identifies the job, open for appending, without a buffer
+    known: dict[str, str]  # hashes of earlier processes, by the names of files
+
+    @classmethod
+    @contextmanager
+    def of(cls, journal: Path) -> Iterator[FinishedFiles]:
+        """Open the record of a job."""
+        with open(journal, "ab", buffering=0) as file:
+            yield cls(file, _read_digests(journal))
+
+    def __contains__(self, name: str) -> bool:
+        """True if a file is what a process of the job has written."""
+        path = Path(self.journal.name).with_name(name)
+        return name in self.known and path.is_file() and self.known[name] == _digest(path.read_bytes())
+
+    def add(self, name: str, data: bytes) -> None:
+        """Add a file that was written."""
+        self.journal.write(f"{_digest(data)} {name}\n".encode())
+
+
+def sort_finished(journal: Path) -> None:
+    """Order the lines of a record by names, so that they do not depend on the order of work."""
+    first = journal.read_bytes().partition(b"\n")[0]
+    lines = [f"{digest} {name}\n".encode() for name, digest in sorted(_read_digests(journal).items())]
+    with replacing(journal) as file:
+        file.writelines([first + b"\n", *lines])
+
+
+def _read_digests(journal: Path) -> dict[str, str]:
+    lines = journal.read_text(encoding="utf-8", errors="replace").splitlines()[1:]
+    return {name: digest for digest, _, name in (line.partition(" ") for line in lines)}
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.blake2b(data, digest_size=16).hexdigest()
+
+
 @contextmanager
 def resumable_folder(
-    folder: Path, job: str, name: Callable[[int], str], is_whole: Callable[[bytes], bool]
-) -> Iterator[int]:
+    folder: Path, job: str, name: Callable[[int], str]
+) -> Iterator[tuple[int, FinishedFiles]]:
     """Make the folder of a job, or resume the one that an interrupted job left.
 
     Layers of another interrupted job are removed with a warning.
 
-    `job`: key of everything that determines the bytes; `is_whole`: true if the bytes are a complete layer
-    file.
+    `job`: key of everything that determines the bytes. Yields the number of finished layers, and the record
+    of finished files.
     """
     with reporting_errors(folder):
         folder.mkdir(exist_ok=True)
     with _reporting_resumption(folder), locked_folder(folder):
+        remove_leftovers(folder)
         names = set(os.listdir(folder))
-        manifest = _read_job_file(folder / JOB)
-        if names and not (manifest.startswith(OURS) and all(n == JOB or LAYER.fullmatch(n) for n in names)):
+        first = _read_job_file(folder / JOB).partition(b"\n")[0]
+        if names and not (first.startswith(OURS) and all(map(OF_A_JOB.fullmatch, names))):
             raise ExportError(f"{folder}: the folder is not empty, and its files are no interrupted job")
-        if manifest != _manifest(job):
+        if first != _manifest(job):
             if names:
                 _warn_discarded(folder)
             for layer in sorted(names - {JOB}):
                 (folder / layer).unlink()
-            names = set()
             _write_manifest(folder / JOB, job)
-        index = 0
-        while name(index) in names and is_whole((folder / name(index)).read_bytes()):
-            index += 1
-        yield index
+        with FinishedFiles.of(folder / JOB) as finished:
+            yield next(index for index in count() if name(index) not in finished), finished
         (folder / JOB).unlink()
 
 
@@ -207,7 +251,7 @@ def _read_job_file(manifest: Path) -> bytes:
 
 def _write_manifest(manifest: Path, job: str) -> None:
     with replacing(manifest, OWNER_ONLY) as file:
-        file.write(_manifest(job))
+        file.write(_manifest(job) + b"\n")
 
 
 def _manifest(job: str) -> bytes:

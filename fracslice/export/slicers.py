@@ -12,12 +12,13 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..common.files import check_target
+from ..common.files import check_target, temporary_folder
 from ..errors import ExportError
 from ..work import Work
 
@@ -29,6 +30,20 @@ POLL = 0.2
 
 SECONDS = 320 / 830_556
 """Time of PrusaSlicer 2.5 per triangle, measured on a Menger sponge; others are similar."""
+
+GUARD = """
+import os, signal, subprocess, sys, threading
+child = subprocess.Popen(sys.argv[1:], stdin=subprocess.DEVNULL)
+def end():
+    sys.stdin.read()
+    os.killpg(0, signal.SIGKILL) if hasattr(os, "killpg") else child.kill()
+threading.Thread(target=end, daemon=True).start()
+status = child.wait()
+os._exit(status if status >= 0 else 128 - status)
+"""
+"""Program that runs a command, and ends it with all that it started when the pipe from this process closes:
+when the work is cancelled, and when this process is killed.
+"""
 
 _WARNING = re.compile(r"\b(warning|error)\b", re.IGNORECASE)
 _LOG = re.compile(r"^\[[^]]*\]\s*\[[^]]*\]\s*\[(\w+)\]\s*")
@@ -62,8 +77,8 @@ class FilamentSlicer:
     def slice(self, model: Path, profiles: Sequence[str], path: Path, work: Work) -> list[str]:
         """Slice a model."""
         program, target = self.program, check_target(path)
-        with tempfile.TemporaryDirectory(prefix=".fracslice-", dir=target.parent) as folder:
-            made = Path(folder) / target.name
+        with temporary_folder(target.parent) as folder:
+            made = folder / target.name
             output = _run_program(self.command(program, profiles, model, made), work, self.title)
             if not made.exists():
                 raise ExportError(f"{self.title} wrote no file: {_last(output)}")
@@ -73,19 +88,17 @@ class FilamentSlicer:
 
 def _run_program(command: Sequence[str], work: Work, title: str) -> list[str]:
     """Run a program; return the lines that it prints."""
+    guarded, pipe = [sys.executable, "-I", "-S", "-c", GUARD, *command], subprocess.PIPE
     with tempfile.TemporaryFile() as output:
-        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=output, stderr=output)
-        try:
+        with subprocess.Popen(
+            guarded, stdin=pipe, stdout=output, stderr=output, start_new_session=True
+        ) as process:
             while True:
                 try:
                     status = process.wait(POLL)
                     break
                 except subprocess.TimeoutExpired:
                     work.check()
-        finally:
-            if process.poll() is None:
-                process.terminate()
-                process.wait()
         output.seek(0)
         lines = output.read().decode(errors="replace").splitlines()
     if status:

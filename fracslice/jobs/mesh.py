@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
@@ -148,13 +147,11 @@ class _Job:
         if self.path is None or self.path.suffix.lower() != STL:
             yield None
             return
-        from ..export import check_target
+        from ..common.files import check_target, temporary_folder
 
         beside = check_target(self.path).parent
         with ExitStack() as stack:
-            yield lambda: Path(
-                stack.enter_context(tempfile.TemporaryDirectory(prefix=".fracslice-", dir=beside))
-            )
+            yield lambda: stack.enter_context(temporary_folder(beside))
 
     def needing_all(self) -> Iterator[tuple[str, float]]:
         """Names and lengths of changes that need a mesh in one piece."""

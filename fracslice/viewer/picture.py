@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
+from ..common.files import temporary_folder
 from ..common.messages import lacking
 from ..common.parameters import Choice, Vector, validate_value
 from ..errors import RenderError
@@ -61,7 +61,7 @@ def picture(
     if not len(mesh.triangles):
         raise RenderError("the mesh has no triangles to draw")
     need_pyvista()
-    with tempfile.TemporaryDirectory(prefix="fracslice-") as folder, replacing(path) as file:
+    with temporary_folder() as folder, replacing(path) as file:
         source, target = os.path.join(folder, "mesh.npz"), os.path.join(folder, "picture.png")
         arrays: dict[str, Any] = {"vertices": mesh.vertices, "triangles": mesh.triangles}
         np.savez(source, **arrays if mesh.colours is None else arrays | {"colours": mesh.colours})

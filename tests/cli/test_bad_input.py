@@ -162,6 +162,23 @@ def test_a_voxel_count_that_does_not_fit_in_memory(folder, capfd, monkeypatch):
     assert line.endswith("mm fits, and an .stl file is written piece after piece")
 
 
+@pytest.mark.parametrize(
+    "error",
+    [
+        MemoryError("std::bad_alloc"),
+        RuntimeError("can't start new thread"),
+        ImportError("libx.so: failed to map segment from shared object"),
+    ],
+)
+def test_a_lack_of_memory_is_one_line(error, folder, capfd, monkeypatch):
+    def lacking(*_):
+        raise error
+
+    monkeypatch.setattr("fracslice.jobs.surfaces.sample_surface", lacking)
+    assert run(["mesh", "ball.xml", "-o", "out/x.stl", "--resolution", "24"]) == 1
+    assert capfd.readouterr().err.startswith("fracslice: out of memory: a coarser voxel")
+
+
 def test_a_grid_that_is_too_large_is_told_in_voxels_and_mm(folder, capfd):
     error = refused(capfd, folder, "mesh", "ball.xml", "-o", "x.stl", "--resolution", "16384")
     assert "expected at most 8172 voxels, or a voxel 2 times as large, 0.00245 mm" in error

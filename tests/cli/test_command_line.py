@@ -325,9 +325,16 @@ def listens(pid: int) -> bool:
 
 
 @pytest.mark.parametrize(
-    "module", ["click", "fracslice.common.memory", "fracslice.cli.mesh", "fracslice.scene"]
+    ("module", "command"),
+    [
+        ("click", "mesh"),
+        ("fracslice.common.memory", "mesh"),
+        ("fracslice.cli.mesh", "mesh"),
+        ("fracslice.scene", "mesh"),
+        ("fracslice.cli.mesh", "--help"),
+    ],
 )
-def test_a_signal_during_an_import_is_one_line(ball, tmp_path, module):
+def test_a_signal_during_an_import_is_one_line(ball, tmp_path, module, command):
     code = f"""if True:
         import os, signal, sys
         signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -338,7 +345,7 @@ def test_a_signal_during_an_import_is_one_line(ball, tmp_path, module):
         sys.meta_path.insert(0, Interrupts())
         from fracslice.cli import main
         main()"""
-    arguments = ["mesh", str(ball), "-o", str(tmp_path / "b.stl"), "--resolution", "24"]
+    arguments = [command, str(ball), "-o", str(tmp_path / "b.stl"), "--resolution", "24"]
     done = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (130, "fracslice: stopped; nothing was written\n")
 

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import subprocess
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -134,3 +137,33 @@ def test_a_failure_is_one_line_and_leaves_no_file(
     assert printed(ball, "-o", ball.with_name("ball.gcode"), "-q", *COARSE) == 2
     assert capfd.readouterr().err == "fracslice: PrusaSlicer failed with status 1: no profile fits\n"
     assert {p.name for p in ball.parent.iterdir()} == {"ball.xml", "bin"}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs /proc")
+@pytest.mark.parametrize("cancelled", [False, True])
+def test_a_slicer_ends_with_the_process_that_started_it(cancelled: bool, tmp_path: Path) -> None:
+    """And what the slicer started, whether the process is killed or the work is cancelled."""
+    program = f"cd {tmp_path}; sleep 97 & echo $! > new; mv new pid; wait"
+    code = f"""if True:
+        import threading
+        from fracslice.export.slicers import _run_program
+        from fracslice.work import Work
+        work = Work(1)
+        if {cancelled}:
+            threading.Timer(1, work.cancel.set).start()
+        _run_program(["sh", "-c", {program!r}], work, "")
+    """
+    with subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL) as process:
+        wait_until((tmp_path / "pid").exists)
+        slicer = Path(f"/proc/{(tmp_path / 'pid').read_text().strip()}/cmdline")
+        assert b"97" in slicer.read_bytes()
+        if not cancelled:
+            process.kill()
+    wait_until(lambda: not slicer.exists() or not slicer.read_bytes())
+
+
+def wait_until(true: Callable[[], bool]) -> None:
+    end = time.monotonic() + 20
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.05)

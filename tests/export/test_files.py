@@ -8,13 +8,15 @@ import signal
 import stat
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from fracslice.common.files import link_or_copy, write_small_file
+from fracslice.common.files import link_or_copy, temporary_folder, write_small_file
 from fracslice.errors import ExportError
 from fracslice.export import check_target, flushing, replacing, write
 from tests.mesh.shapes import cube
@@ -194,11 +196,44 @@ def test_kill_in_mid_write_leaves_no_broken_file(tmp_path: Path) -> None:
         assert child.stdout is not None
         assert child.stdout.readline() == b"writing\n"
         time.sleep(0.1)
+        write(cube(), tmp_path / "other.stl")
+        assert len(os.listdir(tmp_path)) == 3, "a file that is being written is left alone"
         child.send_signal(signal.SIGKILL)
     assert path.read_text() == "old"
-    assert [name for name in os.listdir(tmp_path) if not name.endswith(".part")] == ["model.stl"]
     write(cube(), path)
     assert path.stat().st_size == 84 + 12 * 50
+    assert sorted(os.listdir(tmp_path)) == ["model.stl", "other.stl"]
+
+
+def test_folders_of_killed_processes_are_removed(tmp_path: Path) -> None:
+    (tmp_path / ".fracslice-killed").mkdir()
+    (tmp_path / ".fracslice-killed" / "piece").write_text("half")
+    (tmp_path / ".fracslice-link").symlink_to(tmp_path)
+    with temporary_folder(tmp_path) as folder:
+        (folder / "piece").write_text("mine")
+        with replacing(tmp_path / "model.stl") as file:
+            file.write(b"whole")
+        assert {*os.listdir(tmp_path)} == {folder.name, "model.stl", ".fracslice-link"}
+    assert {*os.listdir(tmp_path)} == {"model.stl", ".fracslice-link"}
+
+
+def test_a_file_that_was_taken_for_a_leftover_is_made_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By another process, before it was locked."""
+    make, made = tempfile.mkstemp, list[str]()
+
+    def swept(*where: Any) -> tuple[int, str]:
+        handle, part = make(*where)
+        made.append(part)
+        if len(made) < 3:
+            os.unlink(part)
+        return handle, part
+
+    monkeypatch.setattr(tempfile, "mkstemp", swept)
+    write(cube(), tmp_path / "cube.stl")
+    assert len(made) == 3
+    assert os.listdir(tmp_path) == ["cube.stl"]
 
 
 def test_a_file_is_put_however_little_the_system_takes_at_once(
