@@ -75,13 +75,37 @@ def _cancelled_by_signals(kept: str) -> Iterator[threading.Event]:
         if len(received) > 1:
             raise KeyboardInterrupt
 
-    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        yield cancel
+        with _handled_by(stop):
+            yield cancel
     except KeptError as error:
         raise StoppedError(received[0] if received else signal.SIGINT, str(error)) from None
     except Cancelled:
         raise StoppedError(received[0] if received else signal.SIGINT, kept) from None
+
+
+@contextmanager
+def stopped_at_once() -> Iterator[None]:
+    """Let the first SIGINT or SIGTERM end what is done within, which looks at no cancellation."""
+    received = [signal.SIGINT]
+
+    def stop(number: int, _: FrameType | None) -> None:
+        received[0] = signal.Signals(number)
+        raise KeyboardInterrupt
+
+    try:
+        with _handled_by(stop):
+            yield
+    except KeyboardInterrupt:
+        raise StoppedError(received[0], NOTHING) from None
+
+
+@contextmanager
+def _handled_by(stop: Callable[[int, FrameType | None], None]) -> Iterator[None]:
+    """Handle SIGINT and SIGTERM within."""
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
