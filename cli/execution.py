@@ -87,17 +87,20 @@ def _cancelled_by_signals(kept: str) -> Iterator[threading.Event]:
 @contextmanager
 def stopped_at_once() -> Iterator[None]:
     """Let the first SIGINT or SIGTERM end what is done within, which looks at no cancellation."""
-    received = [signal.SIGINT]
+    received: list[int] = []
 
     def stop(number: int, _: FrameType | None) -> None:
-        received[0] = signal.Signals(number)
+        received.append(number)
         raise KeyboardInterrupt
 
     try:
         with _handled_by(stop):
             yield
-    except KeyboardInterrupt:
-        raise StoppedError(received[0], NOTHING) from None
+    except BaseException:
+        if not received:
+            raise
+    if received:  # also where a parser, as trimesh's, went on after the exception
+        raise StoppedError(received[0], NOTHING)
 
 
 @contextmanager
