@@ -75,13 +75,40 @@ def _cancelled_by_signals(kept: str) -> Iterator[threading.Event]:
         if len(received) > 1:
             raise KeyboardInterrupt
 
-    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        yield cancel
+        with _handled_by(stop):
+            yield cancel
     except KeptError as error:
         raise StoppedError(received[0] if received else signal.SIGINT, str(error)) from None
     except Cancelled:
         raise StoppedError(received[0] if received else signal.SIGINT, kept) from None
+
+
+@contextmanager
+def stopped_at_once() -> Iterator[None]:
+    """Let the first SIGINT or SIGTERM end what is done within, which looks at no cancellation."""
+    received: list[int] = []
+
+    def stop(number: int, _: FrameType | None) -> None:
+        received.append(number)
+        raise KeyboardInterrupt
+
+    try:
+        with _handled_by(stop):
+            yield
+    except BaseException:
+        if not received:
+            raise
+    if received:  # also where a parser, as trimesh's, went on after the exception
+        raise StoppedError(received[0], NOTHING)
+
+
+@contextmanager
+def _handled_by(stop: Callable[[int, FrameType | None], None]) -> Iterator[None]:
+    """Handle SIGINT and SIGTERM within."""
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -11,6 +11,8 @@ import click
 
 from fracslice.errors import MeshError
 
+from .execution import stopped_at_once
+
 if TYPE_CHECKING:
     from fracslice.mesh import Mesh
     from fracslice.scene import Scene
@@ -43,7 +45,8 @@ def load_scene(source: str, settings: Iterable[str] = ()) -> Scene:
     """Read the scene of a command and apply the values of --set."""
     from fracslice.scene import read
 
-    return read(scene_path(source)).with_values(settings)
+    with stopped_at_once():
+        return read(scene_path(source)).with_values(settings)
 
 
 def refuse_moved(scene: Scene, settings: Iterable[str]) -> None:
@@ -64,7 +67,8 @@ def load_model(source: str) -> Mesh:
     from fracslice.mesh.reading import read_mesh
 
     try:
-        return read_mesh(source)
+        with stopped_at_once():
+            return read_mesh(source)
     except MeshError as error:
         raise BadInput(str(error)) from error
 

@@ -61,6 +61,15 @@ def open_private(
 
 
 @contextmanager
+def open_regular(path: str | Path) -> Iterator[BinaryIO]:
+    """Open a file to read; refuse a pipe or a device, which may never end, with an `OSError`."""
+    with open(path, "rb", opener=lambda name, mode: os.open(name, mode | NO_WAIT)) as file:
+        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            raise OSError(errno.EINVAL, "expected a file, found a pipe or a device", os.fspath(path))
+        yield file
+
+
+@contextmanager
 def private_folder(folder: Path) -> Iterator[int | None]:
     """Open a folder whose contents and path no other user can change; create it if it does not exist.
 

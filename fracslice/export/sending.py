@@ -63,7 +63,7 @@ def send(path: str | Path, address: str, work: Work) -> str:
     protocol, host, port, storage = printer_address(address)
     upload = partial(_prusalink, storage) if protocol == "prusalink" else _sdcp
     with reporting_errors(Path(path)), open(path, "rb") as file:
-        connection = _Connection(host, port, timeout=TIMEOUT)
+        connection = _Connection(host, port)
         try:
             with connection.watched(work):
                 upload(connection, Path(path).name, file, os.fstat(file.fileno()).st_size, work)
@@ -83,11 +83,24 @@ class _Connection(HTTPConnection):
     A limit of the socket is for each byte alone, and a signal does not end a wait for the next one.
     """
 
-    _end, _socket, _late = 0.0, None, False
+    _end, _late = 0.0, False
+    _socket: socket.socket | None = None
 
     def connect(self) -> None:
-        super().connect()
-        self._socket = self.sock  # a response may take it over
+        """Connect by a socket that is watched while it waits; a response may take it over later."""
+        for family, kind, protocol, _, place in socket.getaddrinfo(
+            self.host, self.port, 0, socket.SOCK_STREAM
+        ):
+            self._socket = self.sock = socket.socket(family, kind, protocol)
+            self.sock.settimeout(TIMEOUT)
+            try:
+                self.sock.connect(place)
+                self.sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                return
+            except OSError as error:
+                failure = error
+                self.close()
+        raise failure
 
     @contextmanager
     def watched(self, work: Work) -> Iterator[None]:

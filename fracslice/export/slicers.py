@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..common.files import check_target, temporary_folder
+from ..common.settings import read_text
 from ..errors import ExportError
 from ..work import Work
 
@@ -134,8 +135,8 @@ def _orca(program: str, profiles: Sequence[str], model: Path, path: Path) -> lis
 def _kind(profile: str) -> object:
     """Type of a profile of OrcaSlicer or Bambu Studio: machine, process or filament."""
     try:
-        values = json.loads(Path(profile).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        values = json.loads(read_text(Path(profile), ExportError))
+    except (ValueError, RecursionError) as error:
         raise ExportError(f"{profile}: expected a .json profile: {error}") from None
     kind = values.get("type") if isinstance(values, dict) else None
     if kind not in ("machine", "process", "filament"):

@@ -32,7 +32,9 @@ from .registry import Formula, Hook, Node, names
 from .vocabulary import NAMES
 
 LONGEST, DEEPEST, MOST = 4000, 24, 600
-"""Characters of a text, levels of its tree, and operations with its powers and loops written out."""
+"""Characters of a text, levels of its tree, and operations with its powers and loops written out, where a
+statement counts as one at least.
+"""
 
 HIGHEST, LARGEST = 16, 1e9
 """Largest exponent and largest number."""
@@ -199,7 +201,8 @@ class _Check:
             case ast.For(_, ast.Tuple(elements) as values, body):
                 return self.cost(values) + len(elements) * self.cost(body)
         own = 8 if isinstance(node, ast.Call) else isinstance(node, (ast.operator, ast.Compare))
-        return own + sum(map(self.cost, ast.iter_child_nodes(node)))
+        inner = own + sum(map(self.cost, ast.iter_child_nodes(node)))
+        return max(inner, 1) if isinstance(node, ast.stmt) else inner
 
 
 POINTS = {"step": ("w", "c"), "distance": ("x", "y", "z")}

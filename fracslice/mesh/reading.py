@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import struct
+import warnings
 import zipfile
 import zlib
 from array import array
@@ -14,6 +15,7 @@ from xml.parsers import expat
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.files import open_regular
 from ..common.messages import format_count
 from ..errors import MeshError
 from .model import Mesh, concatenate
@@ -27,17 +29,23 @@ MILLIMETRES = {
     "foot": 304.8,
     "meter": 1000.0,
 }
-DEEPEST, LARGEST = 32, 1 << 28
-"""Limits for a 3MF file: nesting depth of components, and number of triangles and components that the build
-may expand to. A few lines could ask for any number.
+DEEPEST, MOST_PARTS = 32, 1 << 16
+"""Limits for a 3MF file: nesting depth of components, and number of objects, components and items."""
+LARGEST, COPIES = 1 << 21, 64
+"""Vertices, triangles and objects that the build may have, and how many times those of the file. A few lines
+could ask for any number.
 """
+LONGEST, CHUNK = 1 << 20, 1 << 16
+"""Most bytes of a tag, and bytes that are parsed at once."""
+MOST_AROUND = 1 << 13
+"""Most triangles around a vertex, as each is compared with each."""
 MODEL_RELATION = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
 
 
 def read_3mf(path: Path) -> Mesh:
     """Read the build of a 3MF file, mm."""
     try:
-        with zipfile.ZipFile(path) as archive:
+        with open_regular(path) as file, zipfile.ZipFile(file) as archive:
             relations, package = _Relations(), _Package()
             with archive.open("_rels/.rels") as part:
                 _parse(part, relations.start)
@@ -54,7 +62,13 @@ def _parse(part: IO[bytes], start: Any, end: Any = None) -> None:
     parser = expat.ParserCreate()
     parser.StartElementHandler, parser.EndElementHandler = start, end
     parser.StartDoctypeDeclHandler = _refuse
-    parser.ParseFile(part)
+    given = 0
+    while data := part.read(CHUNK):
+        parser.Parse(data, False)
+        given += len(data)
+        if given - parser.CurrentByteIndex > LONGEST:  # which takes quadratic time
+            raise MeshError(f"not a valid 3MF file: it has a tag of more than {LONGEST >> 20} MB")
+    parser.Parse(b"", True)
 
 
 def _refuse(*_: Any) -> None:
@@ -79,6 +93,10 @@ _Placed = tuple[_Name, NDArray[np.float64]]
 """Object and its transform."""
 
 
+IN_PLACE = np.vstack([np.eye(3), np.zeros(3)])
+"""Transform that moves nothing."""
+
+
 class _Package:
     """Collects the meshes of a 3MF model from XML streams, then expands its build.
 
@@ -91,6 +109,8 @@ class _Package:
         self.build: list[_Placed] = []
         self.unit, self.file, self.object = "millimeter", "", ("", "")
         self.vertices, self.triangles = array("d"), array("q")
+        self.count = 0
+        self.expanded: dict[_Name, Mesh] = {}
 
     def read(self, archive: zipfile.ZipFile, model: str) -> None:
         """Read a model, whose unit and build count, and the files that components name."""
@@ -120,6 +140,7 @@ class _Package:
             case "vertex":
                 self.vertices.extend((float(get["x"]), float(get["y"]), float(get["z"])))
             case "object":
+                self.count_part()
                 self.object = self.file, get["id"]
                 self.parts[self.object] = []
             case "levelset":
@@ -133,9 +154,16 @@ class _Package:
 
     def reference(self, get: dict[str, str]) -> _Placed:
         """The object that an item or a component names, in this file or in that of its path."""
+        self.count_part()
         paths = [value for key, value in get.items() if key.rpartition(":")[2] == "path"]
         file = paths[0].lstrip("/") if paths else self.file
         return (file, get["objectid"]), _matrix(get.get("transform"))
+
+    def count_part(self) -> None:
+        """Count an object, a component or an item."""
+        self.count += 1
+        if self.count > MOST_PARTS:
+            raise MeshError(f"not a valid 3MF file: it has more than {MOST_PARTS} objects and parts")
 
     def end(self, name: str) -> None:
         """Handle the end of an element."""
@@ -149,38 +177,46 @@ class _Package:
             raise MeshError(f"not a valid 3MF file: no such unit: {self.unit}")
         if not self.build:
             raise MeshError("the 3MF file asks to build nothing")
-        known: dict[_Name, int] = {}
-        if sum(self.size(name, known) for name, _ in self.build) > LARGEST:
-            raise MeshError(f"not a valid 3MF file: it builds more than {LARGEST} triangles and parts")
+        known: dict[_Name, tuple[int, int]] = {}
+        most = max(LARGEST, COPIES * sum(map(_count, self.meshes.values())))
+        if sum(self.size(name, known)[0] for name, _ in self.build) > most:
+            raise MeshError(f"not a valid 3MF file: it builds more than {most} vertices, triangles and parts")
         return concatenate([self.placed(*item) for item in self.build]).scaled(MILLIMETRES[self.unit])
 
-    def size(self, name: _Name, known: dict[_Name, int], depth: int = 0) -> int:
-        """Triangles and objects of an expanded object, its components included."""
-        self.check(name, depth)
-        if name not in known:
-            inner = sum(self.size(part, known, depth + 1) for part, _ in self.parts[name])
-            known[name] = 1 + len(self.meshes[name].triangles) + inner
-        return known[name]
+    def size(self, name: _Name, known: dict[_Name, tuple[int, int]], depth: int = 0) -> tuple[int, int]:
+        """Vertices, triangles and objects of an expanded object, and levels of its components.
 
-    def check(self, name: _Name, depth: int) -> None:
-        """Refuse an unknown object, or components nested too deep."""
-        if name not in self.meshes or depth > DEEPEST:
-            raise MeshError(f"not a valid 3MF file: no such object: {name[1]}")
+        An unknown object, and components nested too deep, are refused.
+        """
+        if name in self.meshes and depth <= DEEPEST:
+            if name not in known:
+                inner = [self.size(part, known, depth + 1) for part, _ in self.parts[name]]
+                sizes, levels = zip((_count(self.meshes[name]), -1), *inner, strict=True)
+                known[name] = 1 + sum(sizes), 1 + max(levels)
+            if depth + known[name][1] <= DEEPEST:
+                return known[name]
+        raise MeshError(f"not a valid 3MF file: no such object: {name[1]}")
 
-    def placed(self, name: _Name, matrix: NDArray[np.float64], depth: int = 0) -> Mesh:
+    def placed(self, name: _Name, matrix: NDArray[np.float64]) -> Mesh:
         """An object with its components, in the frame of the build."""
-        self.check(name, depth)
-        inner = [self.placed(part, at, depth + 1) for part, at in self.parts[name]]
-        whole = concatenate([self.meshes[name], *inner])
+        if name not in self.expanded:
+            inner = [self.placed(*part) for part in self.parts[name]]
+            self.expanded[name] = concatenate([self.meshes[name], *inner])
+        whole = self.expanded[name]
         order = -1 if np.linalg.det(matrix[:3]) < 0 else 1
         turned = sum(whole.vertices[:, k, None] * matrix[k] for k in range(3))
         return Mesh(turned + matrix[3], whole.triangles[:, ::order])
 
 
+def _count(mesh: Mesh) -> int:
+    """Number of vertices and triangles."""
+    return len(mesh.vertices) + len(mesh.triangles)
+
+
 def _matrix(text: str | None) -> NDArray[np.float64]:
     """3MF transform: four rows of three numbers, applied to row vectors. Raises ValueError."""
     if text is None:
-        return np.vstack([np.eye(3), np.zeros(3)])
+        return IN_PLACE
     matrix = np.array(text.split(), dtype=np.float64).reshape(4, 3)
     if not np.isfinite(matrix).all():
         raise ValueError(f"a transform that is not of finite numbers: {text[:60]}")
@@ -250,13 +286,13 @@ class _Column(NamedTuple):
 
 def read_ply(path: Path) -> Mesh:
     """Read a PLY file; polygons become fans of triangles."""
-    data = path.read_bytes()
+    data = _contents(path)
     try:
         elements, body = _layout(data)
         tables, at = {}, 0
         for element in elements:
             tables[element.name], at = _table(element, body, at)
-        x, y, z = (tables["vertex"][axis].values for axis in "xyz")
+        x, y, z = (_numbers(tables["vertex"][axis]) for axis in "xyz")
         face = tables.get("face", {})
         lengths, corners = next((face[name] for name in CORNERS if name in face), _Column(*np.empty((2, 0))))
     except (ValueError, KeyError, IndexError, OverflowError) as error:
@@ -264,6 +300,13 @@ def read_ply(path: Path) -> Mesh:
     if len(corners) and not 0 <= corners.min() <= corners.max() < len(x):
         raise MeshError("not a valid PLY file: a face names a vertex that does not exist")
     return Mesh(np.stack([x, y, z], axis=1).astype(np.float64), _fans(lengths, corners.astype(np.int32)))
+
+
+def _numbers(column: _Column) -> Numbers:
+    """Values of a property that has one in each row. Raises ValueError."""
+    if (column.lengths != 1).any():
+        raise ValueError("lists in place of numbers")
+    return column.values
 
 
 def _layout(data: bytes) -> tuple[list[_Element], bytes]:
@@ -374,7 +417,8 @@ def read_mesh(path: str | Path) -> Mesh:
     try:
         if path.is_file() and not path.stat().st_size:
             raise MeshError("the file is empty")
-        with np.errstate(invalid="ignore"):  # of coordinates that are not finite, which are refused
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of NumPy: coordinates that are not finite are refused
             mesh = quantise_mesh(reader(path))
     except FileNotFoundError:
         raise MeshError(f"{path}: no such file") from None
@@ -382,12 +426,23 @@ def read_mesh(path: str | Path) -> Mesh:
         raise MeshError(f"{path}: {getattr(error, 'strerror', None) or error}") from error
     if not len(mesh.triangles):
         raise MeshError(f"{path}: the file has no triangles")
+    most = np.bincount(mesh.triangles.ravel()).max()
+    if most > MOST_AROUND:
+        raise MeshError(
+            f"{path}: {most} corners of triangles meet at a vertex: expected at most {MOST_AROUND}"
+        )
     return mesh
+
+
+def _contents(path: Path) -> bytes:
+    """Bytes of a file."""
+    with open_regular(path) as file:
+        return file.read()
 
 
 def _read_stl(path: Path) -> Mesh:
     """Binary or ASCII STL."""
-    data = path.read_bytes()
+    data = _contents(path)
     count = struct.unpack_from("<I", data, 80)[0] if len(data) >= 84 else 0
     if len(data) >= 84 and len(data) == 84 + STL_TRIANGLE.itemsize * count:
         corners = np.frombuffer(data, STL_TRIANGLE, offset=84)["corners"].reshape(-1, 3)
@@ -426,7 +481,7 @@ def _read_by_trimesh(path: Path) -> Mesh:
     """OBJ and GLB, by trimesh. Any exception of its parsers means an invalid file."""
     import trimesh
 
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         try:
             scene = trimesh.load_scene(
                 file, file_type=path.suffix.lower()[1:], process=False, skip_materials=True

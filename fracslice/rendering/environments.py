@@ -5,18 +5,29 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
 from ..common.arrays import to_linear
+from ..common.files import open_regular
 from ..errors import SceneError
 
 _SIZE = re.compile(rb"-Y (\d{1,6}) \+X (\d{1,6})")
 FORMATS = "a .hdr, .exr, .png, .jpg or .webp file"
+LARGEST, BAND = 1 << 26, 1 << 20
+"""Most pixels of a file, and pixels that are in memory as light at once."""
+
+Rows = tuple[int, int, Callable[[int, int], np.ndarray]]
+"""Height and width of a picture, and a function of its rows from one to another, called in their order:
+float32 (rows, width, 3), linear light.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,10 +47,8 @@ class LinearImage:
 
         `most`: maximum number of pixels. Returns float32 (height, width, 3).
         """
-        light = self.light
-        while light.shape[0] * light.shape[1] > most:
-            light = _halve(light)
-        return light
+        height, width, _ = self.light.shape
+        return _shrunk(self.light, _halvings(height, width, most))
 
 
 def load_picture(path: str, most: int, fail: Callable[[str], SceneError]) -> LinearImage:
@@ -62,12 +71,35 @@ def load_picture(path: str, most: int, fail: Callable[[str], SceneError]) -> Lin
 @lru_cache(maxsize=4)
 def _load_image(path: str, most: int, _: tuple[int, int]) -> LinearImage:
     kinds = {".hdr": radiance, ".exr": _openexr}
-    light = np.asarray(kinds.get(Path(path).suffix.lower(), _display_picture)(path), np.float32)
-    if not np.isfinite(light).all():
-        raise ValueError("it holds values that are not finite")
-    light = LinearImage(np.maximum(light, 0)).within(most)
+    with open_regular(path) as file, warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of Pillow: what is wrong is an error here
+        height, width, rows = kinds.get(Path(path).suffix.lower(), _display_picture)(file)
+        if not 0 < height * width <= LARGEST:
+            raise ValueError(f"{width} x {height} pixels: expected at most {LARGEST} of them")
+        times = _halvings(height, width, most)
+        step = max(BAND // width >> times, 1) << times
+        bands = [_shrunk(rows(y, min(y + step, height)), times) for y in range(0, height, step)]
+    light = np.concatenate(bands)
     light.flags.writeable = False
     return LinearImage(light)
+
+
+def _halvings(height: int, width: int, most: int) -> int:
+    """How often a picture is halved until it has at most so many pixels."""
+    times = 0
+    while -(-height >> times) * -(-width >> times) > most:
+        times += 1
+    return times
+
+
+def _shrunk(light: np.ndarray, times: int) -> np.ndarray:
+    """Rows of a picture, halved."""
+    if not np.isfinite(light).all():
+        raise ValueError("it holds values that are not finite")
+    light = np.maximum(light, 0)
+    for _ in range(times):
+        light = _halve(light)
+    return light
 
 
 def _halve(light: np.ndarray) -> np.ndarray:
@@ -77,48 +109,75 @@ def _halve(light: np.ndarray) -> np.ndarray:
     return np.asarray((rows[:, ::2] + rows[:, 1::2]) * np.float32(0.5))
 
 
-def _display_picture(path: str) -> np.ndarray:
+def _display_picture(file: BinaryIO) -> Rows:
     """Picture for screens, by Pillow."""
     from PIL import Image
 
+    levels = to_linear(np.arange(256, dtype=np.float32) / np.float32(255))
     try:
-        with Image.open(path) as image:
-            shown = np.asarray(image.convert("RGB"), np.float32) / np.float32(255)
+        image = Image.open(file, formats=("PNG", "JPEG", "WEBP"))
     except Image.DecompressionBombError as error:
         raise ValueError(str(error)) from None
-    return to_linear(shown)
+    width, height = image.size
+    return height, width, lambda y, end: levels[np.asarray(image.crop((0, y, width, end)).convert("RGB"))]
 
 
-def _openexr(path: str) -> np.ndarray:
+def _openexr(file: BinaryIO) -> Rows:
     """OpenEXR file: its red, green and blue, or its only channel for all three."""
+    import Imath
     import OpenEXR
 
-    with OpenEXR.File(path, separate_channels=True) as file:
-        channels = file.channels()
-        names = ("R", "G", "B") if "R" in channels else ("Y",) * 3
-        if names[0] not in channels or names[2] not in channels:
-            raise ValueError(f"its channels are {', '.join(channels)}: expected R, G and B")
-        return np.stack([np.asarray(channels[name].pixels, np.float32) for name in names], -1)
+    with _silent_stderr():
+        picture = OpenEXR.InputFile(file.name)
+    header, kind = picture.header(), Imath.PixelType(Imath.PixelType.FLOAT)
+    channels, window = header["channels"], header["dataWindow"]
+    names = ["R", "G", "B"] if "R" in channels else ["Y"]
+    if not channels.keys() >= set(names):
+        raise ValueError(f"its channels are {', '.join(channels)}: expected R, G and B")
+    first, width = window.min.y, window.max.x - window.min.x + 1
+
+    def rows(y: int, end: int) -> np.ndarray:
+        with _silent_stderr():
+            values = picture.channels(names, kind, first + y, first + end - 1)
+        levels = [np.frombuffer(value, np.float32).reshape(end - y, width) for value in values]
+        return np.stack(levels * (3 // len(levels)), -1)
+
+    return window.max.y - first + 1, width, rows
 
 
-def radiance(path: str) -> np.ndarray:
-    """Read a Radiance picture (Ward 1991, "Real Pixels"): mantissas of 8 bits with a common exponent.
+@contextmanager
+def _silent_stderr() -> Iterator[None]:
+    """Keep off stderr what OpenEXR prints besides its exceptions."""
+    kept = os.dup(2)
+    try:
+        with open(os.devnull, "wb") as nowhere:
+            os.dup2(nowhere.fileno(), 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
 
-    Returns float32 (height, width, 3).
-    """
-    data = Path(path).read_bytes()
+
+def radiance(file: BinaryIO) -> Rows:
+    """Read a Radiance picture (Ward 1991, "Real Pixels"): mantissas of 8 bits with a common exponent."""
+    data = file.read()
     header, end, rest = data.partition(b"\n\n")
     size, _, pixels = rest.partition(b"\n")
     match = _SIZE.fullmatch(size.strip())
     if not (data.startswith(b"#?") and end and b"32-bit_rle_rgbe" in header and match):
         raise ValueError("no Radiance picture of red, green and blue, from the upper left")
     height, width = map(int, match.groups())
-    levels = np.empty((height, width, 4), np.uint8)
     place = 0
-    for row in levels:
-        place = _scanline(pixels, place, row)
-    scale = np.ldexp(np.float32(1), levels[..., 3:].astype(np.int32) - 136)
-    return np.asarray(levels[..., :3] * np.where(levels[..., 3:] > 0, scale, 0), np.float32)
+
+    def rows(y: int, end: int) -> np.ndarray:
+        nonlocal place
+        levels = np.empty((end - y, width, 4), np.uint8)
+        for row in levels:
+            place = _scanline(pixels, place, row)
+        scale = np.ldexp(np.float32(1), levels[..., 3:].astype(np.int32) - 136)
+        return np.asarray(levels[..., :3] * np.where(levels[..., 3:] > 0, scale, 0), np.float32)
+
+    return height, width, rows
 
 
 def _scanline(data: bytes, place: int, row: np.ndarray) -> int:

@@ -13,10 +13,12 @@ from pathlib import Path
 from typing import Any
 from xml.parsers import expat
 
+from ..common.files import open_regular
 from ..common.messages import hint
 from ..common.parameters import REQUIRED, File, Parameter, printable
 from ..errors import SceneError
 from ..formulas import Node
+from ..formulas.definitions import Defined
 from ..formulas.registry import DEEPEST, TOO_DEEP
 from ..records import Part, Print
 from .animation import Animation, Track
@@ -36,7 +38,10 @@ from .layout import (
 from .model import Scene, computing, scene
 from .view import View
 
-LARGEST_FILE = 16 << 20
+LARGEST_FILE, MOST_ELEMENTS, MOST_DEFINED = 16 << 20, 1 << 17, 100
+"""Most bytes and elements of a scene, and most definitions, or parameters of one."""
+LONGEST_TEXT = 1 << 16
+"""Most characters of a definition with its indentation."""
 UNIT = "1mm"
 """Length of a scene unit where neither it nor the size is given, as for a shape in Python."""
 
@@ -64,7 +69,7 @@ def read(path: str | os.PathLike[str]) -> Scene:
     """
     source = os.fspath(path)
     try:
-        with open(source, "rb") as file:
+        with open_regular(source) as file:
             data = file.read(LARGEST_FILE + 1)
     except OSError as error:
         raise SceneError(f"{source}: {error.strerror or error}") from None
@@ -101,6 +106,9 @@ def _scene(data: bytes, source: str, name: str) -> Scene:
         raise SceneError(f"{source}: expected a scene of at most {LARGEST_FILE >> 20} MB")
     if not data.strip():
         raise SceneError(f"{source}: expected a scene, the file is empty")
+    tags = data.replace(b"\0", b"")  # of UTF-16
+    if tags.count(b"<") - tags.count(b"</") > MOST_ELEMENTS:
+        raise SceneError(f"{source}: expected a scene of at most {MOST_ELEMENTS} elements")
     builder = _Builder(source)
     solid = builder.sections(data)[SOLID.name]
     others = (Print, Animation, Track)
@@ -126,6 +134,7 @@ class _Open:
     children: list[Node] = field(default_factory=list)
     declared: list[tuple[str, Parameter]] = field(default_factory=list)
     lines: dict[int, str] = field(default_factory=dict)
+    characters: int = 0
 
     def fail(self, message: str) -> SceneError:
         """The error to raise about this element."""
@@ -232,6 +241,8 @@ class _Builder:
         section = closed.element
         if section is PARAMETER:
             self.open[-1].declared.append(parameter(closed.values, closed.fail))
+            if len(self.open[-1].declared) > MOST_DEFINED:
+                raise closed.fail(f"expected at most {MOST_DEFINED} of them in a definition")
         elif section is DEFINE:
             self.define(closed)
         elif isinstance(section, TopElement) and section.part:
@@ -247,6 +258,8 @@ class _Builder:
 
     def define(self, closed: _Open) -> None:
         """Add the formula of a definition."""
+        if sum(isinstance(formula, Defined) for formula in self.formulas.values()) == MOST_DEFINED:
+            raise closed.fail(f"expected at most {MOST_DEFINED} definitions in a scene")
         made = make_definition(closed.values, closed.declared, closed.lines, self.source)
         if made.name in self.formulas:
             raise closed.fail(f"name={_quote(made.name)}: expected one definition of this name")
@@ -254,13 +267,17 @@ class _Builder:
 
     def text(self, text: str) -> None:
         """Keep the lines of a definition; refuse other text than white space elsewhere."""
-        if self.open[-1].element is DEFINE:
+        opened = self.open[-1]
+        if opened.element is DEFINE:
             line = self.parser.CurrentLineNumber
-            before = self.open[-1].lines.get(line, " " * self.parser.CurrentColumnNumber)
-            self.open[-1].lines[line] = before + text.rstrip("\n")
+            before = opened.lines.get(line, " " * self.parser.CurrentColumnNumber)
+            opened.lines[line] = before + text.rstrip("\n")
+            opened.characters += len(text)
+            if opened.characters > LONGEST_TEXT:
+                raise opened.fail(f"has a text of more than {LONGEST_TEXT} characters")
         elif text.strip():
             shown = " ".join(text.split())[:40]
-            raise self.open[-1].fail(f"holds the text {shown!r}: expected elements only")
+            raise opened.fail(f"holds the text {shown!r}: expected elements only")
 
 
 def _value(opened: _Open, attribute: str, text: str) -> Any:

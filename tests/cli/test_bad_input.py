@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import errno
 import os
+import signal
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -191,6 +193,37 @@ def test_a_full_disk(folder, capfd, monkeypatch):
     monkeypatch.setattr("os.fsync", full)
     line = refused(capfd, folder, "mesh", "ball.xml", "-o", "out/x.stl", "--resolution", "16")
     assert line == "out/x.stl: the disk is full; the file was not written"
+
+
+@pytest.mark.parametrize("ending", ["xml", "stl", "3mf", "ply", "obj", "glb"])
+def test_a_pipe(ending, folder, capfd):
+    os.mkfifo(folder / f"pipe.{ending}")
+    line = refused(capfd, folder, "check", f"pipe.{ending}")
+    assert line == f"pipe.{ending}: expected a file, found a pipe or a device"
+
+
+@pytest.mark.parametrize(
+    ("number", "reader", "name"),
+    [
+        (signal.SIGINT, "fracslice.mesh.reading.read_mesh", "ball.stl"),
+        (signal.SIGTERM, "fracslice.mesh.reading.read_mesh", "ball.stl"),
+        (signal.SIGTERM, "fracslice.scene.read", "ball.xml"),
+    ],
+)
+def test_the_first_signal_ends_reading(number, reader, name, folder, capfd, monkeypatch):
+    def reading(_: object) -> None:
+        signal.raise_signal(number)
+        pytest.fail("it goes on")
+
+    def going_on(_: object) -> None:
+        with suppress(BaseException):
+            signal.raise_signal(number)
+
+    monkeypatch.chdir(folder)
+    for read in (reading, going_on):
+        monkeypatch.setattr(reader, read)
+        assert run(["check", name]) == 128 + number
+        assert capfd.readouterr().err == "fracslice: stopped; nothing was written\n"
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")

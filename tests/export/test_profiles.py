@@ -179,12 +179,33 @@ def test_a_resin_of_ones_own(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["mine.toml", "mine.ini"])
 def test_a_file_that_may_not_be_read(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    def read_text(*_: object, **__: object) -> str:
+    def refused(*_: object) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(Path, "read_text", read_text)
+    monkeypatch.setattr("fracslice.common.settings.open_regular", refused)
     with pytest.raises(ExportError, match=rf"^{name}: Permission denied$"):
         resin(name, None, 0.05)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("exposure = " + "9" * 10**5, "expected at most 16 kB of settings"),
+        ("exposure = " + "9" * 10**4, "not a TOML file: "),
+        ("exposure = " + "[" * 10**4, "expected at most 8 tables and arrays within each other"),
+        (f"exposure = {'[' * 20}1{']' * 20}", "expected at most 8 tables and arrays within each other"),
+        (".".join("a" * 2000) + " = 1", "expected at most 8 tables and arrays within each other"),
+    ],
+)
+def test_hostile_settings_are_one_line(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    for read, error in (
+        (lambda: resin(str(path), None, 0.05), ExportError),
+        (lambda: printer(str(path)), SliceError),
+    ):
+        with pytest.raises(error, match=f"^{path}: {message}"):
+            read()
 
 
 def test_a_resin_profile_of_prusaslicer(tmp_path: Path) -> None:

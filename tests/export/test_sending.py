@@ -5,10 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+import socket
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 
@@ -210,6 +211,20 @@ def test_cancellation_ends_a_wait_for_the_printer(job: Path) -> None:
     threading.Timer(0.2, work.cancel.set).start()
     with printer(hostile) as (port, _), pytest.raises(Cancelled):
         sending.send(job, f"sdcp://127.0.0.1:{port}", work)
+
+
+def test_cancellation_ends_a_wait_for_a_connection(job: Path) -> None:
+    with ExitStack() as stack:
+        busy, work = stack.enter_context(socket.create_server(("127.0.0.1", 0), backlog=0)), Work()
+        for _ in range(3):  # fill the queue of the server, which accepts nothing
+            waiting = stack.enter_context(socket.socket())
+            waiting.setblocking(False)
+            waiting.connect_ex(busy.getsockname())
+        threading.Timer(0.2, work.cancel.set).start()
+        began = time.monotonic()
+        with pytest.raises(Cancelled):
+            sending.send(job, f"sdcp://127.0.0.1:{busy.getsockname()[1]}", work)
+    assert time.monotonic() - began < 5
 
 
 def test_slice_sends_with_the_flag_only(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import struct
+import time
 import zipfile
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import pytest
 
 from fracslice.errors import MeshError
 from fracslice.export import write
+from fracslice.mesh import Mesh
 from fracslice.mesh.checks import check_mesh
 from fracslice.mesh.reading import read_mesh
 
@@ -135,11 +137,24 @@ TENFOLD, CHAIN = (
         (second(TWICE.replace('v3="1"', f'v3="{10**20}"')), "not a valid 3MF"),
         (second(TWICE.replace('y="3"', 'y="1e999"')), "coordinate is not a finite number"),
         ({"build": '<item objectid="1" transform="nan 0 0 0 1 0 0 0 1 0 0 0"/>'}, "not of finite numbers"),
-        ({"more": TENFOLD, "build": '<item objectid="11"/>'}, "more than 268435456 triangles and parts"),
+        (
+            {"more": TENFOLD, "build": '<item objectid="11"/>'},
+            "more than 2097152 vertices, triangles and parts",
+        ),
         (
             {"more": CHAIN, "build": "".join(f'<item objectid="{k}"/>' for k in range(1, 99))},
             "no such object",
         ),
+        ({"build": '<item objectid="1"/>' * (1 << 16)}, "more than 65536 objects and parts"),
+        (
+            {
+                "more": INNER.format(2, '<component objectid="1"/>' * 400)
+                + INNER.format(3, '<component objectid="2"/>' * 400),
+                "build": '<item objectid="3"/>',
+            },
+            "more than 2097152 vertices, triangles and parts",
+        ),
+        ({"more": f"<object{' ' * (3 << 20)}/>"}, "a tag of more than 1 MB"),
         ({"more": "<object>"}, "not a .*3MF"),
         ({"head": '<!DOCTYPE m [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;&a;">]>'}, "document type"),
     ],
@@ -148,6 +163,53 @@ def test_3mf_that_is_wrong(tmp_path: Path, change: dict[str, str], words: str) -
     with pytest.raises(MeshError, match=words) as failure:
         read_mesh(box(tmp_path / "wrong.3mf", **change))
     assert "\n" not in str(failure.value)
+
+
+def test_components_are_expanded_once(tmp_path: Path) -> None:
+    beside = '<component objectid="{0}"/><component objectid="{0}" transform="1 0 0 0 1 0 0 0 1 {1} 0 0"/>'
+    more = "".join(INNER.format(k, beside.format(k - 1, 20 << k)) for k in range(2, 17))
+    began = time.process_time()
+    mesh = read_mesh(box(tmp_path / "many.3mf", more=more, build='<item objectid="16"/>'))
+    assert len(mesh.triangles) == 12 << 15
+    assert time.process_time() - began < 2
+
+
+def fan(corners: int) -> Mesh:
+    """A polygon as a fan of triangles."""
+    k, turn = np.arange(corners, dtype=np.int32), 2 * np.pi * np.arange(corners) / corners
+    points = np.stack([np.cos(turn), np.sin(turn), 0 * turn], 1)
+    return Mesh(points, np.stack([0 * k[2:], k[1:-1], k[2:]], 1))
+
+
+@pytest.mark.parametrize("ending", [".stl", ".3mf", ".ply", ".obj"])
+def test_a_vertex_of_too_many_triangles(tmp_path: Path, ending: str) -> None:
+    path = tmp_path / f"fan{ending}"
+    write(fan(8194), path)
+    assert len(read_mesh(path).triangles) == 8192
+    write(fan(8195), path)
+    with pytest.raises(MeshError, match="8193 corners of triangles meet at a vertex: expected at most 8192"):
+        read_mesh(path)
+
+
+@pytest.mark.parametrize("kind", ["ascii", "binary_little_endian"])
+def test_ply_with_lists_in_place_of_coordinates(tmp_path: Path, kind: str) -> None:
+    head = (
+        f"ply\nformat {kind} 1.0\nelement vertex 3\nproperty list uchar float x\nproperty float y\n"
+        "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    rows = [("Bffff", 2, k, 0, k, k * k) for k in range(3)] + [("Biii", 3, 0, 1, 2)]
+    text = "".join(" ".join(map(str, row[1:])) + "\n" for row in rows).encode()
+    binary = b"".join(struct.pack(f"<{row[0]}", *row[1:]) for row in rows)
+    (tmp_path / "list.ply").write_bytes(head.encode() + (text if kind == "ascii" else binary))
+    with pytest.raises(MeshError, match="not a whole PLY file"):
+        read_mesh(tmp_path / "list.ply")
+
+
+def test_numpy_says_nothing_of_numbers_that_are_refused(tmp_path: Path, recwarn) -> None:  # type: ignore[no-untyped-def]
+    (tmp_path / "far.obj").write_text("v 1e300 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    with pytest.raises(MeshError, match="not a finite number"):
+        read_mesh(tmp_path / "far.obj")
+    assert not recwarn.list
 
 
 def ascii_stl(path: Path) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 from PIL import Image
 
 from fracslice.errors import SceneError
+from fracslice.export.images import write_image
 from fracslice.formulas import Node, material, plane, sphere
 from fracslice.rendering import Pass, Renderer, lighting
 from fracslice.rendering.environments import Environment, LinearImage, load_picture
@@ -91,6 +93,43 @@ def test_radiance_pictures_are_read(tmp_path: Path, packed: bool) -> None:
     assert load_picture(path, 1000, fail) is load_picture(path, 1000, fail)
     assert load_picture(path, 30, fail).light.shape == (1, 10, 3)
     assert load_picture(path, 30, fail).light.mean() == pytest.approx(light.mean(), rel=0.5)
+
+
+HEAD = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n"
+
+
+def test_hostile_pictures_are_one_line(tmp_path: Path, recwarn, capfd) -> None:  # type: ignore[no-untyped-def]
+    (tmp_path / "none.hdr").write_bytes(HEAD + b"-Y 0 +X 0\n")
+    (tmp_path / "thin.hdr").write_bytes(HEAD + b"-Y 4 +X 0\n")
+    (tmp_path / "huge.hdr").write_bytes(HEAD + b"-Y 999999 +X 999999\n\2\2\0\0")
+    Image.new("1", (10_000, 10_000)).save(tmp_path / "large.png")
+    write_image(tmp_path / "cut.exr", light := sky(), light)
+    data = (tmp_path / "cut.exr").read_bytes()
+    (tmp_path / "cut.exr").write_bytes(data[: len(data) * 2 // 3])
+    os.mkfifo(tmp_path / "pipe.png")
+    os.mkfifo(tmp_path / "pipe.exr")
+    for name, message in (
+        ("none.hdr", "0 x 0 pixels"),
+        ("thin.hdr", "0 x 4 pixels"),
+        ("huge.hdr", "999999 x 999999 pixels: expected at most 67108864"),
+        ("large.png", "10000 x 10000 pixels: expected at most 67108864"),
+        ("cut.exr", "not a picture"),
+        ("pipe.png", "expected a file, found a pipe"),
+        ("pipe.exr", "expected a file, found a pipe"),
+    ):
+        with pytest.raises(SceneError, match=f"{name}.*: {message}.*; expected a .hdr"):
+            load_picture(str(tmp_path / name), 1000, fail)
+    assert not recwarn.list
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("size", [(1001, 1100), (37, 30_001)])
+def test_bands_of_a_picture_are_halved_as_the_whole(tmp_path: Path, size: tuple[int, int]) -> None:
+    light = np.random.default_rng(2).random((*size, 3), np.float32)
+    write_image(tmp_path / "a.exr", light, light)
+    for most in (1 << 22, 1 << 16, 50):
+        read = load_picture(str(tmp_path / "a.exr"), most, fail).light
+        assert np.array_equal(read, LinearImage(light).within(most))
 
 
 def test_a_picture_that_cannot_be_read_is_named(tmp_path: Path) -> None:

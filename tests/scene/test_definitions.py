@@ -147,6 +147,9 @@ HOSTILE = [
     "while 1:\n    w = w\nreturn w",
     "for k in range(1000000000):\n    w = 2 * w\nreturn w",
     "for a in range(99):\n    for b in range(99):\n        w = 2 * w\nreturn w",
+    "for a in range(600):\n  for b in range(600):\n    for k in range(600):\n      w = w\nreturn w",
+    "".join(f"{'  ' * k}for {'abdefgh'[k]} in (1, 2, 3, 4, 5, 6, 7, 8, 9):\n" for k in range(7))
+    + f"{'  ' * 7}w = w\nreturn w",
     "for k in w:\n    w = w\nreturn w",
     "x, y, z = w\nx = (((x**16)**16)**16)**16\nreturn (x, y, z) + c",
     "return 9**9**9**9 * w",
@@ -255,6 +258,22 @@ def test_what_is_accepted_compiles(text: str) -> None:
     except SceneError:
         return
     assert compile_scene(root.changed(iterations=2)).points(*np.ones((3, 4))).shape == (4,)
+
+
+@pytest.mark.parametrize(
+    ("inside", "message"),
+    [
+        ("<define name='own'>" + "&lt;" * 70_000 + "</define>", "a text of more than 65536 characters"),
+        ("".join(f"<define name='a{k}'>return 2 * w + c</define>" for k in range(101)), "100 definitions"),
+        (
+            "<define name='own'>" + "".join(f"<parameter name='a{k}' default='1'/>" for k in range(101)),
+            "at most 100 of them in a definition",
+        ),
+    ],
+)
+def test_definitions_have_an_end(inside: str, message: str) -> None:
+    with pytest.raises(SceneError, match=f"scene:1: <.*{message}"):
+        reads(f'<scene version="1">{inside}<solid size="1cm"><sphere/></solid></scene>')
 
 
 def test_a_shipped_scene_defines_its_formula() -> None:

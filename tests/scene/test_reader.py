@@ -209,6 +209,15 @@ def test_files_that_cannot_be_read(tmp_path):
             read(path)
 
 
+@pytest.mark.parametrize(("count", "encoding"), [(10**6, "utf-8"), (10**5 * 5, "utf-16")])
+def test_a_scene_of_a_million_shapes_is_refused_before_one_is_made(count, encoding):
+    data = around(f"<union>{'<sphere/>' * count}</union>").encode(encoding)
+    began = time.process_time()
+    with pytest.raises(SceneError, match="at most 131072 elements"):
+        reads(data)
+    assert time.process_time() - began < 1
+
+
 @pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="root may read everything")
 def test_a_file_without_permission(tmp_path):
     path = tmp_path / "secret.xml"
