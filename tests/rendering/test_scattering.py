@@ -155,6 +155,15 @@ def test_rays_to_glowing_bodies_change_no_mean(rough: float, monkeypatch: pytest
     assert means[0] == pytest.approx(means[1], rel=0.01)
 
 
+def test_a_sun_in_rough_metal_leaves_no_sparks_on_a_floor() -> None:
+    """A scattered ray hardly ever meets its sharp reflection: single pixels had 8 times the floor's light."""
+    metal = material(sphere(radius=0.6), colour=WHITE, metallic=1, roughness=0.15) + (0, 0, 0.9)
+    camera = Camera(eye=(0, -3, 2), target=(-0.6, -0.9, 0), fov=12)
+    lights, shading = (Light(position=(-1, -2, 2.5), size=8),), Shading(paths="yes", bounces=1)
+    light = seen(metal | FLOOR, shading, 256, camera, lights=lights).mean(1)
+    assert light.max() < 1.6 * np.median(light)
+
+
 def test_bodies_have_boxes_where_they_are() -> None:
     lamp = material(sphere(radius=0.5), glow=2, colour=WHITE)
     (body,) = glowing_bodies(transform(lamp | box(), translate=(3, 0, 0)) | FLOOR)

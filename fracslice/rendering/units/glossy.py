@@ -16,6 +16,10 @@ SMOOTHEST = 1e-3
 """Smallest square of the roughness."""
 CELLS = 15.0
 """Cells along each side of the table of `lost`."""
+WIDE = 2.0
+"""Density of a direction below which a ray was scattered widely."""
+DULL = 0.5
+"""Least roughness of surfaces that such a ray meets."""
 LACQUER = 0.1
 """Roughness with which a lacquer reflects a light; what it mirrors is sharp."""
 
@@ -78,6 +82,18 @@ def glossy(dx, dy, dz, nx, ny, nz, rough, u, v):
     seen = 1.0 + hidden(vz, a)
     weight = where(nl > 0.0, seen / (seen + hidden(nl, a)), 0.0)
     return ex, ey, ez, weight, -(dx * hx + dy * hy + dz * hz)
+
+
+def dulled(rough, q):
+    """Return the roughness of a surface to a ray.
+
+    A ray that was scattered widely hardly ever meets a light in a sharp reflection, and is far too bright
+    then: the reflection is widened (Kaplanyan and Dachsbacher 2013, "Path Space Regularization").
+
+    `q`: density of the ray's direction.
+    """
+    wide = (q > 0.0) & (q < WIDE) & (rough > 0.0)
+    return where(wide, maximum(rough, DULL), rough)
 
 
 def lost(cosine, rough, table, P):
