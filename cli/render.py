@@ -120,7 +120,9 @@ class RenderOptions(ClusterOptions, SceneOptions):
     layers: bool = flag("Add depth, normal, position, albedo and samples to the .exr file.")
     denoise: bool = flag("Remove the noise that is left.")
     device: str = DEVICE
-    limit: float | None = option(DURATION, "Stop after this time: 10s, 2min or 1h.", "--time")
+    limit: float | None = option(
+        DURATION, "Stop after this time, denoising included: 10s, 2min or 1h.", "--time"
+    )
     bits: str = option(click.Choice(["8", "16"]), "Bits per channel of a PNG; 8 by default.", default="8")
     pass_images: str | None = option(Name("DIR"), "Write the picture of every pass there.")
     state: str | None = option(
@@ -158,11 +160,19 @@ def render(given: RenderOptions) -> None:
         device = for_picture(given.device, given.crop[2:] if given.crop else film, samples)
         renderer = Renderer(scene.root, scene.view, given.size, work, device, sequence, given.crop)
         aside = None if pool is None or given.state else pool.pieces.path(f"{renderer.key}.npz")
-        render_passes(renderer, scene, given.but(state=given.state or aside), work)
-        if pool and not pool.first:
-            raise SharedError("the samples are made; shard 1 writes the file")
-        more = layers(renderer) if given.layers else None
-        done = without_noise(renderer) if given.denoise else renderer.seen()
+        try:
+            guides, limit = plan_denoising(renderer, given)
+            render_passes(renderer, scene, given.but(state=given.state or aside, limit=limit), work)
+            if pool and not pool.first:
+                raise SharedError("the samples are made; shard 1 writes the file")
+            more = layers(renderer) if given.layers else None
+            done = without_noise(renderer, guides) if given.denoise else renderer.seen()
+        except Cancelled:
+            kept = renderer.seen()
+            if not kept.samples or (pool and not pool.first):
+                raise
+            save(given.output, kept, scene, given.bits, given.threads)
+            raise KeptError(describe_picture(given.output, renderer, kept)) from None
         save(given.output, done, scene, given.bits, given.threads, more)
     if pool and aside:
         Path(aside).unlink(missing_ok=True)
@@ -204,7 +214,7 @@ def in_bands(given: RenderOptions, scene: Scene, film: tuple[int, int], rows: in
 
 
 def render_passes(renderer: Renderer, scene: Scene, given: RenderOptions, work: Work) -> None:
-    """Render pass after pass, from --state and into it; a cancelled picture is written as it is."""
+    """Render pass after pass, from --state and into it."""
     state, first, samples = given.state, work.cluster is None or work.cluster.first, given.samples
     if state and Path(state).exists():
         renderer.resume(state)
@@ -221,13 +231,9 @@ def render_passes(renderer: Renderer, scene: Scene, given: RenderOptions, work: 
         if given.limit and state and first:
             save_state(renderer, state)  # of a pass that the limit interrupted
     except Cancelled:
-        kept = renderer.seen()
-        if not first or not kept.samples:
-            raise
-        if state:
+        if state and first and renderer.seen().samples:
             save_state(renderer, state)
-        save(given.output, kept, scene, given.bits, given.threads)
-        raise KeptError(describe_picture(given.output, renderer, kept)) from None
+        raise
 
 
 def show_passes(passes: Iterator[Pass], renderer: Renderer, name: str) -> Iterator[Pass]:
@@ -237,13 +243,30 @@ def show_passes(passes: Iterator[Pass], renderer: Renderer, name: str) -> Iterat
     return previewed(passes, f"fracslice  {name}", (renderer.width, renderer.height))
 
 
-def without_noise(renderer: Renderer) -> Pass:
+def plan_denoising(renderer: Renderer, given: RenderOptions) -> tuple[list[np.ndarray] | None, float | None]:
+    """Guides of --denoise where --time is limited, and the time that is left for the passes, seconds.
+
+    Removing noise takes as long from an empty picture as from the one at the end.
+    """
+    if not given.denoise or given.limit is None:
+        return None, given.limit
+    from fracslice.rendering.denoising import denoise, guides
+
+    start = time.monotonic()
+    made = guides(renderer)
+    guided = time.monotonic()
+    denoise(renderer, made)
+    taken = time.monotonic() - start + (time.monotonic() - guided)
+    return made, max(given.limit - taken, given.limit / 10)
+
+
+def without_noise(renderer: Renderer, guides: list[np.ndarray] | None) -> Pass:
     """Picture of a renderer without noise; note if Open Image Denoise is not installed."""
     from fracslice.rendering.denoising import advice, denoise
 
     if missing := advice():
         click.echo(f"--denoise: {missing}", err=True)
-    return denoise(renderer)
+    return denoise(renderer, guides)
 
 
 def limit_time(renderer: Renderer, samples: int | None, limit: float | None) -> Iterator[Pass]:

@@ -75,7 +75,7 @@ def tile(P, Q, S, pixels, A, width, limit, blocks, frame):
                 sample(whole(Q[q, first + d]), place, first + d) for d in range(frame.bounce_samples)
             )
             last = real(1.0) if bounce == frame.bounces else real(0.0)
-            light, onward = surface(x, y, z, dx, dy, dz, t, path, steps, side, last, chance, P)
+            light, onward = surface(x, y, z, dx, dy, dz, t, path, steps, side, last, dense, chance, P)
             hr, hg, hb = light
             r, g, b = r + tr * hr, g + tg * hg, b + tb * hb
             if not frame.bounces:

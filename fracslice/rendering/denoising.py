@@ -28,11 +28,19 @@ def advice() -> str:
     return lacking("pyoidn", "by non-local means; Open Image Denoise, which leaves less noise, needs")
 
 
-def denoise(renderer: Renderer) -> Pass:
-    """Remove the noise of a renderer's picture, by Open Image Denoise or else by non-local means."""
+def guides(renderer: Renderer) -> list[np.ndarray]:
+    """Render what guides `denoise`: colours without light and normals, float32 (height, width, 3) each."""
+    return [layer(renderer, mode) for mode in GUIDES]
+
+
+def denoise(renderer: Renderer, known: list[np.ndarray] | None = None) -> Pass:
+    """Remove the noise of a renderer's picture, by Open Image Denoise or else by non-local means.
+
+    `known`: the picture's `guides`, if they were made before.
+    """
     done, host, cut = renderer.seen(), renderer.accumulator.host(), renderer.crop.within
     mean = done.mean
-    albedo, normal = (layer(renderer, mode) for mode in GUIDES)
+    albedo, normal = known or guides(renderer)
     light = np.ascontiguousarray(mean[..., :3])
     if not advice():
         import pyoidn

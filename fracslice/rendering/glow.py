@@ -95,8 +95,11 @@ def density(name: str, to: str) -> str:
     return f"{name} = mixed_density(sent, {beside}, nx, ny, nz, dx, dy, dz, {ray}, roughness, share)"
 
 
-def scatter_lines(linker: Linker, drawn: Drawn, u: str, v: str, choice: str) -> list[str]:
-    """Return the lines that choose between a reflected ray, a scattered one and one to a body."""
+def scatter_lines(linker: Linker, drawn: Drawn, u: str, v: str, choice: str, facets: str) -> list[str]:
+    """Return the lines that choose between a reflected ray, a scattered one and one to a body.
+
+    `facets`: reflectance of microfacets; the colour is left open.
+    """
     linker.share(highlight)
     (w,) = drawn.names(1)
     lines = [
@@ -112,7 +115,7 @@ def scatter_lines(linker: Linker, drawn: Drawn, u: str, v: str, choice: str) -> 
     ]
     for c in CHANNELS:
         lines += [
-            f"shine = where(roughness > 0.0, spot * tinted(half, k{c}), 0.0)",
+            f"shine = where(roughness > 0.0, spot * {facets.format(c)}, 0.0)",
             f"t{c} = where(sharp > 0.5, t{c} / maximum(share * (1.0 - sent), 1e-6), "
             f"(c{c} * cosine + shine) / ({math.pi} * maximum(eq, 1e-9)))",
         ]

@@ -278,7 +278,7 @@ class Lighting:
         if look.glossy:
             self.linker.share(highlight)
             lines.append("spot, half = highlight(nx, ny, nz, dx, dy, dz, lx, ly, lz, roughness)")
-            shine = "where(roughness > 0.0, spot * tinted(half, k{0}), gloss)"
+            shine = f"where(roughness > 0.0, spot * {look.facets}, gloss)"
         if self.weighted and seen_as_disc(light):
             self.around.bind_sun(k, light)
             lines += [f"dense = sun_density{k}(lx, ly, lz, P)", *self.weights(look)]
@@ -342,7 +342,7 @@ class Lighting:
             "spot, half = highlight(nx, ny, nz, dx, dy, dz, lx, ly, lz, roughness)",
             *self.weights(look),
         ]
-        shine = "where(roughness > 0.0, reflected * spot * tinted(half, k{0}), 0.0)"
+        shine = f"where(roughness > 0.0, reflected * spot * {look.facets}, 0.0)"
         return lines + [
             f"{c} = {c} + power * h{c} * (scattered * diffuse * c{c} + {shine.format(c)})" for c in "rgb"
         ]

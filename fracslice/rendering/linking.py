@@ -23,7 +23,7 @@ from .materials import Look, text_of
 from .scattering import onward
 from .setup import Optics, footprint, ray_bound
 from .units import camera as units
-from .units import march
+from .units import glossy, march
 from .units.intrinsics import GIVEN, surface
 from .units.march import normal
 
@@ -225,7 +225,11 @@ class _Frame:
             width = "sharp_width(h, P)" if self.inside and mode == "light" else "h"
             lines.append(f"nx, ny, nz = normal(x, y, z, {width}, P)")
         if mode == "light":
-            lines += look.lines() + self.lighting.lines(look)
+            lines += look.lines()
+            if look.rough and self.lighting.weighted:
+                self.linker.share(glossy.dulled)
+                lines.append("roughness = dulled(roughness, q)")
+            lines += self.lighting.lines(look)
             if self.bounces:
                 lines += onward(self.linker, self.drawn, look, self.lighting.weighted)
             if look.coated:

@@ -285,9 +285,14 @@ class Look:
         self.glows = any(n["glow"] for n in self.all)
         self.bodies = glowing_bodies(self.root) if self.paths else []
         self.inside = any(n["clear"] for n in self.all)
-        rough = any(n["roughness"] or n["vary"] or n["metallic"] for n in self.all)
-        self.glossy = self.paths or self.coated or rough
+        self.rough = any(n["roughness"] or n["vary"] for n in self.all)
+        self.glossy = self.paths or self.coated or self.rough or any(n["metallic"] for n in self.all)
         self.bounces = self.inside or self.glossy or any(n["reflect"] for n in self.all)
+
+    @property
+    def facets(self) -> str:
+        """Reflectance of microfacets; the colour is left open."""
+        return "again{0} * tinted(half, k{0})" if self.rough else "tinted(half, k{0})"
 
     def lines(self) -> list[str]:
         """Return the lines that set cr, cg, cb, specular, shininess and the other properties in use."""

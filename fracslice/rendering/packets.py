@@ -187,7 +187,8 @@ def shade(W, m, first, last, P, frame):
             z = load(W, Row.oz * m + i) + t * dz
             steps, side = load(W, Row.steps * m + i), load(W, Row.side * m + i)
             u = tuple(load(W, (first + k) * m + i) for k in range(frame.bounce_samples))
-            light, onward = surface(x, y, z, dx, dy, dz, t, path, steps, side, last, u, P)
+            q = load(W, Row.dense * m + i) if frame.weighted else 0.0
+            light, onward = surface(x, y, z, dx, dy, dz, t, path, steps, side, last, q, u, P)
             hr, hg, hb = light
             r = where(hit, hr, r)
             g = where(hit, hg, g)

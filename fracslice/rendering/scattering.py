@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
+import numpy as np
+
 from ..kernel.linker import Linker
 from . import glow
 from .glow import Drawn
@@ -10,6 +14,24 @@ from .setup import ray_bound
 from .units import glossy, lights, march, shade, weights
 
 CHANNELS = "rgb"
+MIDPOINTS = 24
+"""Points along each side of the unit square of random numbers."""
+
+
+@lru_cache(maxsize=1)
+def reflected_shares() -> np.ndarray:
+    """Return the table of `glossy.lost`, by the midpoint rule over the directions that `glossy.glossy` takes.
+
+    It is rounded, so that it is the same on any machine.
+    """
+    grid = np.linspace(0, 1, int(glossy.CELLS) + 1)
+    points = (np.arange(MIDPOINTS) + 0.5) / MIDPOINTS
+    rough, root, u, v = np.meshgrid(grid, grid, points, points, indexing="ij", sparse=True)
+    z = np.maximum(root * root, 1e-4)
+    none = 0.0 * z
+    ray, normal = (np.sqrt(1 - z * z), none, -z), (none, none, 1 + none)
+    *_, weight, _ = glossy.glossy(*ray, *normal, rough, u, v)  # type: ignore[no-untyped-call]
+    return np.asarray(weight.mean((2, 3)).round(5))
 
 
 def division_lines(linker: Linker, look: Look) -> list[str]:
@@ -18,6 +40,12 @@ def division_lines(linker: Linker, look: Look) -> list[str]:
         linker.share(function)
     lines = ["facing = -(dx * nx + dy * ny + dz * nz)", *(f"e{c} = c{c}" for c in CHANNELS)]
     lines += [f"k{c} = reflect + metallic * (c{c} - reflect)" for c in CHANNELS]
+    if look.rough:
+        linker.bind("lost_", glossy.lost, {"table": reflected_shares()})
+        lines.append("lost = lost_(facing, roughness, P)")
+        lines += [
+            f"again{c} = 1.0 + (k{c} + (1.0 - k{c}) / 21.0) * lost" for c in CHANNELS
+        ]  # mean of Schlick's
     lines += [f"c{c} = c{c} * (1.0 - metallic) * (1.0 - tinted(facing, k{c}))" for c in CHANNELS]
     if look.paths:
         lines += [
@@ -44,12 +72,12 @@ def onward(linker: Linker, drawn: Drawn, look: Look, weighted: bool) -> list[str
     (u,) = drawn.names(1) if look.inside else ("t",)
     lines, out = ["eq = 0.0 * t"], ""
     if look.glossy:
-        lines += _reflection_lines(linker, drawn)
+        lines += _reflection_lines(linker, drawn, look)
     elif not look.inside:
         lines.append("tr, ex, ey, ez = reflects(dx, dy, dz, nx, ny, nz, reflect)")
         lines += ["tg, tb, es = tr, tr, side", *(f"{c} = {c} * (1.0 - t{c})" for c in CHANNELS)]
     if look.paths:
-        lines += _scatter_choice_lines(linker, drawn, bool(look.bodies))
+        lines += _scatter_choice_lines(linker, drawn, look)
     if weighted and not look.bodies:
         linker.share(weights.density_onward)
         lines.append("eq = density_onward(chosen, nx, ny, nz, dx, dy, dz, ex, ey, ez, roughness, share)")
@@ -71,13 +99,13 @@ def _start_lines(linker: Linker, look: Look) -> list[str]:
     return [*lines, *(f"o{a} = {kept.format(a)}" for a in "xyz")]
 
 
-def _reflection_lines(linker: Linker, drawn: Drawn) -> list[str]:
+def _reflection_lines(linker: Linker, drawn: Drawn, look: Look) -> list[str]:
     """Lines for reflection by microfacets."""
     for function in (glossy.width, glossy.hidden, lights.frame, glossy.glossy):
         linker.share(function)
     u, v = drawn.names(2)
     lines = [f"ex, ey, ez, weight, half = glossy(dx, dy, dz, nx, ny, nz, roughness, {u}, {v})", "es = side"]
-    return lines + [f"t{c} = weight * tinted(half, k{c})" for c in CHANNELS]
+    return lines + [f"t{c} = weight * {look.facets.format(c)}" for c in CHANNELS]
 
 
 def lacquer_lines(linker: Linker, colour: list[str]) -> list[str]:
@@ -107,7 +135,7 @@ def _lacquer_choice_lines(linker: Linker, drawn: Drawn) -> list[str]:
     return lines + [f"{c} = {c} * (1.0 - lacquer_)" for c in CHANNELS]
 
 
-def _scatter_choice_lines(linker: Linker, drawn: Drawn, bodies: bool) -> list[str]:
+def _scatter_choice_lines(linker: Linker, drawn: Drawn, look: Look) -> list[str]:
     """Lines that choose between the reflected ray and a scattered one, and end some rays.
 
     One sample of both (Veach 1997), and Russian roulette with the probability of the throughput (Arvo and
@@ -117,8 +145,8 @@ def _scatter_choice_lines(linker: Linker, drawn: Drawn, bodies: bool) -> list[st
         linker.share(function)
     u, v, choice, life = drawn.names(4)
     lines = [f"wx, wy, wz = upward(nx, ny, nz, {u}, {v})"]
-    if bodies:
-        lines += glow.scatter_lines(linker, drawn, u, v, choice)
+    if look.bodies:
+        lines += glow.scatter_lines(linker, drawn, u, v, choice, look.facets)
     else:
         lines += [
             f"chosen = {choice} < share",

@@ -12,11 +12,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fracslice.cli import render as command
 from fracslice.cli.main import run
 from fracslice.cli.render import describe_pass
 from PIL import Image
 
-from fracslice.rendering import Pass, Renderer, bands, cpu
+from fracslice.rendering import Pass, Renderer, bands, cpu, denoising
 from fracslice.rendering.accumulator import CHANNELS, COARSE, COUNT, PassPlan
 from fracslice.rendering.crops import BYTES
 
@@ -176,25 +177,33 @@ def test_mistakes_in_the_file_have_their_line(
     assert f"ball.xml:{line}: " in capsys.readouterr().err
 
 
-def stopped_after(passes: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Press Ctrl-C in the pass after some others."""
+def stopped_after(
+    passes: int, monkeypatch: pytest.MonkeyPatch, number: signal.Signals = signal.SIGINT
+) -> None:
+    """Send a signal, that of Ctrl-C, in the pass after some others."""
     receive = Renderer._pass
 
     def pressed(self: Renderer, plan: PassPlan) -> Pass:
         if self.accumulator.passes == passes:
-            os.kill(os.getpid(), signal.SIGINT)
+            os.kill(os.getpid(), number)
         return receive(self, plan)
 
     monkeypatch.setattr(Renderer, "_pass", pressed)
 
 
-def test_ctrl_c_keeps_the_picture_and_its_state(
-    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_keeps_the_picture_and_its_state(
+    scene: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    number: signal.Signals,
+    status: int,
 ) -> None:
     common = ["render", str(scene), "--device", "cpu", "--samples", "8", "-o"]
-    stopped_after(3, monkeypatch)
+    stopped_after(3, monkeypatch, number)
     state = ["--state", str(tmp_path / "s.npz")]
-    assert run([*common, str(tmp_path / "a.png"), *state]) == 130
+    assert run([*common, str(tmp_path / "a.png"), *state]) == status
     assert "stopped; " in (error := capsys.readouterr().err)
     assert "a.png: 40 x 24 pixels, 2.0 samples a pixel" in error
     with Image.open(tmp_path / "a.png") as image:
@@ -241,6 +250,46 @@ def test_a_time_limit_interrupts_the_first_pass(
         assert state["sums"].reshape(-1, CHANNELS)[:, COUNT].sum() == len(begun[0])
     with Image.open(tmp_path / "a.png") as image:
         assert np.asarray(image).reshape(-1, 3).max(1).min() > 0, "no pixel is empty"
+
+
+@pytest.mark.parametrize("name", ["guides", "denoise"])
+def test_a_signal_while_noise_is_removed_keeps_the_picture(
+    scene: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    name: str,
+) -> None:
+    def stopped(renderer: Renderer, *_: Any) -> None:
+        os.kill(os.getpid(), signal.SIGTERM)
+        renderer.work.check()
+
+    monkeypatch.setattr(denoising, name, stopped)
+    options = ["--denoise", "--device", "cpu", "-o", str(tmp_path / "a.png")]
+    assert run(["render", str(scene), *options]) == 143
+    assert "a.png: 40 x 24 pixels, 3.0 samples a pixel" in capsys.readouterr().err
+    assert (tmp_path / "a.png").exists()
+
+
+def test_a_time_limit_includes_the_removal_of_noise(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    limits, limited = list[float](), command.limit_time
+
+    def seen(renderer: Renderer, samples: int | None, limit: float) -> Any:
+        limits.append(limit)
+        return limited(renderer, samples, limit)
+
+    def slow(*of: Any) -> Any:
+        time.sleep(1)
+        return remove(*of)
+
+    remove = denoising.denoise
+    monkeypatch.setattr(denoising, "denoise", slow)
+    monkeypatch.setattr(command, "limit_time", seen)
+    options = ["--denoise", "--time", "60s", "--device", "cpu", "-o", str(tmp_path / "a.png")]
+    assert run(["render", str(scene), *options]) == 0
+    assert 6 <= limits[0] < 58.01
 
 
 def test_a_time_limit_before_the_first_sample_is_doubled(scene: Path, tmp_path: Path) -> None:

@@ -20,7 +20,8 @@ from fracslice.formulas import (
 )
 from fracslice.rendering import Renderer, materials
 from fracslice.rendering.glow import glowing_bodies
-from fracslice.rendering.units.glossy import glossy, highlight
+from fracslice.rendering.scattering import reflected_shares
+from fracslice.rendering.units.glossy import glossy, highlight, lost
 from fracslice.rendering.units.pixel import linear
 from fracslice.rendering.units.shade import varied
 from fracslice.scene.view import Camera, Light, Shading, View
@@ -77,12 +78,20 @@ def seen(
 
 @pytest.mark.parametrize("rough", [0.0, 0.5, 1.0])
 @pytest.mark.parametrize("paths", ["no", "yes"])
-def test_metal_in_a_white_furnace_returns_no_more_than_it_receives(rough: float, paths: str) -> None:
+def test_metal_in_a_white_furnace_returns_what_it_receives(rough: float, paths: str) -> None:
+    """Between rough facets light is reflected again: one reflection returned 0.33 of it at roughness 1."""
     ball = material(sphere(), colour=WHITE, metallic=1, roughness=rough, specular=0)
-    light = seen(ball, Shading(paths=paths, bounces=1))
-    assert light.max() < 1.0001
-    middle = seen(ball, Shading(paths=paths, bounces=1), camera=replace(CAMERA, fov=2))
-    assert middle.mean() == pytest.approx(albedo(rough, 0.0) if rough else 1.0, abs=0.01)
+    light = seen(ball, Shading(paths=paths, bounces=1), 512)
+    assert light.mean() == pytest.approx(1, abs=0.005)
+    middle = seen(ball, Shading(paths=paths, bounces=1), 512, camera=replace(CAMERA, fov=2))
+    assert middle.mean() == pytest.approx(1, abs=0.005)
+
+
+@pytest.mark.parametrize(("rough", "cosine"), [(0.5, 0.8), (0.7, 0.3), (1.0, 0.5), (1.0, 1.0)])
+def test_light_that_one_reflection_loses_is_reflected_again(rough: float, cosine: float) -> None:
+    again = 1 + lost(np.float64(cosine), rough, 0.0, reflected_shares().ravel())
+    assert albedo(rough, np.sqrt(1 - cosine**2)) * again == pytest.approx(1, abs=0.01)
+    assert lost(np.float64(cosine), 0.0, 0.0, reflected_shares().ravel()) == 0
 
 
 @pytest.mark.parametrize("reflect", [0.0, 0.3])
@@ -144,6 +153,15 @@ def test_rays_to_glowing_bodies_change_no_mean(rough: float, monkeypatch: pytest
         monkeypatch.setattr(materials, "glowing_bodies", bodies)
         means.append(seen(root, shading, 512, camera, lights=lights).mean(0))
     assert means[0] == pytest.approx(means[1], rel=0.01)
+
+
+def test_a_sun_in_rough_metal_leaves_no_sparks_on_a_floor() -> None:
+    """A scattered ray hardly ever meets its sharp reflection: single pixels had 8 times the floor's light."""
+    metal = material(sphere(radius=0.6), colour=WHITE, metallic=1, roughness=0.15) + (0, 0, 0.9)
+    camera = Camera(eye=(0, -3, 2), target=(-0.6, -0.9, 0), fov=12)
+    lights, shading = (Light(position=(-1, -2, 2.5), size=8),), Shading(paths="yes", bounces=1)
+    light = seen(metal | FLOOR, shading, 256, camera, lights=lights).mean(1)
+    assert light.max() < 1.6 * np.median(light)
 
 
 def test_bodies_have_boxes_where_they_are() -> None:

@@ -5,13 +5,21 @@ Trowbridge and Reitz 1975 (GGX of Walter et al. 2007), with Smith's height-corre
 
 from __future__ import annotations
 
-from ...formulas.vocabulary import cos, maximum, rsqrt, sin, sqrt, where
+from ...formulas.vocabulary import cos, floor, maximum, rsqrt, sin, sqrt, where
+from .environment import bounded
+from .intrinsics import gather
 from .lights import TURN, frame
 from .march import normalised
 from .shade import fresnel, mirrored
 
 SMOOTHEST = 1e-3
 """Smallest square of the roughness."""
+CELLS = 15.0
+"""Cells along each side of the table of `lost`."""
+WIDE = 2.0
+"""Density of a direction below which a ray was scattered widely."""
+DULL = 0.5
+"""Least roughness of surfaces that such a ray meets."""
 LACQUER = 0.1
 """Roughness with which a lacquer reflects a light; what it mirrors is sharp."""
 
@@ -74,3 +82,36 @@ def glossy(dx, dy, dz, nx, ny, nz, rough, u, v):
     seen = 1.0 + hidden(vz, a)
     weight = where(nl > 0.0, seen / (seen + hidden(nl, a)), 0.0)
     return ex, ey, ez, weight, -(dx * hx + dy * hy + dz * hz)
+
+
+def dulled(rough, q):
+    """Return the roughness of a surface to a ray.
+
+    A ray that was scattered widely hardly ever meets a light in a sharp reflection, and is far too bright
+    then: the reflection is widened (Kaplanyan and Dachsbacher 2013, "Path Space Regularization").
+
+    `q`: density of the ray's direction.
+    """
+    wide = (q > 0.0) & (q < WIDE) & (rough > 0.0)
+    return where(wide, maximum(rough, DULL), rough)
+
+
+def lost(cosine, rough, table, P):
+    """Return the light that one reflection by microfacets loses to others, relative to what it reflects.
+
+    Others reflect it again, as the first one does (Turquin 2019, "Practical Multiple Scattering Compensation
+    for Microfacet Models").
+
+    `table`: share that is reflected at each roughness and root of the cosine, both from 0 to 1.
+    """
+    a = CELLS * rough
+    b = CELLS * sqrt(maximum(cosine, 0.0))
+    i = bounded(floor(a), CELLS)
+    j = bounded(floor(b), CELLS)
+    place = table + (CELLS + 1.0) * i + j
+    a = a - i
+    b = b - j
+    low = (1.0 - b) * gather(place, P) + b * gather(place + 1.0, P)
+    place = place + CELLS + 1.0
+    high = (1.0 - b) * gather(place, P) + b * gather(place + 1.0, P)
+    return where(rough > 0.0, 1.0 / ((1.0 - a) * low + a * high) - 1.0, 0.0)

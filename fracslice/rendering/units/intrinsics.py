@@ -62,10 +62,10 @@ def step_cone(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P):
 
 
 @intrinsic
-def surface(x, y, z, dx, dy, dz, t, path, steps, side, last, u, P):
+def surface(x, y, z, dx, dy, dz, t, path, steps, side, last, q, u, P):
     """Shade a surface point.
 
-    `u`: random numbers in [0, 1).
+    `q`: density of the direction of the ray; `u`: random numbers in [0, 1).
     """
     raise NotImplementedError
 

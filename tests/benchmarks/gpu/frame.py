@@ -91,7 +91,7 @@ __global__ void tile(Parameters P, const int *Q, const float *S, const int *pixe
         r = colour[0], g = colour[1], b = colour[2];
     } else {
         auto light = surface_(ox + t * dx, oy + t * dy, oz + t * dz, dx, dy, dz, t, 0.0f, steps, 1.0f, 1.0f,
-                              Tuple<1>{{0.0f}}, P).first;
+                              0.0f, Tuple<1>{{0.0f}}, P).first;
         r = light[0], g = light[1], b = light[2];
     }
     r = tamed(r), g = tamed(g), b = tamed(b);
