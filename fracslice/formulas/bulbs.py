@@ -74,8 +74,8 @@ def cosine_bulb(w, c, power):  # type: ignore[no-untyped-def]
     """The Mandelbulb with angles counted from the equator (Nylander 2009, bugman123.com): odd powers.
 
     Lengths along meridians grow by n r^(n-1), along circles of latitude by r^(n-1) |cos n theta / cos theta|,
-    without limit near the poles if n is not odd: space tears there. L = 2 is measured for whole powers; of
-    others, which tear space along a half plane, no space is skipped by the field.
+    without limit near the poles if n is not odd: space tears there. L = 2 is measured for whole
+    powers; others tear space along a half plane, beside which values are larger.
     """
     return equatorial_power(w, power) + c
 

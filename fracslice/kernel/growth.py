@@ -258,14 +258,13 @@ class Growth:
         """Form of the field; a conservative one stays below twice the distance to tears.
 
         That of a hybrid stays below twice the sure distance, too, for critical points may be outside. Without
-        majorants, neither is known: outside of a hybrid with tears, or of a fractional power, it is then 0.
+        majorants, neither is known: outside of a hybrid with tears it is then 0.
         """
         made = [code.traced(place) for place, code in enumerate(steps)]
         bent = orbits.has_majorants(made)
         torn = self.torn and conservative and bent and orbits.is_torn(made)
         hybrid = len(steps) > 1 or steps[0].moved
-        unbounded = hybrid or any(power % 1 for power in self.powers)
-        blind = conservative and unbounded and not bent and any(step.is_torn for step in made)
+        blind = conservative and hybrid and not bent and any(step.is_torn for step in made)
         sure = self.by_power and (self.connected is False or (hybrid and bent and conservative))
         return Form(self.by_power, self.scaled, not self.connected, sure, torn, blind)
 
