@@ -85,9 +85,10 @@ def apollonian(level: int = 4, swell: float = 1.02) -> Node:
     """Apollonian packing of balls in the unit ball (Soddy 1936, "The kiss precise"; Boyd 1973).
 
     Inversions in the five spheres at right angles to four of the five first ones, the four balls and the
-    outside, make all others. A ball of radius d around an image point, all outside or all in one ball, comes
-    from one of radius d / (a + b d) at least, and these maps compose. L = 2 is measured, on both sides: balls
-    of further levels are left out.
+    outside, make all others: one for each level, in the sphere that a point is deepest in, as the others do
+    not move the ball that it is in. A ball of radius d around an image point, all outside or all in one ball,
+    comes from one of radius d / (a + b d) at least, and these maps compose. L = 2 is measured, on both sides:
+    balls of further levels are left out.
 
     Parameters
     ----------
@@ -125,18 +126,19 @@ def bend(*elements: Node, degrees: float, axis: Literal['x', 'y', 'z'] = 'z') ->
     Node
     """
 
-def benesi(scale: float = 1.0, offset: float = 0.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
+def benesi(scale: float = 2.0, offset: float = 2.0, iterations: Union[int, Literal['auto']] = 'auto', julia: Sequence[float] | None = None, repeat: int = 1) -> Node:
     """Folds in a frame along the space diagonal, then a square about the x axis (Benesi 2010,
-    fractalforums.com: "Pine tree" and the transform T1).
+    fractalforums.com: "Pine tree" after the transform T1). Of the constant, x is added alone; scale 1 and
+    offset 0 leave the folds.
 
-    The square doubles the angle about the x axis and that to it: lengths grow by 2 r along meridians and by
-    4 |x| along circles. L = 2 is measured.
+    The square doubles the angle about the x axis, counted from the z axis to the y axis, and that to it:
+    lengths grow by 2 r along meridians and by 4 |x| along circles. L = 2 is measured.
 
     Parameters
     ----------
-    scale : a number > 0 and <= 4, default 1.0
+    scale : a number > 0 and <= 4, default 2.0
         how much space is enlarged before it is squared
-    offset : a number >= -4 and <= 4, default 0.0
+    offset : a number >= -4 and <= 4, default 2.0
         how far it is moved along the x axis before that
     iterations : a whole number from 1 to 10000 or "auto", default 'auto'
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
@@ -278,7 +280,8 @@ def cosine_bulb(power: float = 9.0, iterations: Union[int, Literal['auto']] = 'a
     """The Mandelbulb with angles counted from the equator (Nylander 2009, bugman123.com): odd powers.
 
     Lengths along meridians grow by n r^(n-1), along circles of latitude by r^(n-1) |cos n theta / cos theta|,
-    without limit near the poles if n is not odd: space tears there. L = 2 is measured.
+    without limit near the poles if n is not odd: space tears there. L = 2 is measured for whole
+    powers; others tear space along a half plane, beside which values are larger.
 
     Parameters
     ----------

@@ -12,8 +12,9 @@ from .vocabulary import absolute, atan2, cos, exp, floor, log, maximum, rsqrt, s
 
 POWER = Number(8.0, "the exponent", least=2, most=16)
 
-DIAGONAL_AXIS, DIAGONAL = (0.0, 0.7071067811865476, -0.7071067811865476), 54.735610317245346
-"""Rotation that takes the x axis to the space diagonal."""
+DIAGONAL_AXIS = (0.24450384497347374, -0.5902844985873289, 0.7692737357538558)
+DIAGONAL = 56.60026933422475
+"""Rotation that takes the x axis to the space diagonal, and the y axis to (-1, 1, 0)."""
 
 
 @orbit()
@@ -73,7 +74,8 @@ def cosine_bulb(w, c, power):  # type: ignore[no-untyped-def]
     """The Mandelbulb with angles counted from the equator (Nylander 2009, bugman123.com): odd powers.
 
     Lengths along meridians grow by n r^(n-1), along circles of latitude by r^(n-1) |cos n theta / cos theta|,
-    without limit near the poles if n is not odd: space tears there. L = 2 is measured.
+    without limit near the poles if n is not odd: space tears there. L = 2 is measured for whole
+    powers; others tear space along a half plane, beside which values are larger.
     """
     return equatorial_power(w, power) + c
 
@@ -122,18 +124,20 @@ def lambda_slope(node: Node) -> float:
 
 
 @orbit(
-    scale=Number(1.0, "how much space is enlarged before it is squared", above=0, most=4),
-    offset=Number(0.0, "how far it is moved along the x axis before that", least=-4, most=4),
+    scale=Number(2.0, "how much space is enlarged before it is squared", above=0, most=4),
+    offset=Number(2.0, "how far it is moved along the x axis before that", least=-4, most=4),
 )
 def benesi(w, c, scale, offset):  # type: ignore[no-untyped-def]
     """Folds in a frame along the space diagonal, then a square about the x axis (Benesi 2010,
-    fractalforums.com: "Pine tree" and the transform T1).
+    fractalforums.com: "Pine tree" after the transform T1). Of the constant, x is added alone; scale 1 and
+    offset 0 leave the folds.
 
-    The square doubles the angle about the x axis and that to it: lengths grow by 2 r along meridians and by
-    4 |x| along circles. L = 2 is measured.
+    The square doubles the angle about the x axis, counted from the z axis to the y axis, and that to it:
+    lengths grow by 2 r along meridians and by 4 |x| along circles. L = 2 is measured.
     """
     w = turn(positive(turn(w, DIAGONAL_AXIS, DIAGONAL)), DIAGONAL_AXIS, -DIAGONAL)
-    return pine(scale * w - offset * (1.0, 0.0, 0.0)) + c
+    cx, _, _ = c
+    return pine(scale * w - offset * (1.0, 0.0, 0.0)) + (cx, 0.0, 0.0)
 
 
 def pine(w):  # type: ignore[no-untyped-def]
@@ -141,7 +145,7 @@ def pine(w):  # type: ignore[no-untyped-def]
     x, y, z = w
     rho = sqrt(maximum(y * y + z * z, 1e-30))
     k = 2.0 * x / rho
-    image = (x * x - y * y - z * z, k * (y * y - z * z), k * 2.0 * y * z)
+    image = (x * x - y * y - z * z, k * 2.0 * y * z, k * (y * y - z * z))
     return image, maximum(2.0 * sqrt(x * x + y * y + z * z), 4.0 * absolute(x))
 
 

@@ -21,11 +21,11 @@ RADIUS = math.sqrt(6) - 2
 BALLS = tuple((*((1 - RADIUS) * v for v in axis), RADIUS) for axis in AXES)
 """Centres and radii of the four balls."""
 
-MIDDLE = 5 - 2 * math.sqrt(6)
-"""Square of the radius of the sphere around the origin at right angles to the four balls."""
+MIDDLE = math.sqrt(5 - 2 * math.sqrt(6))
+"""Radius of the sphere around the origin at right angles to the four balls."""
 
-MIRRORS = ((0.0, 0.0, 0.0, MIDDLE), *((*(-3.0 * v for v in axis), 8.0) for axis in AXES))
-"""Centres and squares of the radii of the spheres at right angles to four of the five."""
+MIRRORS = ((0.0, 0.0, 0.0, MIDDLE), *((*(-3.0 * v for v in axis), math.sqrt(8)) for axis in AXES))
+"""Centres and radii of the spheres at right angles to four of the five; any two meet at 60 degrees."""
 
 
 @shape(
@@ -38,9 +38,10 @@ def apollonian(x, y, z, level, swell):  # type: ignore[no-untyped-def]
     """Apollonian packing of balls in the unit ball (Soddy 1936, "The kiss precise"; Boyd 1973).
 
     Inversions in the five spheres at right angles to four of the five first ones, the four balls and the
-    outside, make all others. A ball of radius d around an image point, all outside or all in one ball, comes
-    from one of radius d / (a + b d) at least, and these maps compose. L = 2 is measured, on both sides: balls
-    of further levels are left out.
+    outside, make all others: one for each level, in the sphere that a point is deepest in, as the others do
+    not move the ball that it is in. A ball of radius d around an image point, all outside or all in one ball,
+    comes from one of radius d / (a + b d) at least, and these maps compose. L = 2 is measured, on both sides:
+    balls of further levels are left out.
     """
     a, b = 1.0 + 0.0 * x, 0.0 * x
     within = 0.0 * x
@@ -48,18 +49,19 @@ def apollonian(x, y, z, level, swell):  # type: ignore[no-untyped-def]
         r2 = x * x + y * y + z * z
         orbit(r2, r2 < 4.0, x, y, z)
         x = where(r2 < 1e-12, 1e-6, x)  # the centre has no image
-        for cx, cy, cz, square in MIRRORS:
+        depth, square = 0.0 * x, 1.0 + 0.0 * x
+        u, v, w = x, y, z
+        for cx, cy, cz, radius in MIRRORS:
             px, py, pz = x - cx, y - cy, z - cz
-            r2 = maximum(px * px + py * py + pz * pz, 1e-12)
-            inside = r2 < square
-            k = where(inside, ratio(square, r2), 1.0)
-            a, b = a * k, where(inside, a * sqrt(k / square) + b, b)
-            within = where(inside, 1.0, within) if square < 1.0 else within
-            x, y, z = (
-                where(inside, cx + k * px, x),
-                where(inside, cy + k * py, y),
-                where(inside, cz + k * pz, z),
-            )
+            deep = radius - (px * px + py * py + pz * pz) / radius
+            deeper = deep > depth
+            depth, square = where(deeper, deep, depth), where(deeper, radius * radius, square)
+            u, v, w = where(deeper, px, u), where(deeper, py, v), where(deeper, pz, w)
+        inside = depth > 0.0
+        k = where(inside, ratio(square, maximum(u * u + v * v + w * w, 1e-12)), 1.0)
+        a, b = a * k, where(inside, a * sqrt(k / square) + b, b)
+        within = where(square < 1.0, 1.0, within)
+        x, y, z = x + (k - 1.0) * u, y + (k - 1.0) * v, z + (k - 1.0) * w
     d = where(within > 0.5, 1.0 / swell - sqrt(x * x + y * y + z * z), 1e6)
     for cx, cy, cz, radius in BALLS:
         px, py, pz = x - cx, y - cy, z - cz

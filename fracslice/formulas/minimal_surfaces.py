@@ -21,6 +21,10 @@ WALL: dict[str, Any] = {
 }
 
 
+STEEPEST = {"neovius": 0.7423075, "iwp": 0.942809, "lidinoid": 0.9798, "frd": 0.786}
+"""Largest gradient on the surface, where walls are thinnest, relative to the bound; 1 where it is reached."""
+
+
 def graded(x, y, z, half, grade):  # type: ignore[no-untyped-def]
     """Half the thickness of the wall at a point."""
     gx, gy, gz = grade
@@ -127,10 +131,11 @@ def split_p(x, y, z, k, half, grade):  # type: ignore[no-untyped-def]
 
 
 def wall_arguments(node: Node) -> dict[str, object]:
+    steepest = STEEPEST.get(node.formula.name, 1.0)
     return {
         "k": 2 * math.pi / node["period"],
-        "half": node["thickness"] / 2,
-        "grade": tuple(g / 2 for g in node["grade"]),
+        "half": steepest * node["thickness"] / 2,
+        "grade": tuple(steepest * g / 2 for g in node["grade"]),
     }
 
 

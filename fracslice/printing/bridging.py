@@ -6,9 +6,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
+from ..common.cache import key
 from ..common.compiled import compiled
 from ..kernel import Kernel
 from ..volume import Bricks
@@ -16,7 +18,7 @@ from ..volume.bricks import INSIDE, OUTSIDE
 from ..volume.lattice import values_at
 from ..work import Work
 from .components import SolidComponents, components_of
-from .samples import Samples, positions
+from .samples import Samples, between, positions, sample_at
 
 NONE = -1
 """Marks samples in no body and cells without an entry."""
@@ -29,16 +31,16 @@ CHUNK = 2048
 
 
 def bridging_struts(
-    components: SolidComponents, bodies: np.ndarray, groups: np.ndarray | None = None
+    components: SolidComponents, bodies: np.ndarray, groups: np.ndarray | None = None, near: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Struts that join n bodies with minimum total length.
+    """Struts that join n bodies with minimum total length, and all struts shorter than `near` samples.
 
     Each cell of the empty space belongs to its nearest body, by exact Euclidean distances (Maurer, Qi and
     Raghavan 2003). Bodies whose regions are adjacent are candidate pairs. The minimum spanning tree of the
     bodies is among these pairs, as the one of points is in their Delaunay triangulation.
 
     `bodies`: int64 [n]; `groups`: int64 [n], optional. Returns start, end float64 [m, 3], scene units: n - 1
-    of them for one group.
+    of them for one group, and those that are near.
     """
     from scipy.ndimage import distance_transform_edt
     from scipy.sparse import coo_array
@@ -61,7 +63,7 @@ def bridging_struts(
     pairs, ends, length = _nearest(body[meeting], place[meeting], times)
     tree = minimum_spanning_tree(coo_array((length, pairs.T), (len(bodies),) * 2)).tocoo()
     chosen = {(int(i), int(j)) for i, j in zip(*tree.coords, strict=True)}
-    kept = [n for n, (i, j) in enumerate(pairs.tolist()) if (i, j) in chosen]
+    kept = [n for n, (i, j) in enumerate(pairs.tolist()) if (i, j) in chosen or length[n] < near]
     points = np.array(solid.origin) + solid.voxel * ends[kept]
     return points[:, 0], points[:, 1]
 
@@ -215,6 +217,11 @@ def adjacent_row(index, ijk, row, axis, sign):  # type: ignore[no-untyped-def]
 TOUCHING = 0.9
 """Value of the field, in samples, up to which two bodies touch: less than half of the thinnest gap."""
 
+CLOSE = 6.0
+"""Distance between the samples of two bodies, in samples, below which their contact is looked for even if
+others join them: tips end at samples before they touch.
+"""
+
 SIDE = 33
 """Points along each side of the cube around a contact."""
 
@@ -222,7 +229,7 @@ SIDE = 33
 def contacts(
     components: SolidComponents, bodies: np.ndarray, kernel: Kernel, work: Work
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Struts between bodies that touch, a tree for each cluster of them.
+    """Struts where bodies touch.
 
     Samples cannot tell bodies that touch from bodies with a gap of a sample between them. Around the middle
     of each strut the field is sampled 12 times finer.
@@ -230,7 +237,7 @@ def contacts(
     `bodies`: int64 [n]. Returns start, end float64 [m, 3], scene units.
     """
     voxel = components.solid.voxel
-    start, end = bridging_struts(components, bodies, clusters(components)[bodies])
+    start, end = bridging_struts(components, bodies, clusters(components)[bodies], CLOSE)
     touching = np.zeros(len(start), bool)
     for n in range(len(start)):
         touching[n] = _touching(kernel, start[n], end[n], voxel, work)
@@ -311,7 +318,46 @@ BAND = 2.0
 """Width of the sampled band around the capsules, voxels."""
 
 
-def capsules(start: np.ndarray, end: np.ndarray, radius: float, like: Bricks) -> Samples:
+class Capsules(Samples):
+    """Capsules of one radius, as samples of the distance to them.
+
+    Between samples, the squares of the distances to their axes are interpolated: less the square of the
+    distance to any fixed point they are concave, so that interpolation makes no capsule thinner.
+    """
+
+    def __init__(self, bricks: Bricks, radius: float) -> None:
+        super().__init__(bricks)
+        self._radius = radius
+
+    @cached_property
+    def key(self) -> str:
+        """`Field.key`."""
+        return key(super().key, self._radius)
+
+    def _interpolate(self, x: np.ndarray, y: np.ndarray, z: np.ndarray, out: np.ndarray) -> None:
+        _interpolate_squares(x, y, z, self.grid, self._radius, out)
+
+
+@compiled
+def _interpolate_squares(xs, ys, zs, grid, radius, out):  # type: ignore[no-untyped-def]
+    """Write the values of `Capsules` at points."""
+    x0, y0, z0, voxel, _, index, values, bounds = grid
+    for n in range(len(xs)):
+        u, v, w = (xs[n] - x0) / voxel, (ys[n] - y0) / voxel, (zs[n] - z0) / voxel
+        out[n] = between(u, v, w, voxel, index, bounds, values)
+        if out[n] > voxel:  # a bound suffices
+            continue
+        i, j, k = int(np.floor(u)), int(np.floor(v)), int(np.floor(w))
+        u, v, w = u - i, v - j, w - k
+        square = -voxel * voxel * (u * (1 - u) + v * (1 - v) + w * (1 - w))
+        for corner in range(8):
+            a, b, c = corner >> 2, (corner >> 1) & 1, corner & 1
+            share = (u if a else 1 - u) * (v if b else 1 - v) * (w if c else 1 - w)
+            square += share * (radius + sample_at(index, bounds, values, voxel, i + a, j + b, k + c)) ** 2
+        out[n] = np.sqrt(max(square, 0.0)) - radius
+
+
+def capsules(start: np.ndarray, end: np.ndarray, radius: float, like: Bricks) -> Capsules:
     """Sample the distance to capsules on the grid of given bricks.
 
     `start`, `end`: float64 [n, 3], scene units.
@@ -331,7 +377,7 @@ def capsules(start: np.ndarray, end: np.ndarray, radius: float, like: Bricks) ->
     _shorten(lines, points, of, reach, index, squares)
     x, y, z = origin.tolist()
     values = (np.sqrt(squares, out=squares) - np.float32(reach - BAND)) * np.float32(voxel)
-    return Samples(Bricks((x, y, z), voxel, ijk, values, index))
+    return Capsules(Bricks((x, y, z), voxel, ijk, values, index), radius)
 
 
 def _lines(start: np.ndarray, along: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ Distances come from the field where its values are distances, else from its samp
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -34,6 +35,11 @@ COARSE, FINE = 128, 640
 
 SHARP = 6
 """Samples across a length to thicken, close or keep, as far as `FINE` permits."""
+
+COVERED = 0.75**0.5
+"""Distance of any point of a medial surface to the nearest middle of a wall, samples: rays start where grid
+lines along the axis nearest to the normal cross the surface.
+"""
 
 THIN = 1.0
 """Area of walls or gaps that samples may miss, from which finer samples are taken, mm^2."""
@@ -291,7 +297,8 @@ class _Edits(Preparation):
         return self.with_capsules(made, 2 * radius)
 
     def thickened(self) -> Field:
-        """Add balls as wide as the minimum thickness along the medial axis of thinner walls.
+        """Add balls along the medial axis of thinner walls, which are as wide as the minimum thickness where
+        they meet.
 
         They restore what opening with such a ball would remove (Serra 1982), along the part of the medial
         axis between opposite faces. Bodies that touch are joined. Pores that this seals are filled.
@@ -310,7 +317,8 @@ class _Edits(Preparation):
         if not len(middle) + len(start):
             return self.root
         start, end = np.concatenate([middle, start]), np.concatenate([middle, end])
-        balls = capsules(start, end, least / 2, solid.bricks)
+        radius = math.hypot(least / 2, COVERED * solid.bricks.voxel)
+        balls = capsules(start, end, radius, solid.bricks)
         self.put(self.with_capsules(balls, least))
         self.known = components_of(together(solid.bricks, balls.bricks))
         return self.without(self.known.sealed(before))

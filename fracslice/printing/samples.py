@@ -232,8 +232,12 @@ class Samples(ArrayField):
         """
         out = np.empty(np.shape(x))
         u, v, w = (np.ascontiguousarray(a, np.float64).ravel() for a in (x, y, z))
-        interpolate(u, v, w, self.grid, out.ravel())
+        self._interpolate(u, v, w, out.ravel())
         return out
+
+    def _interpolate(self, x: np.ndarray, y: np.ndarray, z: np.ndarray, out: np.ndarray) -> None:
+        """Write the values at points, in scene units, to `out`."""
+        interpolate(x, y, z, self.grid, out)
 
 
 class _Interpolated(Kernel):

@@ -140,10 +140,32 @@ def test_the_bristorbrot_is_bounded_where_the_usual_derivative_is_not() -> None:
 def test_the_packings_middle_ball_is_soddys() -> None:
     """Four balls in the unit ball leave room for one of radius 5 - 2 sqrt(6) between them."""
     root = apollonian(level=1, swell=1.0)
-    assert pytest.approx(5 - 2 * sqrt(6)) == MIDDLE
+    radius = 5 - 2 * sqrt(6)
+    assert pytest.approx(radius) == MIDDLE**2
     zero = np.zeros(2)
-    f = field(root)(np.array([MIDDLE * 0.999, MIDDLE * 1.001]), zero, zero)
+    f = field(root)(np.array([radius * 0.999, radius * 1.001]), zero, zero)
     assert f[0] < 0 < f[1]
+
+
+@pytest.mark.parametrize("name", ["neovius", "iwp", "lidinoid", "frd", "gyroid"])
+@pytest.mark.parametrize("thickness", [0.02, 0.06])
+def test_a_wall_is_as_thick_as_asked_at_its_thinnest(name: str, thickness: float) -> None:
+    """It was up to 1.35 times as thick. Along normals, from points of its faces."""
+    value = field(get(name)(period=1.0, thickness=thickness))
+
+    def slope(p: np.ndarray) -> np.ndarray:
+        steps = 1e-6 * np.eye(3)[:, :, None]
+        return np.stack([value(*(p + s)) - value(*(p - s)) for s in steps]) / 2e-6
+
+    p = np.random.default_rng(1).uniform(0, 1, (3, 20000))
+    for _ in range(30):
+        normal = slope(p)
+        p = p - np.clip(value(*p), -0.02, 0.02) * normal / np.maximum((normal**2).sum(0), 0.1)
+    p = p[:, np.abs(value(*p)) < 1e-9]
+    inwards = -slope(p) / np.linalg.norm(slope(p), axis=0)
+    along = thickness * np.linspace(0.5, 1.1, 121)
+    outside = np.array([value(*(p + s * inwards)) > 0 for s in along])
+    assert 0.98 < along[outside.any(1).argmax()] / thickness < 1.06
 
 
 @pytest.mark.parametrize("symbol", [(5, 3, 4), (3, 5, 3)])

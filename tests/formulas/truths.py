@@ -128,6 +128,22 @@ def tetrabrot(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
     return np.where(inside, -1.0, 1.0)
 
 
+def pine_tree(*points: np.ndarray) -> np.ndarray:
+    """The transform T1, with scale 2 and offset 2, and the pine tree with the constant (x, 0, 0), as in
+    Mandelbulber: 2 steps.
+    """
+    s, t, u = sqrt(1 / 3), sqrt(1 / 2), sqrt(1 / 6)
+    frame, inside = np.array([[s, -t, -u], [s, t, -u], [s, 0, 2 * u]]), np.ones(len(points[0]), bool)
+    w, escape = np.array(points), growth_of(f.benesi(iterations=2)).escape
+    for _ in range(2):
+        x, y, z = frame.T @ (2 * np.abs(frame @ w)) - [[2], [0], [0]]
+        double, square = 2 * x / np.maximum(np.hypot(y, z), 1e-30), y * y + z * z
+        image = np.array([x * x - square + points[0], 2 * double * y * z, double * (y * y - z * z)])
+        w = np.where(inside, image, w)
+        inside &= np.linalg.norm(w, axis=0) < escape
+    return np.where(inside, -1.0, 1.0)
+
+
 def tube(level: int) -> float:
     """Volume along a Hilbert curve whose radius is a quarter of its edges: cylinders, quarters of a ball for
     the quarters of a Steinmetz solid at its bends, and half a ball at each end.
@@ -267,7 +283,9 @@ TRUTHS: dict[str, list[Truth]] = {
     ],
     "apollonian": [
         Volume(f.apollonian(level=0, swell=1.0), 4 * 4 / 3 * pi * (sqrt(6) - 2) ** 3),
+        Volume(f.apollonian(level=1, swell=1.0), 8 * 0.2418),
         *symmetric(f.apollonian(level=0), *TETRAHEDRAL),
+        *symmetric(f.apollonian(level=3), *TETRAHEDRAL),
     ],
     "pseudo_kleinian": symmetric(f.pseudo_kleinian(steps=3), FLIP, FLIP_Y, FLIP_Z),
     "honeycomb": [
@@ -314,7 +332,8 @@ TRUTHS: dict[str, list[Truth]] = {
         *symmetric(f.bristorbrot(iterations=5), reflection((0, 1, 1))),
     ],
     "benesi": [
-        ball(f.benesi(iterations=3, julia=ORIGIN), 2),
+        Equal(f.benesi(iterations=2), pine_tree, sign=True),
+        ball(f.benesi(scale=1, offset=0, iterations=3, julia=ORIGIN), 2),
         *symmetric(f.benesi(iterations=3, julia=(0.3, 0.2, 0.1)), *(reflection(row) for row in FRAME)),
     ],
     "mandelbox": [
