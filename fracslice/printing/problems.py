@@ -26,8 +26,8 @@ Place = tuple[float, float, float]
 class Problem:
     """One reason why an object would not print."""
 
-    # "bodies", "islands", "overhangs", "necks", "cavities", "cups", "traps", "walls", "floors", "fit" or
-    # "lost"
+    # "bodies", "islands", "overhangs", "necks", "cavities", "cups", "traps", "walls", "floors", "fit", "lost"
+    # or "mesh"
     kind: str
     text: str  # description with the size
     layer: int | None = None  # first layer of the largest one; None if layers were not examined
@@ -35,6 +35,7 @@ class Problem:
     mend: tuple[tuple[str, str], ...] = ()  # print settings that mend it, by name; empty if none does
     advice: str = ""  # what else helps
     count: int = 1  # number of features, such as traps
+    resin: float = 0.0  # volume of resin that stays in it, mm3
 
     def __str__(self) -> str:
         """The problem in one line."""
@@ -65,6 +66,16 @@ def severity(problems: Sequence[object]) -> tuple[int, float]:
     rank = ["would print", "would print with supports", "would not print"].index(verdict(problems))
     own = [problem for problem in problems if isinstance(problem, Problem)]
     return rank, 1000.0 * (len(problems) - len(own)) + sum(WEIGHTS.get(p.kind, 1.0) * p.count for p in own)
+
+
+def mends(made: Sequence[object], others: Sequence[object]) -> bool:
+    """True if problems are less bad than others: in the verdict, or in number while no more resin stays."""
+    mine, theirs = severity(made), severity(others)
+    resin, of_others = (
+        sum(problem.resin for problem in problems if isinstance(problem, Problem))
+        for problems in (made, others)
+    )
+    return mine[0] < theirs[0] or (mine < theirs and resin <= of_others)
 
 
 def flat_base(height: float) -> str:

@@ -70,20 +70,23 @@ def problems_of(report: PrintReport, stack: Stack, limits: Limits) -> list[Probl
     if report.neck and report.neck.ratio > limits.neck:
         problems.append(_narrow_neck(report.neck, stack, limits))
     if report.cavities:
-        sealed = format_count(len(report.cavities), "sealed cavity", "sealed cavities")
-        text = f"{sealed} with {significant(sum(c.volume for c in report.cavities))} mm3 of resin"
-        problems.append(
-            Problem("cavities", text, mend=FILL, count=len(report.cavities), **where(report.cavities[0]))
-        )
+        count, volume = len(report.cavities), sum(c.volume for c in report.cavities)
+        sealed = format_count(count, "sealed cavity", "sealed cavities")
+        text = f"{sealed} with {significant(volume)} mm3 of resin"
+        place = where(report.cavities[0])
+        problems.append(Problem("cavities", text, mend=FILL, count=count, resin=volume, **place))
     for kind, noun, hollows in (("cups", "suction cup", report.cups), ("traps", "resin trap", report.traps)):
         remaining = [hollow for hollow in hollows if hollow not in report.cavities]
         if remaining:
             largest = max(remaining, key=lambda h: h.area)
-            volume = significant(sum(h.volume for h in remaining))
-            text = f"{format_count(len(remaining), noun)} with {volume} mm3 of resin"
+            volume = sum(h.volume for h in remaining)
+            text = f"{format_count(len(remaining), noun)} with {significant(volume)} mm3 of resin"
             text += f", the largest {significant(largest.area)} mm2"
             advice, count = "--up, or a drain hole", len(remaining)
-            problems.append(Problem(kind, text, advice=advice, count=count, **where(largest)))
+            if kind == "cups" and all(hollow.layers[0] == 0 for hollow in remaining):
+                advice += f", or {SUPPORTS}"  # off the plate, it is open upwards
+            place = where(largest)
+            problems.append(Problem(kind, text, advice=advice, count=count, resin=volume, **place))
     return [*problems, *report.solid.thin]
 
 

@@ -20,6 +20,7 @@ from fracslice.formulas import (
     transform,
     union,
 )
+from fracslice.printing.problems import verdict
 from fracslice.scene import Print
 from fracslice.slicing import SliceJob, plan_stack
 from fracslice.slicing.layer_checks import PrintReport, check_layers
@@ -174,6 +175,13 @@ def tree(r: Random) -> Node:
     """A ball on a trunk that can carry it."""
     radius = r.uniform(6, 10)
     return union(rod(8, 2), rod(radius / 3, 12), at(sphere(radius=radius), 0, 0, 11 + radius))
+
+
+def test_a_ring_on_the_plate_needs_supports_only() -> None:
+    """The plate closes it, and supports open it; a cup stays one."""
+    ring, cup_of_resin = torus(radius=10, tube=2), cup(np.random.default_rng(0))
+    assert verdict(examined(ring, 0.2).problems) == "would print with supports"
+    assert verdict(examined(cup_of_resin, 0.2).problems) == "would not print"
 
 
 GOOD: list[Family] = [brick, disc, upright_cone, ring, tunnel, ledge, dome, tower, trestle, tree]
