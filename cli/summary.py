@@ -56,7 +56,7 @@ class Closing:
     drain: float = 0.0  # diameter of the drain holes
     cavities: int = 0  # sealed cavities
     trapped: float = 0.0  # their volume, mm3
-    bodies: int = 1  # connected components
+    loose: int = 0  # bodies that do not stand on the plate
     bridge: float = 0.0  # minimum diameter of struts
 
     def lines(self) -> Iterator[str]:
@@ -83,8 +83,9 @@ class Closing:
             sealed = "a sealed cavity" if self.cavities == 1 else f"{self.cavities} sealed cavities"
             mend = "--cavities fill, or --drain 3mm for a hollow"
             yield f"{millilitres(self.trapped)} trapped in {sealed}: {mend}"
-        if self.bodies > 1:
-            yield f"{self.bodies} loose bodies: --bridge {max(self.bridge, 1):.2g}mm, or --keep largest"
+        if self.loose:
+            bodies = format_count(self.loose, "loose body", "loose bodies")
+            yield f"{bodies}: --bridge {max(self.bridge, 1):.2g}mm, or --keep largest"
         if self.contact * FLAT < self.volume / self.height:
             from fracslice.printing.problems import flat_base
 
@@ -122,7 +123,7 @@ def of_mesh(result: MeshResult, material: str, price: float | None) -> Closing:
         drain=2 * result.place.scale * max((d.radius for d in result.planned.drains), default=0.0),
         cavities=mesh.cavities,
         trapped=report.cavities_mm3,
-        bodies=mesh.components,
+        loose=report.loose_bodies,
         bridge=JOINING * report.voxel_mm,
     )
 
