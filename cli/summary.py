@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 DENSITIES = {"resin": 1.1, "pla": 1.24, "petg": 1.27, "abs": 1.04, "asa": 1.07, "tpu": 1.22}
 """Materials and their densities, g/ml; filaments as in PrusaResearch.ini of PrusaSlicer 2.5."""
 
-OF_RESIN = {"cavities", "cups", "traps", "fit"}
+OF_RESIN = {"cavities", "cups", "traps", "holes", "fit"}
 """Problems of liquid resin, and of the known printers, which are for resin."""
 
 FLAT = 50.0

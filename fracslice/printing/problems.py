@@ -26,8 +26,8 @@ Place = tuple[float, float, float]
 class Problem:
     """One reason why an object would not print."""
 
-    # "bodies", "islands", "overhangs", "necks", "cavities", "cups", "traps", "walls", "floors", "fit", "lost"
-    # or "mesh"
+    # "bodies", "islands", "overhangs", "necks", "cavities", "cups", "traps", "holes", "walls", "floors",
+    # "fit", "lost" or "mesh"
     kind: str
     text: str  # description with the size
     layer: int | None = None  # first layer of the largest one; None if layers were not examined
@@ -108,6 +108,8 @@ class Limits:
     speck: float = attribute(Number, 0.02, "an area", least=0)
     # minimum area of a suction cup, a resin trap or, in layers, a sealed cavity, mm^2
     cup: float = attribute(Number, 1.0, "an area", least=0)
+    # minimum diameter of a drain hole, mm: narrower ones may close; this limit is ours
+    hole: float = attribute(Length, 0.5, "a diameter", zero=True)
     # minimum height of a suction cup, mm; every hole in the first layers is a shallow one
     deep: float = attribute(Length, 2.0, "a height", zero=True)
     # thinnest allowed wall, mm; layers are judged by their thinnest hundredth

@@ -16,6 +16,7 @@ from ..common.messages import format_count, significant
 from ..printing.problems import SUPPORTS, Limits, Problem, flat_base
 from ..printing.solid_checks import FILL, SolidReport, check_object, loose
 from ..printing.widths import Widths, widths_of
+from ..scene import Print
 from ..work import Work
 from .feature_graph import Feature, Graph, Neck, Overhang, farthest, unsupported_pixels, weakest
 from .layers import Layer, Slicer
@@ -87,7 +88,18 @@ def problems_of(report: PrintReport, stack: Stack, limits: Limits) -> list[Probl
                 advice += f", or {SUPPORTS}"  # off the plate, it is open upwards
             place = where(largest)
             problems.append(Problem(kind, text, advice=advice, count=count, resin=volume, **place))
-    return [*problems, *report.solid.thin]
+    return [*problems, *_narrow_drains(stack, limits), *report.solid.thin]
+
+
+def _narrow_drains(stack: Stack, limits: Limits) -> Iterator[Problem]:
+    """Problem of drain holes that may close while they are printed."""
+    narrow = [drain for drain in stack.drains if 2 * drain.radius * stack.scale < limits.hole]
+    if narrow:
+        x, y, z = (stack.scale * (np.array(narrow[0].start) - stack.origin)).tolist()
+        text = f"{format_count(len(narrow), 'drain hole')} of {2 * narrow[0].radius * stack.scale:.2g} mm"
+        text += f", narrower than {limits.hole:g} mm, may close"
+        layer, mend = int(np.searchsorted(stack.tops, z)), (("drain", f"{Print().drain:g}mm"),)
+        yield Problem("holes", text, layer, (x, y, z), mend, count=len(narrow))
 
 
 def _narrow_neck(neck: Neck, stack: Stack, limits: Limits) -> Problem:

@@ -184,6 +184,14 @@ def test_a_ring_on_the_plate_needs_supports_only() -> None:
     assert verdict(examined(cup_of_resin, 0.2).problems) == "would not print"
 
 
+def test_a_drain_hole_that_may_close_is_named() -> None:
+    (hole,) = (p for p in examined(box(size=(20, 20, 20)), hollow=2, drain=0.4).problems if p.kind == "holes")
+    assert (
+        "0.4 mm, narrower than 0.5 mm" in hole.text and hole.count == 2 and hole.mend == (("drain", "3mm"),)
+    )
+    assert "holes" not in [p.kind for p in examined(box(size=(20, 20, 20)), hollow=2, drain=3).problems]
+
+
 GOOD: list[Family] = [brick, disc, upright_cone, ring, tunnel, ledge, dome, tower, trestle, tree]
 
 
