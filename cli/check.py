@@ -228,8 +228,8 @@ def longest(mesh: Mesh) -> float:
 
 
 @dataclass(frozen=True)
-class Form:
-    """Settings of an object, and the options that change them."""
+class Variant:
+    """An object with other settings, and the options that change them."""
 
     size: Sizing
     how: Print
@@ -237,7 +237,7 @@ class Form:
     faults: tuple[str, ...] = ()  # problems of its mesh
     flags: tuple[str, ...] = ()
 
-    def changed(self, settings: dict[str, str]) -> Form:
+    def changed(self, settings: dict[str, str]) -> Variant:
         """With other print settings, or another size."""
         size, values, kinds = self.size, dict(settings), type(self.how).kinds()
         if smaller := values.pop("size", None):
@@ -245,7 +245,7 @@ class Form:
         how = replace(self.how, **{name: kinds[name].read(text) for name, text in values.items()})
         return replace(self, size=size, how=how, flags=(*self.flags, *options_of(settings)))
 
-    def turned(self, up: Triple) -> Form:
+    def turned(self, up: Triple) -> Variant:
         """With another direction up."""
         return replace(self, up=up, flags=(*self.flags, "--up " + " ".join(f"{c:g}" for c in up)))
 
@@ -257,9 +257,9 @@ def options_of(settings: dict[str, str]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Attempt:
-    """A form of an object, and what its layers show."""
+    """A variant of an object, and what its layers show."""
 
-    form: Form
+    variant: Variant
     numbers: dict[str, Any]
     text: str
     problems: Sequence[Any]
@@ -288,18 +288,18 @@ def of_layers(
     `faults`: problems of its mesh.
     """
     check_targets(given.source, given.picture, given.html, given.fixed)
-    first = examine_layers(of, Form(size, how, given.up, faults), given, work)
+    first = examine_layers(of, Variant(size, how, given.up, faults), given, work)
     best, refused = mended_object(of, first, given, work) if given.fix and first.problems else (first, [])
     if best.shown and given.picture:
         draw(*best.shown, given.picture, work)
     if best.shown and given.html:
         write_page(*best.shown, [figures_of(best.shown[1])], given.source, given.html, work)
     if given.fixed:
-        write_mesh(cast("Scene", of), best.form, given, work)
+        write_mesh(cast("Scene", of), best.variant, given, work)
     lines = [f"{given.source}: {first.text}"]
     if not refused and best is first:
         return first.numbers, lines, first.problems
-    flags = " ".join(best.form.flags)
+    flags = " ".join(best.variant.flags)
     lines += refused
     lines += [f"with {flags}: {best.text}"] if flags else []
     return {"before": first.numbers, "flags": flags, "after": best.numbers}, lines, best.problems
@@ -317,24 +317,24 @@ def mended_object(
     from fracslice.scene import Scene
 
     until, lines = time.process_time() - first.seconds + MOST_SECONDS, list[str]()
-    finest = first.form.size.longest / ACROSS
+    finest = first.variant.size.longest / ACROSS
     coarse = finest > min(*given.pixels, given.layer[0])
 
-    def tried(form: Form, before: Attempt) -> Attempt | None:
-        text = " ".join(form.flags)
+    def tried(variant: Variant, before: Attempt) -> Attempt | None:
+        text = " ".join(variant.flags)
         seconds = before.seconds + (first.seconds if coarse else 0)
         if time.process_time() + seconds > until:
             lines.append(f"with {text}: not tried, as it would take more than {MOST_SECONDS:g} s")
             return None
         work.progress(f"trying {text}", 0.0)
-        return examine_layers(of, form, given, work, finest)
+        return examine_layers(of, variant, given, work, finest)
 
     settings = mend_settings(first.problems)
-    base = best = examine_layers(of, first.form, given, work, finest) if coarse else first
+    base = best = examine_layers(of, first.variant, given, work, finest) if coarse else first
     choices = [settings] if settings else []
     choices += [{name: text} for name, text in settings.items()] if len(settings) > 1 else []
     for choice in choices:
-        now = tried(best.form.changed(choice), best)
+        now = tried(best.variant.changed(choice), best)
         if now and now.mends(best):
             best = now
             if choice is settings:
@@ -342,55 +342,57 @@ def mended_object(
         elif now and (len(choice) == 1 or len(choices) == 1):
             lines.append(f"with {' '.join(options_of(choice))}: no better, left out")
     if isinstance(of, Scene) and any("--up" in problem.advice for problem in best.problems):
-        turns = [tried(best.form.turned(up), best) for up in AXES if up != best.form.up]
+        turns = [tried(best.variant.turned(up), best) for up in AXES if up != best.variant.up]
         helpful = [turned for turned in turns if turned and turned.mends(best)]
         best = min([best, *helpful], key=lambda attempt: attempt.severity)
     if best is base:
         return first, lines
-    found = examine_layers(of, best.form, given, work) if coarse else best
+    found = examine_layers(of, best.variant, given, work) if coarse else best
     if found.mends(first):
         return found, lines
-    return first, [*lines, f"with {' '.join(best.form.flags)}: no better, left out"]
+    return first, [*lines, f"with {' '.join(best.variant.flags)}: no better, left out"]
 
 
-def write_mesh(scene: Scene, form: Form, given: CheckOptions, work: Work) -> None:
-    """Write the mesh of a form of a scene."""
+def write_mesh(scene: Scene, variant: Variant, given: CheckOptions, work: Work) -> None:
+    """Write the mesh of a variant of a scene."""
     from fracslice.jobs.mesh import make_mesh
 
-    size = form.size.side if form.size.unit is None else None
-    job = replace(given.job(scene), size_mm=size, printing=form.how, up=form.up)
+    size = variant.size.side if variant.size.unit is None else None
+    job = replace(given.job(scene), size_mm=size, printing=variant.how, up=variant.up)
     make_mesh(scene, job, work, given.fixed)
 
 
 def examine_layers(
-    of: Scene | Field, form: Form, given: CheckOptions, work: Work, finest: float = 0.0
+    of: Scene | Field, variant: Variant, given: CheckOptions, work: Work, finest: float = 0.0
 ) -> Attempt:
-    """Check the layers of a form of an object, in layers and pixels of at least `finest` mm."""
+    """Check the layers of a variant of an object, in layers and pixels of at least `finest` mm."""
     from fracslice.jobs.completeness import layers_amount
     from fracslice.printing.problems import Problem
     from fracslice.scene import Scene
     from fracslice.slicing import SliceJob, Slicer, adapted, plan_stack
     from fracslice.slicing.layer_checks import check_layers, misfit
 
-    begun, machine, size = time.process_time(), given.machine, form.size
+    begun, machine, size = time.process_time(), given.machine, variant.size
     layer, most = (step and max(step, finest) for step in given.layer)
     across, along = (max(step, finest) for step in given.pixels)
-    job = SliceJob(size.side, layer, (across, along), form.up, form.how, size.factors, size.unit)
+    job = SliceJob(size.side, layer, (across, along), variant.up, variant.how, size.factors, size.unit)
     stack = plan_stack(of.root if isinstance(of, Scene) else of, job, work)
     if machine and (unfit := misfit(stack, machine)):
         numbers = {"size": stack.size, "fits": False, "problems": [str(unfit)]}
         spent = time.process_time() - begun
-        return Attempt(form, numbers, f"would not print: {unfit}", [unfit], None, spent)
+        return Attempt(variant, numbers, f"would not print: {unfit}", [unfit], None, spent)
     if work.cluster and isinstance(of, Scene):
         stack, report = shared_check(of, job, most, given, work)
     else:
         stack = stack if most is None else adapted(stack, most, work)
         report = check_layers(stack, given.limits, machine, work)
     lost = [Problem("lost", text) for text in layers_amount(Slicer(stack, work), work).problems]
-    faults = [Problem("mesh", text) for text in form.faults]
+    faults = [Problem("mesh", text) for text in variant.faults]
     report = replace(report, problems=[*faults, *lost, *report.problems])
     report, spent = of_material(report, given.material), time.process_time() - begun
-    return Attempt(form, report.as_dict(), describe_report(report), report.problems, (stack, report), spent)
+    return Attempt(
+        variant, report.as_dict(), describe_report(report), report.problems, (stack, report), spent
+    )
 
 
 def shared_check(
