@@ -308,9 +308,9 @@ def of_layers(
 def mended_object(
     of: Scene | Field, first: Attempt, given: CheckOptions, work: Work
 ) -> tuple[Attempt, list[str]]:
-    """The best of the object and its mended forms, and a line on each that was left out.
+    """The best of the object and its mended variants, and a line on each that was left out.
 
-    All settings that the problems name are tried at once, then one by one; then other directions up. Forms
+    All settings that the problems name are tried at once, then one by one; then other directions up. They
     are compared in coarse layers; the best is examined in those that were asked for.
     """
     from fracslice.printing.problems import mend_settings
