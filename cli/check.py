@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import click
 
 from fracslice.common.messages import decimal, format_count, significant
 from fracslice.records import PIXEL, MeshJob, Placed, Print, SliceJob
 
-from .inputs import BadInput, check_targets, is_model, load_model, load_scene, refuse_options
+from .inputs import MODELS, BadInput, check_targets, is_model, load_model, load_scene, refuse_options
 from .options import (
     LENGTH,
     ClusterOptions,
@@ -42,15 +43,22 @@ if TYPE_CHECKING:
     from fracslice.work import Work
 
 SHARED = {"cluster", "shard", "store"}
-OF_LAYERS = {*SHARED, "pixel", "machine", "picture", "html", "fix", "material"}
 OF_MESHES = MeshJob.kinds().keys() - Placed.kinds().keys()
-OF_SCENES = {*OF_MESHES, *SHARED, "settings"}
+OF_SCENES = {*OF_MESHES, *SHARED, "settings", "fixed"}
 
 AXES = (0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0)
 """Directions up that --fix tries."""
 
+THINNEST = SliceJob().layer[0]
+"""Least height of a layer, if --layer is not given, mm."""
+
 ACROSS = 256
-"""Layers of a model's longest side, if --layer is not given, unless they would be thinner than `LAYER`."""
+"""Layers of the longest side, if --layer is not given, unless they would be thinner than `THINNEST`; and most
+layers of it in which --fix compares what it tries.
+"""
+
+MOST_SECONDS = 60.0
+"""CPU seconds of checks with --fix; what would take longer is not tried."""
 
 
 def limit(text: str) -> Any:
@@ -68,15 +76,23 @@ class CheckOptions(LayerOptions, MeshOptions, ClusterOptions):
     up: Triple
     scale: Triple
     pixel: tuple[float, float] | None
-    layer: Any = kind_option(SliceJob.kinds()["layer"], None, "Check layers of this height")
-    machine: Printer | None = printer_option(
-        'With layers: the printer that the object must fit; "list" shows all.'
+    layer: Any = kind_option(
+        SliceJob.kinds()["layer"],
+        None,
+        "Check layers of this height, and no mesh; 256 layers and a mesh by default",
     )
-    picture: str | None = option(Name("FILE.png", ".png"), "With layers: draw the worst layers.")
-    fix: bool = flag("With layers: try what would mend the problems, and keep what helps.")
+    machine: Printer | None = printer_option('The printer that the object must fit; "list" shows all.')
+    picture: str | None = option(Name("FILE.png", ".png"), "Draw the worst layers.")
+    fix: bool = flag("Try what would mend the problems, and keep what helps.")
+    fixed: str | None = option(
+        Name("FILE", *sorted(MODELS)),
+        "With --fix, of a scene: write the mesh of what it made.",
+        "-o",
+        "--output",
+    )
     material: str = option(
         click.Choice(list(DENSITIES)),
-        "With layers: resin by default. Filaments have no resin traps, suction cups and sealed cavities.",
+        "Resin by default. Filaments have no resin traps, suction cups and sealed cavities.",
         default="resin",
     )
     wall: float = limit("walls")
@@ -97,19 +113,21 @@ class CheckOptions(LayerOptions, MeshOptions, ClusterOptions):
 
 @command(CheckOptions, short_help="Say whether a model, or a scene's mesh or layers, would print.")
 def check(given: CheckOptions) -> int:
-    """Say whether a model file, or the mesh or the layers of a scene, would print as it is.
+    """Say whether a model file, or a scene, would print as it is.
 
-    The layers of a model are always checked, those of a scene with --layer. Each problem comes with its
-    layer, its place in mm from the middle of the object and above its lowest point, and the option that mends
-    it. Exit status: 1 if it would not print, or only with supports.
+    The mesh and its layers are checked; with --layer, the layers of a scene alone. Each problem comes with
+    its layer, its place in mm from the middle of the object and above its lowest point, and the option that
+    mends it. Exit status: 1 if it would not print, or only with supports.
 
     Examples
     --------
     fracslice check part.stl --printer sl1s
     fracslice check mandelbulb --size 60mm --layer 0.05mm --html summary.html
-    fracslice check my.xml --layer 0.05mm --fix
+    fracslice check my.xml --layer 0.05mm --fix -o fixed.stl
     fracslice check vase.stl --layer 0.2mm --wall 0.4mm --material pla
     """
+    if not given.fix:
+        refuse_options({"fixed"}, "only with --fix")
     if is_model(given.source):
         refuse_options(OF_SCENES, "only for scenes, and a model was given")
         checked = of_model
@@ -117,7 +135,7 @@ def check(given: CheckOptions) -> int:
         refuse_options(OF_MESHES, "only for meshes, and --layer checks layers")
         checked = of_scene
     else:
-        refuse_options(OF_LAYERS, "only with --layer")
+        refuse_options(SHARED, "only with --layer")
         checked = of_mesh
     with given.working() as work:
         numbers, lines, problems = checked(given, work)
@@ -132,17 +150,24 @@ Checked = tuple[dict[str, Any], list[str], Sequence[object]]
 
 
 def of_mesh(given: CheckOptions, work: Work) -> Checked:
-    """Check the mesh of a scene."""
+    """Check the mesh of a scene, and its layers."""
     from fracslice.jobs.mesh import make_mesh
-    from fracslice.printing.solid_checks import check_solid
+    from fracslice.volume.sizing import sizing
 
     scene = load_scene(given.source, given.settings)
-    result = make_mesh(scene, given.mesh_job(scene), work)
-    solid = check_solid(result.root, result.bricks, result.place.scale, given.limits, work)
-    problems = (*result.report.problems, *solid.thin)
-    hint = "" if problems else "; --layer looks at islands, cups, traps, overhangs and necks, too"
-    numbers = result.report.as_dict() | {"solid": solid.as_dict()}
-    return numbers, [summary(given.source, result.report), solid.unseen, verdict(problems) + hint], problems
+    report = make_mesh(scene, given.mesh_job(scene), work).report
+    size = sizing(scene, given.size, given.scale, work)
+    layered = in_layers(given, size.longest)
+    how, faults = given.printing(scene.printing), report.problems
+    layers, lines, problems = of_layers(scene, size, how, layered, work, faults)
+    return report.as_dict() | {"layers": layers}, [summary(given.source, report), *lines], problems
+
+
+def in_layers(given: CheckOptions, size: float) -> CheckOptions:
+    """Options with a layer height and a pixel for an object of this size, mm, where none were given."""
+    height = max(size / ACROSS, THINNEST)
+    pixel = None if given.machine else 2 * (max(height, PIXEL),)
+    return given.but(layer=given.layer or (height, None), pixel=given.pixel or pixel)
 
 
 def of_scene(given: CheckOptions, work: Work) -> Checked:
@@ -174,31 +199,25 @@ def of_model(given: CheckOptions, work: Work) -> Checked:
         report = check_mesh(mesh, threads=work.threads)
     except MeshError as error:
         raise BadInput(f"{given.source}: {error}") from error
-    line, numbers = f"{given.source}: {figures(report)}", report.as_dict()
-    if not report.problems:
-        line = f"{given.source}: {sizes(report)}"
+    line, numbers = f"{given.source}: {sizes(report)}", report.as_dict()
     if not report.watertight or report.misoriented_edges or not report.volume_mm3:
-        return numbers, [line], report.problems
-    size, thinnest = longest(mesh), SliceJob().layer[0]
-    if size <= thinnest and given.layer is None:
+        return numbers, [f"{given.source}: {figures(report)}"], report.problems
+    size = longest(mesh)
+    if size <= THINNEST and given.layer is None:
         raise BadInput(f"{given.source}: {size:.3g} mm long, less than a layer: expected a model in mm")
-    height = max(size / ACROSS, thinnest)
-    layered = given.but(
-        layer=given.layer or (height, None),
-        pixel=given.pixel or (None if given.machine else 2 * (max(height, PIXEL),)),
-        up=UP,
-    )
+    layered = in_layers(given, size).but(up=UP)
     factor = size / side  # the mesh is compensated already: a size that is advised is before that
     sides = Sizing(side, 1 / factor, (factor,) * 3)
     field = MeshField(replace(mesh, vertices=mesh.vertices - mesh.bounds.mean(0)))
     try:
-        layers, lines, problems = of_layers(field, sides, given.printing(Print()), layered, work)
+        how, faults = given.printing(Print()), report.problems
+        layers, lines, problems = of_layers(field, sides, how, layered, work, faults)
     except EmptyError:
         pixel = max(layered.slice_job(Print()).pixels)
         finest = f"layer of {layered.layer[0]:.3g} mm has a pixel of {pixel:.3g} mm"
         nothing = f"no {finest} inside: all of it is thinner"
-        return numbers, [line, verdict([nothing])], (*report.problems, nothing)
-    return numbers | {"layers": layers}, [line, *lines], (*report.problems, *problems)
+        return numbers, [line, verdict([*report.problems, nothing])], (*report.problems, nothing)
+    return numbers | {"layers": layers}, [line, *lines], problems
 
 
 def place(mesh: Mesh, up: Triple, scale: Triple) -> Mesh:
@@ -218,17 +237,43 @@ def longest(mesh: Mesh) -> float:
 
 
 @dataclass(frozen=True)
-class Attempt:
-    """An object with some settings, and what its layers show."""
+class Variant:
+    """An object with other settings, and the options that change them."""
 
-    flags: tuple[str, ...]
     size: Sizing
     how: Print
     up: Triple
+    faults: tuple[str, ...] = ()  # problems of its mesh
+    flags: tuple[str, ...] = ()
+
+    def changed(self, settings: dict[str, str]) -> Variant:
+        """With other print settings, or another size."""
+        size, values, kinds = self.size, dict(settings), type(self.how).kinds()
+        if smaller := values.pop("size", None):
+            size = replace(size, side=float(smaller[:-2]), unit=None)
+        how = replace(self.how, **{name: kinds[name].read(text) for name, text in values.items()})
+        return replace(self, size=size, how=how, flags=(*self.flags, *options_of(settings)))
+
+    def turned(self, up: Triple) -> Variant:
+        """With another direction up."""
+        return replace(self, up=up, flags=(*self.flags, "--up " + " ".join(f"{c:g}" for c in up)))
+
+
+def options_of(settings: dict[str, str]) -> tuple[str, ...]:
+    """Print settings as options."""
+    return tuple(f"--{name} {text}" for name, text in settings.items())
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """A variant of an object, and what its layers show."""
+
+    variant: Variant
     numbers: dict[str, Any]
     text: str
     problems: Sequence[Any]
     shown: tuple[Stack, PrintReport] | None
+    seconds: float  # CPU time of the check
 
     @property
     def severity(self) -> tuple[int, float]:
@@ -237,21 +282,34 @@ class Attempt:
 
         return severity(self.problems)
 
+    def mends(self, other: Attempt) -> bool:
+        """See `fracslice.printing.problems.mends`."""
+        from fracslice.printing.problems import mends
 
-def of_layers(of: Scene | Field, size: Sizing, how: Print, given: CheckOptions, work: Work) -> Checked:
-    """Check the layers of an object; with --fix, try what mends its problems and keep what helps."""
-    check_targets(given.source, given.picture, given.html)
-    first = examine_layers(of, size, how, given.up, (), given, work)
-    best, refused = mended_object(of, first, given, work) if given.fix else (first, [])
+        return mends(self.problems, other.problems)
+
+
+def of_layers(
+    of: Scene | Field, size: Sizing, how: Print, given: CheckOptions, work: Work, faults: tuple[str, ...] = ()
+) -> Checked:
+    """Check the layers of an object; with --fix, try what mends its problems and keep what helps.
+
+    `faults`: problems of its mesh.
+    """
+    check_targets(given.source, given.picture, given.html, given.fixed)
+    first = examine_layers(of, Variant(size, how, given.up, faults), given, work)
+    best, refused = mended_object(of, first, given, work) if given.fix and first.problems else (first, [])
     if best.shown and given.picture:
         draw(*best.shown, given.picture, work)
     if best.shown and given.html:
         write_page(*best.shown, [figures_of(best.shown[1])], given.source, given.html, work)
+    if given.fixed:
+        write_mesh(cast("Scene", of), best.variant, given, work)
     lines = [f"{given.source}: {first.text}"]
     if not refused and best is first:
         return first.numbers, lines, first.problems
-    flags = " ".join(best.flags)
-    lines += [f"with {text}: no better, left out" for text in refused]
+    flags = " ".join(best.variant.flags)
+    lines += refused
     lines += [f"with {flags}: {best.text}"] if flags else []
     return {"before": first.numbers, "flags": flags, "after": best.numbers}, lines, best.problems
 
@@ -259,73 +317,96 @@ def of_layers(of: Scene | Field, size: Sizing, how: Print, given: CheckOptions, 
 def mended_object(
     of: Scene | Field, first: Attempt, given: CheckOptions, work: Work
 ) -> tuple[Attempt, list[str]]:
-    """The best of the object and its mended forms, and the settings that made it no better.
+    """The best of the object and its mended variants, and a line on each that was left out.
 
-    All settings that the problems name are tried at once, then one by one; then other directions up.
+    All settings that the problems name are tried at once, then one by one; then other directions up. They
+    are compared in coarse layers; the best is examined in those that were asked for.
     """
     from fracslice.printing.problems import mend_settings
+    from fracslice.scene import Scene
 
-    def tried(of_best: Attempt, settings: dict[str, str], up: Triple) -> Attempt:
-        size, values = of_best.size, dict(settings)
-        if smaller := values.pop("size", None):
-            size = replace(size, side=float(smaller[:-2]), unit=None)
-        kinds = type(of_best.how).kinds()
-        how = replace(of_best.how, **{name: kinds[name].read(text) for name, text in values.items()})
-        turned = () if up == of_best.up else ("--up " + " ".join(f"{c:g}" for c in up),)
-        flags = (*of_best.flags, *(f"--{name} {text}" for name, text in settings.items()), *turned)
-        return examine_layers(of, size, how, up, flags, given, work)
+    until, lines = time.process_time() - first.seconds + MOST_SECONDS, list[str]()
+    finest = first.variant.size.longest / ACROSS
+    asked = given.slice_job(first.variant.how)
+    coarse = finest > min(*asked.pixels, asked.layer[0])
 
-    settings, best, refused = mend_settings(first.problems), first, list[str]()
+    def tried(variant: Variant, before: Attempt) -> Attempt | None:
+        text = " ".join(variant.flags)
+        seconds = before.seconds + (first.seconds if coarse else 0)
+        if time.process_time() + seconds > until:
+            lines.append(f"with {text}: not tried, as it would take more than {MOST_SECONDS:g} s")
+            return None
+        work.progress(f"trying {text}", 0.0)
+        return examine_layers(of, variant, given, work, finest)
+
+    settings = mend_settings(first.problems)
+    base = best = examine_layers(of, first.variant, given, work, finest) if coarse else first
     choices = [settings] if settings else []
-    if len(settings) > 1:
-        choices += [{name: text} for name, text in settings.items()]
+    choices += [{name: text} for name, text in settings.items()] if len(settings) > 1 else []
     for choice in choices:
-        now = tried(best, choice, best.up)
-        if now.severity < best.severity:
+        now = tried(best.variant.changed(choice), best)
+        if now and now.mends(best):
             best = now
             if choice is settings:
                 break
-        elif len(choice) == 1 or len(choices) == 1:
-            refused.append(" ".join(f"--{name} {text}" for name, text in choice.items()))
-    if hasattr(of, "root") and any("--up" in problem.advice for problem in best.problems):
-        turns = [tried(best, {}, up) for up in AXES if up != best.up]
-        best = min([best, *turns], key=lambda attempt: attempt.severity)
-    return best, refused
+        elif now and (len(choice) == 1 or len(choices) == 1):
+            lines.append(f"with {' '.join(options_of(choice))}: no better, left out")
+    if isinstance(of, Scene) and any("--up" in problem.advice for problem in best.problems):
+        turns = [tried(best.variant.turned(up), best) for up in AXES if up != best.variant.up]
+        helpful = [turned for turned in turns if turned and turned.mends(best)]
+        best = min([best, *helpful], key=lambda attempt: attempt.severity)
+    if best is base:
+        return first, lines
+    found = examine_layers(of, best.variant, given, work) if coarse else best
+    if found.mends(first):
+        return found, lines
+    return first, [*lines, f"with {' '.join(best.variant.flags)}: no better, left out"]
+
+
+def write_mesh(scene: Scene, variant: Variant, given: CheckOptions, work: Work) -> None:
+    """Write the mesh of a variant of a scene."""
+    from fracslice.jobs.mesh import make_mesh
+
+    size = variant.size.side if variant.size.unit is None else None
+    job = replace(given.mesh_job(scene), size_mm=size, printing=variant.how, up=variant.up)
+    make_mesh(scene, job, work, given.fixed)
 
 
 def examine_layers(
-    of: Scene | Field,
-    size: Sizing,
-    how: Print,
-    up: Triple,
-    flags: tuple[str, ...],
-    given: CheckOptions,
-    work: Work,
+    of: Scene | Field, variant: Variant, given: CheckOptions, work: Work, finest: float = 0.0
 ) -> Attempt:
-    """Check the layers of an object once."""
+    """Check the layers of a variant of an object, in layers and pixels of at least `finest` mm."""
     from fracslice.jobs.completeness import layers_amount
     from fracslice.printing.problems import Problem
     from fracslice.scene import Scene
     from fracslice.slicing import Slicer, adapted, plan_stack
     from fracslice.slicing.layer_checks import check_layers, misfit
 
-    machine, most = given.machine, given.layer[1]
+    begun, machine, size = time.process_time(), given.machine, variant.size
     side = None if size.unit else size.side
-    job = replace(given.slice_job(how), up=up, size=side)
-    root = of.root if isinstance(of, Scene) else of
-    stack, settings = plan_stack(root, job, work, size), (flags, size, how, up)
+    job = replace(given.slice_job(variant.how), up=variant.up, size=side)
+    if finest:
+        layer = tuple(step and max(step, finest) for step in job.layer)
+        pixel = tuple(max(step, finest) for step in job.pixels)
+        job = replace(job, layer=layer, pixel=pixel, printer=None)
+    most = job.layer[1]
+    stack = plan_stack(of.root if isinstance(of, Scene) else of, job, work, size)
     if machine and (unfit := misfit(stack, machine)):
         numbers = {"size": stack.size, "fits": False, "problems": [str(unfit)]}
-        return Attempt(*settings, numbers, f"would not print: {unfit}", [unfit], None)
+        spent = time.process_time() - begun
+        return Attempt(variant, numbers, f"would not print: {unfit}", [unfit], None, spent)
     if work.cluster and isinstance(of, Scene):
         stack, report = shared_check(of, job, given, work)
     else:
         stack = stack if most is None else adapted(stack, most, work)
         report = check_layers(stack, given.limits, machine, work)
-    if lost := layers_amount(Slicer(stack, work), work).problems:
-        report = replace(report, problems=[*(Problem("lost", text) for text in lost), *report.problems])
-    report = of_material(report, given.material)
-    return Attempt(*settings, report.as_dict(), describe_report(report), report.problems, (stack, report))
+    lost = [Problem("lost", text) for text in layers_amount(Slicer(stack, work), work).problems]
+    faults = [Problem("mesh", text) for text in variant.faults]
+    report = replace(report, problems=[*faults, *lost, *report.problems])
+    report, spent = of_material(report, given.material), time.process_time() - begun
+    return Attempt(
+        variant, report.as_dict(), describe_report(report), report.problems, (stack, report), spent
+    )
 
 
 def shared_check(scene: Scene, job: SliceJob, given: CheckOptions, work: Work) -> tuple[Stack, PrintReport]:

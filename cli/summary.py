@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 DENSITIES = {"resin": 1.1, "pla": 1.24, "petg": 1.27, "abs": 1.04, "asa": 1.07, "tpu": 1.22}
 """Materials and their densities, g/ml; filaments as in PrusaResearch.ini of PrusaSlicer 2.5."""
 
-OF_RESIN = {"cavities", "cups", "traps", "fit"}
+OF_RESIN = {"cavities", "cups", "traps", "holes", "fit"}
 """Problems of liquid resin, and of the known printers, which are for resin."""
 
 FLAT = 50.0
@@ -57,7 +57,7 @@ class Closing:
     drain: float = 0.0  # diameter of the drain holes
     cavities: int = 0  # sealed cavities
     trapped: float = 0.0  # their volume, mm3
-    bodies: int = 1  # connected components
+    loose: int = 0  # bodies that do not stand on the plate
     bridge: float = 0.0  # minimum diameter of struts
 
     def lines(self) -> Iterator[str]:
@@ -84,8 +84,9 @@ class Closing:
             sealed = "a sealed cavity" if self.cavities == 1 else f"{self.cavities} sealed cavities"
             mend = "--cavities fill, or --drain 3mm for a hollow"
             yield f"{millilitres(self.trapped)} trapped in {sealed}: {mend}"
-        if self.bodies > 1:
-            yield f"{self.bodies} loose bodies: --bridge {max(self.bridge, 1):.2g}mm, or --keep largest"
+        if self.loose:
+            bodies = format_count(self.loose, "loose body", "loose bodies")
+            yield f"{bodies}: --bridge {max(self.bridge, 1):.2g}mm, or --keep largest"
         if self.contact * FLAT < self.volume / self.height:
             from fracslice.printing.problems import flat_base
 
@@ -121,7 +122,7 @@ def of_mesh(result: Result, material: str, price: float | None) -> Closing:
         drain=2 * result.place.scale * max((d.radius for d in result.planned.drains), default=0.0),
         cavities=mesh.cavities,
         trapped=report.cavities_mm3,
-        bodies=mesh.components,
+        loose=report.loose_bodies,
         bridge=JOINING * report.voxel_mm,
     )
 

@@ -362,7 +362,7 @@ class SliceJob(Placed, RasterOptions):
         For an invalid value.
     """
 
-    layer: Given[AnyLength | Sequence[AnyLength], tuple[float, float | None]] = attribute(
+    layer: Given[AnyLength | Sequence[AnyLength | None], tuple[float, float | None]] = attribute(
         Heights,
         (0.05, None),
         "height of a layer; or a range, 0.05mm..0.2mm: thick where the surface is steep",

@@ -85,6 +85,9 @@ class Finish:
         self.stays, removed = choose(sized, keep=how.bodies, dust_mm3=limit, cavities=how.cavities)
         (x, y, _), lowest = planned.box.centre, float(shells.bounds(self.stays)[0, 2])
         self.place = Placement(scale, (-scale * x, -scale * y, -scale * lowest))
+        bottoms = shells.outermost[self.stays & (shells.volumes > 0), 2, 2]
+        self.loose = int((bottoms > lowest + planned.voxel).sum())
+        """Bodies that do not stand on the plate."""
         self.removed: Removed = removed
         self.size: list[float] = (scale * np.ptp(shells.bounds(), axis=0)).tolist()
         """Size of all bodies, removed ones included, mm."""

@@ -269,6 +269,7 @@ class _Job:
             ),
             depths=planned.depths,
             contact_mm2=float(f"{made.contact:.9g}"),  # sums over pieces differ in the last digit
+            loose_bodies=finish.loose,
             cavities_mm3=float(f"{finish.cavities + 0.0:.9g}"),
             lost_mm=lost,
             missing_volume_share=round(

@@ -103,6 +103,8 @@ class Report:
         Automatic depths of fractals.
     contact_mm2 : float
         Area on the plate, mm2.
+    loose_bodies : int
+        Bodies that do not stand on the plate; those that do are parts.
     cavities_mm3 : float
         Volume of sealed cavities, mm3.
     proved : float, optional
@@ -136,6 +138,7 @@ class Report:
     notes: tuple[str, ...] = ()
     depths: tuple[str, ...] = ()
     contact_mm2: float = 0.0
+    loose_bodies: int = 0
     cavities_mm3: float = 0.0
     proved: float | None = None
     measured: tuple[str, ...] = ()

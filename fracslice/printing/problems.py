@@ -25,8 +25,8 @@ Place = tuple[float, float, float]
 class Problem:
     """One reason why an object would not print."""
 
-    # "bodies", "islands", "overhangs", "necks", "cavities", "cups", "traps", "walls", "floors", "fit" or
-    # "lost"
+    # "bodies", "islands", "overhangs", "necks", "cavities", "cups", "traps", "holes", "walls", "floors",
+    # "fit", "lost" or "mesh"
     kind: str
     text: str  # description with the size
     layer: int | None = None  # first layer of the largest one; None if layers were not examined
@@ -34,6 +34,7 @@ class Problem:
     mend: tuple[tuple[str, str], ...] = ()  # print settings that mend it, by name; empty if none does
     advice: str = ""  # what else helps
     count: int = 1  # number of features, such as traps
+    resin: float = 0.0  # volume of resin that stays in it, mm3
 
     def __str__(self) -> str:
         """The problem in one line."""
@@ -66,6 +67,16 @@ def severity(problems: Sequence[object]) -> tuple[int, float]:
     return rank, 1000.0 * (len(problems) - len(own)) + sum(WEIGHTS.get(p.kind, 1.0) * p.count for p in own)
 
 
+def mends(made: Sequence[object], others: Sequence[object]) -> bool:
+    """True if problems are less bad than others: in the verdict, or in number while no more resin stays."""
+    mine, theirs = severity(made), severity(others)
+    resin, of_others = (
+        sum(problem.resin for problem in problems if isinstance(problem, Problem))
+        for problems in (made, others)
+    )
+    return mine[0] < theirs[0] or (mine < theirs and resin <= of_others)
+
+
 def flat_base(height: float) -> str:
     """Setting "base" by which an object stands flat: a fiftieth of it, 0.5 mm or more, but at most a quarter.
 
@@ -96,6 +107,8 @@ class Limits:
     speck: float = attribute(Number, 0.02, "an area", least=0)
     # minimum area of a suction cup, a resin trap or, in layers, a sealed cavity, mm^2
     cup: float = attribute(Number, 1.0, "an area", least=0)
+    # minimum diameter of a drain hole, mm: narrower ones may close; this limit is ours
+    hole: float = attribute(Length, 0.5, "a diameter", zero=True)
     # minimum height of a suction cup, mm; every hole in the first layers is a shallow one
     deep: float = attribute(Length, 2.0, "a height", zero=True)
     # thinnest allowed wall, mm; layers are judged by their thinnest hundredth

@@ -366,17 +366,24 @@ AGAIN = 3.0
 
 
 def sampled_object(root: Field, outer: Box, longest: float, samples: float, work: Work) -> Bricks:
-    """Sample an object, finer until a surface appears: a plate may lie between all samples.
+    """Sample an object until a surface appears: a plate may lie between all samples.
+
+    A lattice has no samples on the middle planes of its box. Where it shows nothing, one that has is tried,
+    then a finer one.
 
     `outer`, `longest` in scene units.
     """
-    while True:
-        try:
-            return sample(root.kernel(), root.bounds, Lattice.around(outer, longest / samples), work)
-        except VolumeError:
-            samples *= 2
-            if samples > FINEST:
-                raise
+    for times in (1, 2, 4, 8):
+        lattice = Lattice.around(outer, longest / (times * samples))
+        x, y, z = (first - lattice.voxel / 2 for first in lattice.origin)
+        for grid in (lattice, replace(lattice, origin=(x, y, z))):
+            try:
+                return sample(root.kernel(), root.bounds, grid, work)
+            except VolumeError as error:
+                failure = error
+        if 2 * times * samples > FINEST:
+            break
+    raise failure
 
 
 def resolve_connectivity(

@@ -16,6 +16,7 @@ from ..common.messages import format_count, significant
 from ..printing.problems import SUPPORTS, Limits, Problem, flat_base
 from ..printing.solid_checks import FILL, SolidReport, check_object, loose
 from ..printing.widths import Widths, widths_of
+from ..scene import Print
 from ..work import Work
 from .feature_graph import Feature, Graph, Neck, Overhang, farthest, unsupported_pixels, weakest
 from .layers import Layer, Slicer
@@ -70,21 +71,35 @@ def problems_of(report: PrintReport, stack: Stack, limits: Limits) -> list[Probl
     if report.neck and report.neck.ratio > limits.neck:
         problems.append(_narrow_neck(report.neck, stack, limits))
     if report.cavities:
-        sealed = format_count(len(report.cavities), "sealed cavity", "sealed cavities")
-        text = f"{sealed} with {significant(sum(c.volume for c in report.cavities))} mm3 of resin"
-        problems.append(
-            Problem("cavities", text, mend=FILL, count=len(report.cavities), **where(report.cavities[0]))
-        )
+        count, volume = len(report.cavities), sum(c.volume for c in report.cavities)
+        sealed = format_count(count, "sealed cavity", "sealed cavities")
+        text = f"{sealed} with {significant(volume)} mm3 of resin"
+        place = where(report.cavities[0])
+        problems.append(Problem("cavities", text, mend=FILL, count=count, resin=volume, **place))
     for kind, noun, hollows in (("cups", "suction cup", report.cups), ("traps", "resin trap", report.traps)):
         remaining = [hollow for hollow in hollows if hollow not in report.cavities]
         if remaining:
             largest = max(remaining, key=lambda h: h.area)
-            volume = significant(sum(h.volume for h in remaining))
-            text = f"{format_count(len(remaining), noun)} with {volume} mm3 of resin"
+            volume = sum(h.volume for h in remaining)
+            text = f"{format_count(len(remaining), noun)} with {significant(volume)} mm3 of resin"
             text += f", the largest {significant(largest.area)} mm2"
             advice, count = "--up, or a drain hole", len(remaining)
-            problems.append(Problem(kind, text, advice=advice, count=count, **where(largest)))
-    return [*problems, *report.solid.thin]
+            if kind == "cups" and all(hollow.layers[0] == 0 for hollow in remaining):
+                advice += f", or {SUPPORTS}"  # off the plate, it is open upwards
+            place = where(largest)
+            problems.append(Problem(kind, text, advice=advice, count=count, resin=volume, **place))
+    return [*problems, *_narrow_drains(stack, limits), *report.solid.thin]
+
+
+def _narrow_drains(stack: Stack, limits: Limits) -> Iterator[Problem]:
+    """Problem of drain holes that may close while they are printed."""
+    narrow = [drain for drain in stack.drains if 2 * drain.radius * stack.scale < limits.hole]
+    if narrow:
+        x, y, z = (stack.scale * (np.array(narrow[0].start) - stack.origin)).tolist()
+        text = f"{format_count(len(narrow), 'drain hole')} of {2 * narrow[0].radius * stack.scale:.2g} mm"
+        text += f", narrower than {limits.hole:g} mm, may close"
+        layer, mend = int(np.searchsorted(stack.tops, z)), (("drain", f"{Print().drain:g}mm"),)
+        yield Problem("holes", text, layer, (x, y, z), mend, count=len(narrow))
 
 
 def _narrow_neck(neck: Neck, stack: Stack, limits: Limits) -> Problem:

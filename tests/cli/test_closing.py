@@ -32,7 +32,7 @@ def test_everything_that_a_maker_asks() -> None:
         drain=3,
         cavities=2,
         trapped=1200,
-        bodies=3,
+        loose=3,
     )
     assert list(whole.lines()) == [
         "38.2 ml, 42 g of Siraya Tech Fast Grey (1.1 g/ml), 1,200 layers, 3 h 25 min, cost 1.91",
@@ -43,13 +43,25 @@ def test_everything_that_a_maker_asks() -> None:
     ]
     many = list(replace(whole, drains=[(-30.0, 0.0, 4.0)] * 5).lines())[1]
     assert many == "drain holes of 3 mm leave the hollow at -30.0 0.0 4.0 mm and at 4 other places"
-    assert list(replace(whole, trapped=0.0644, drains=(), bodies=1, contact=50).lines())[1:] == []
-    tiny = replace(whole, volume=8, trapped=0.0644, drains=(), bodies=1, contact=50)
+    assert list(replace(whole, trapped=0.0644, drains=(), loose=0, contact=50).lines())[1:] == []
+    tiny = replace(whole, volume=8, trapped=0.0644, drains=(), loose=0, contact=50)
     assert [line.split(":")[0].split(",")[0] for line in tiny.lines()] == [
         "8 mm3",
         "0.064 mm3 trapped in 2 sealed cavities",
     ]
     assert [duration(s) for s in (0.1, 60, 3599, 7260)] == ["1 s", "1 min", "1 h 0 min", "2 h 1 min"]
+
+
+def test_parts_on_the_plate_are_not_loose(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    for height, loose in ((0, 0), (3, 1)):
+        other = f'<transform translate="4 0 {height}"><box size="2 2 2"/></transform>'
+        (tmp_path / "two.xml").write_text(
+            f'<scene version="1"><solid unit="1mm"><union><box size="2 2 2"/>{other}</union></solid></scene>'
+        )
+        out = printed(capfd, "mesh", tmp_path / "two.xml", "-o", tmp_path / "m.stl", "--resolution", 24)
+        assert [line for line in out if "loose" in line or "largest" in line] == [
+            "1 loose body: --bridge 1mm, or --keep largest"
+        ] * loose
 
 
 def test_the_base_that_is_advised_leaves_most_of_a_tiny_object(

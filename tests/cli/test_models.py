@@ -6,6 +6,7 @@ import base64
 import io
 import json
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree as Tree
 
 import numpy as np
@@ -16,6 +17,7 @@ from fracslice.cli.main import run
 from PIL import Image
 
 from fracslice.mesh import Mesh
+from fracslice.printing.problems import Problem, mends
 
 pytestmark = pytest.mark.once
 
@@ -124,6 +126,61 @@ def test_fix_leaves_out_what_does_not_help(
     assert run(command) == 1
     report = json.loads(capfd.readouterr().out)
     assert report["flags"] == "" and report["after"] == report["before"]
+
+
+STEP = """<scene version="1"><solid unit="1mm"><union><box size="4 4 4"/>
+<transform translate="4 0 4"><box size="4 4 4"/></transform></union></solid></scene>"""
+
+
+def test_an_object_has_one_verdict(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Two cubes touch along an edge, one above the other: as a scene, as its layers, and as a model."""
+    scene, model = tmp_path / "step.xml", tmp_path / "step.stl"
+    scene.write_text(STEP)
+    assert run(["mesh", str(scene), "-o", str(model), "--resolution", "16", "-q"]) == 0
+    for source in ([scene, "--resolution", "16"], [scene, "--layer", "0.1mm"], [model]):
+        assert run(["check", *map(str, source), "-q"]) == 1
+        out = capfd.readouterr().out
+        assert out.count("would") == 1 and "would not print" in out and "  1 loose body: " in out
+
+
+def test_a_model_with_faults_and_good_layers_has_one_verdict(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    other = box((20, 20, 2))
+    other.apply_translation((5, 5, 0))
+    trimesh.util.concatenate([box(PLATE), other]).export(tmp_path / "over.stl")
+    assert run(["check", str(tmp_path / "over.stl"), *COARSE]) == 1
+    out = capfd.readouterr().out
+    assert out.count("would") == 1 and "would not print:" in out and "that cut or touch others" in out
+
+
+def test_fix_writes_what_it_made(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene, made = tmp_path / "step.xml", tmp_path / "made.stl"
+    scene.write_text(STEP)
+    run(["check", str(scene), "--layer", "0.1mm", "--fix", "-q", "--json", "-o", str(made)])
+    report = json.loads(capfd.readouterr().out)
+    assert "--bridge 1mm" in report["flags"]
+    assert trimesh.load_mesh(made).body_count == 1
+    assert severity_of(report["after"]) < severity_of(report["before"])
+
+
+def severity_of(report: dict[str, Any]) -> int:
+    return sum(int(problem["count"]) for problem in report["problems"])
+
+
+def test_fix_keeps_nothing_that_holds_more_resin() -> None:
+    few, many = (Problem("traps", "", count=n, resin=r) for n, r in ((3, 900.0), (9, 200.0)))
+    fewest = Problem("traps", "", count=3, resin=200.0)
+    assert not mends([few], [many]) and mends([fewest], [many]) and mends([], [few])
+
+
+def test_fix_ends_in_time(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("fracslice.cli.check.MOST_SECONDS", 0.0)
+    trimesh.util.concatenate([box(PLATE), ball(4, 4)]).export(tmp_path / "loose.stl")
+    assert run(["check", str(tmp_path / "loose.stl"), *COARSE, "--fix"]) == 1
+    assert "with --bridge 1mm: not tried" in capfd.readouterr().out
 
 
 def test_options_of_scenes_are_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -69,12 +69,12 @@ def test_check_ends_with_a_verdict(pair: str, tmp_path: Path, capfd: pytest.Capt
         run(["check", *arguments, "-q"])
         return capfd.readouterr().out.splitlines()
 
-    assert lines(pair, "--resolution", "32")[-1].startswith("would print; --layer")
-    reported = lines(pair, "--resolution", "32", "--wall", "3mm")
-    assert reported[-2] == "would not print:" and " of walls are thinner than 3 mm: at " in reported[-1]
-    reported = lines(
-        pair, "--layer", "0.5mm", "--pixel", "0.2mm", "--bridge", "0", "--set", "transform.rotate=0 1 0 45"
-    )
+    layers = "--layer", "0.5mm", "--pixel", "0.2mm"
+    assert lines(pair, *layers)[-1].endswith(", would print")
+    reported = lines(pair, *layers, "--wall", "3mm")
+    assert reported[0].endswith(", would not print:")
+    assert " of walls are thinner than 3 mm: at " in reported[-1]
+    reported = lines(pair, *layers, "--bridge", "0", "--set", "transform.rotate=0 1 0 45")
     assert reported[0].endswith(", would print with supports:")
     assert any(line.startswith("  1 island in the air, the first from layer ") for line in reported)
 

@@ -51,6 +51,13 @@ def components(made: Plan, voxels: float) -> tuple[SolidComponents, float]:
     return components_of(sample(made.root.kernel(), made.root.bounds, lattice)), voxel
 
 
+def test_a_plate_between_all_samples_needs_no_finer_ones() -> None:
+    for middle in (0.0, 0.3):
+        plate = at(box(size=(2, 0.1 * VOXEL, 2)), 0, middle, 0)
+        bricks = connectivity.sampled_object(plate, plate.bounds.box, 2, COARSE, Work())
+        assert bricks.voxel == pytest.approx(VOXEL) and (bricks.values < 0).any()
+
+
 def plates(thick: float, gap: float) -> Node:
     """Two, the lower one smaller, in voxels."""
     z = (thick + gap) / 2

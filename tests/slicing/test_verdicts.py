@@ -20,6 +20,7 @@ from fracslice.formulas import (
     transform,
     union,
 )
+from fracslice.printing.problems import verdict
 from fracslice.scene import Print
 from fracslice.slicing import SliceJob, plan_stack
 from fracslice.slicing.layer_checks import PrintReport, check_layers
@@ -174,6 +175,21 @@ def tree(r: Random) -> Node:
     """A ball on a trunk that can carry it."""
     radius = r.uniform(6, 10)
     return union(rod(8, 2), rod(radius / 3, 12), at(sphere(radius=radius), 0, 0, 11 + radius))
+
+
+def test_a_ring_on_the_plate_needs_supports_only() -> None:
+    """The plate closes it, and supports open it; a cup stays one."""
+    ring, cup_of_resin = torus(radius=10, tube=2), cup(np.random.default_rng(0))
+    assert verdict(examined(ring, 0.2).problems) == "would print with supports"
+    assert verdict(examined(cup_of_resin, 0.2).problems) == "would not print"
+
+
+def test_a_drain_hole_that_may_close_is_named() -> None:
+    (hole,) = (p for p in examined(box(size=(20, 20, 20)), hollow=2, drain=0.4).problems if p.kind == "holes")
+    assert (
+        "0.4 mm, narrower than 0.5 mm" in hole.text and hole.count == 2 and hole.mend == (("drain", "3mm"),)
+    )
+    assert "holes" not in [p.kind for p in examined(box(size=(20, 20, 20)), hollow=2, drain=3).problems]
 
 
 GOOD: list[Family] = [brick, disc, upright_cone, ring, tunnel, ledge, dome, tower, trestle, tree]
