@@ -368,7 +368,7 @@ def write_mesh(scene: Scene, variant: Variant, given: CheckOptions, work: Work) 
     from fracslice.jobs.mesh import make_mesh
 
     size = variant.size.side if variant.size.unit is None else None
-    job = replace(given.mesh_job(scene), size_mm=size, printing=variant.how, up=variant.up)
+    job = replace(given.mesh_job(scene), size=size, printing=variant.how, up=variant.up)
     make_mesh(scene, job, work, given.fixed)
 
 
