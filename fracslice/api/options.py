@@ -50,12 +50,17 @@ class PrintKeywords(TypedDict, total=False):
     raft: AnyLength | None
 
 
-class MeshKeywords(PrintKeywords, WorkKeywords, total=False):
-    """A mesh: the fields of `MeshJob`, print preparation and execution."""
+class PlacedKeywords(PrintKeywords, WorkKeywords, total=False):
+    """Size and orientation, print preparation and execution."""
 
     size: AnyLength | None
     up: Sequence[float] | None
     scale: AnyScale | None
+
+
+class MeshKeywords(PlacedKeywords, total=False):
+    """A mesh: the fields of `MeshJob`, and the others."""
+
     voxel: AnyLength | None
     resolution: float | None
     chord: AnyLength | None
@@ -65,12 +70,9 @@ class MeshKeywords(PrintKeywords, WorkKeywords, total=False):
     proved: bool | None
 
 
-class LayerKeywords(PrintKeywords, WorkKeywords, total=False):
-    """Layers: fields of `SliceJob`, print preparation and execution."""
+class LayerKeywords(PlacedKeywords, total=False):
+    """Layers: fields of `SliceJob`, and the others."""
 
-    size: AnyLength | None
-    up: Sequence[float] | None
-    scale: AnyScale | None
     pixel: AnyLength | Sequence[AnyLength] | None
 
 

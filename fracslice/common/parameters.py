@@ -58,6 +58,12 @@ def plain(text: str) -> str:
     return text
 
 
+def alternatives(*words: object) -> str:
+    """Words with commas between them and "or" before the last."""
+    *others, last = map(str, words)
+    return f"{', '.join(others)} or {last}" if others else last
+
+
 def shortest(value: Any) -> str:
     """Shortest text of a number that reads back as the same."""
     return repr(int(value)) if float(value).is_integer() and abs(value) < 1e15 else repr(float(value))
@@ -200,8 +206,7 @@ class Count(Parameter):
     @property
     def expects(self) -> str:
         whole = f"a whole number from {self.least} to {self.most}"
-        *others, last = whole, *(f'"{word}"' for word in self.words)
-        return f"{', '.join(others)} or {last}" if others else last
+        return alternatives(whole, *(f'"{word}"' for word in self.words))
 
     def read(self, text: str) -> Any:
         try:
@@ -240,9 +245,7 @@ class Vector(Bounded):
     def expects(self) -> str:
         kind = "whole numbers" if self.whole else "numbers"
         nonzero = ", not all zero" if self.nonzero else ""
-        *others, last = map(str, self.sizes)
-        count = f"{', '.join(others)} or {last}" if others else last
-        return f"{count} {kind}{self.range}{nonzero}"
+        return f"{alternatives(*self.sizes)} {kind}{self.range}{nonzero}"
 
     def read(self, text: str) -> Any:
         if "," in text:
@@ -277,8 +280,7 @@ class Choice(Parameter):
 
     @property
     def expects(self) -> str:
-        *others, last = self.choices
-        return f"{', '.join(others)} or {last}" if others else last
+        return alternatives(*self.choices)
 
     def check(self, value: Any) -> Any:
         if not isinstance(value, str) or value not in self.choices:
@@ -321,8 +323,7 @@ class Listed(Parameter):
 
     @property
     def expects(self) -> str:
-        *others, last = map(str, self.values)
-        return f"{', '.join(others)} or {last}"
+        return alternatives(*self.values)
 
     def read(self, text: str) -> Any:
         try:
