@@ -280,8 +280,7 @@ def cosine_bulb(power: float = 9.0, iterations: Union[int, Literal['auto']] = 'a
     """The Mandelbulb with angles counted from the equator (Nylander 2009, bugman123.com): odd powers.
 
     Lengths along meridians grow by n r^(n-1), along circles of latitude by r^(n-1) |cos n theta / cos theta|,
-    without limit near the poles if n is not odd: space tears there. L = 2 is measured for whole
-    powers; others tear space along a half plane, beside which values are larger.
+    without limit near the poles if n is not odd: space tears there. L = 2 is measured.
 
     Parameters
     ----------

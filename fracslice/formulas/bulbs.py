@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from ..common.parameters import Count, Number
 from . import power_maps
-from .orbits import LENGTHS, orbit, positive, turn
+from .orbits import LENGTHS, MAJORANTS, Stepped, orbit, orbit_step, positive, turn
 from .powers import calm_power, power_length, square, square_length
 from .powers import power as raised
-from .registry import Node
+from .registry import Fixed, Node
 from .vocabulary import absolute, atan2, cos, exp, floor, log, maximum, rsqrt, sin, sqrt, where
 
 POWER = Number(8.0, "the exponent", least=2, most=16)
@@ -70,18 +70,37 @@ def quaternion_power(w, c, power):  # type: ignore[no-untyped-def]
 
 
 @orbit(power=Number(9.0, "the exponent", least=2, most=16))
-def cosine_bulb(w, c, power):  # type: ignore[no-untyped-def]
+def cosine_bulb(w, c, power, torn):  # type: ignore[no-untyped-def]
     """The Mandelbulb with angles counted from the equator (Nylander 2009, bugman123.com): odd powers.
 
     Lengths along meridians grow by n r^(n-1), along circles of latitude by r^(n-1) |cos n theta / cos theta|,
-    without limit near the poles if n is not odd: space tears there. L = 2 is measured for whole
-    powers; others tear space along a half plane, beside which values are larger.
+    without limit near the poles if n is not odd: space tears there. L = 2 is measured.
     """
-    return equatorial_power(w, power) + c
+    image = torn_power(w, power) if torn else equatorial_power(w, power)
+    return image + c
+
+
+@cosine_bulb.step  # type: ignore[untyped-decorator]
+def cosine_step(node: Node) -> Stepped:
+    """A power that is not whole tears space where the azimuth jumps."""
+    function, values, julia = orbit_step(node)
+    return function, {**values, "torn": Fixed(node["power"] % 1 != 0)}, julia
 
 
 def equatorial_power(w, power):  # type: ignore[no-untyped-def]
     """Power in polar coordinates whose angle is that to the equator."""
+    x, y, z, stretch = equatorial(w, power)
+    return (x, y, z), stretch
+
+
+def torn_power(w, power):  # type: ignore[no-untyped-def]
+    """`equatorial_power` that is not whole."""
+    x, y, z, stretch = equatorial(w, power)
+    return (x, y, z), stretch
+
+
+def equatorial(w, power):  # type: ignore[no-untyped-def]
+    """Image of `equatorial_power`, and its stretch."""
     x, y, z = w
     rho2 = maximum(x * x + y * y, 1e-30)
     r2 = maximum(rho2 + z * z, 1e-30)
@@ -96,10 +115,18 @@ def equatorial_power(w, power):  # type: ignore[no-untyped-def]
     p, q = sin(theta), cos(theta)
     across, along = rn * (cosine * q + sine * p), rn * (sine * q - cosine * p)
     stretch = power * maximum(rn * rsqrt(r2), absolute(across) / rho)
-    return (across * cos(phi), across * sin(phi), where(z < 0.0, -along, along)), stretch
+    return across * cos(phi), across * sin(phi), where(z < 0.0, -along, along), stretch
 
 
-LENGTHS[equatorial_power] = power_length
+def torn_majorant(w, power):  # type: ignore[no-untyped-def]
+    """Towards the axis, rho away, |across| / rho grows by less than 1 / (1 - n e / rho)^2."""
+    x, y, z = w
+    rho = sqrt(maximum(x * x + y * y, 1e-30))
+    return power / rho, where(x < 0.0, absolute(y), rho)
+
+
+LENGTHS[equatorial_power] = LENGTHS[torn_power] = power_length
+MAJORANTS[torn_power] = torn_majorant
 
 
 @orbit(

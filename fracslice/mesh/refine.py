@@ -102,7 +102,7 @@ def on_three(
         there, moved = there + move, np.linalg.norm(move, axis=1)
         directions = points - there[:, None]
         directions /= np.maximum(np.linalg.norm(directions, axis=2, keepdims=True), 1e-300)
-        spacing = np.clip(2 * moved, NEAREST * size, spacing / 2)
+        spacing = np.maximum(np.minimum(2 * moved, spacing / 2), NEAREST * size)
         points = there[:, None] + spacing[:, None, None] * directions
     result &= ((first * normals).sum(axis=2) > SAME).all(axis=1) & (moved < NEAREST / 4 * size)
     return there, result

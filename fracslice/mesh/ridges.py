@@ -25,7 +25,7 @@ from .model import Mesh
 from .pieces import Pieces, rows
 from .quantisation import quantise, used_vertices
 from .refine import Edges, edges_of, on_creases, on_three, split_edges, with_neighbours
-from .spatial import self_intersecting_triangles
+from .spatial import Nearest, self_intersecting_triangles
 from .tips import Cap, heights, replace_by_fans, spans, tips_to_end
 from .topology import component_sizes
 
@@ -49,6 +49,9 @@ its greatest distance from what is added there, voxels.
 
 GAP = 0.01
 """Distance of the middle of a mesh edge from the surface, voxels, above which it is examined."""
+
+REACHED = 1e-3
+"""Distance from the mesh, voxels, below which it has a point of a sharp edge already."""
 
 BESIDE = 0.02
 """Distance from the ends of a mesh edge at which its sides are examined, relative to its length."""
@@ -74,8 +77,10 @@ NEAR, GROWTH = 0.05, 2.0
 factor by which it grows.
 """
 
-MOST, RINGS, TURNS, RETRIES = 64, 6, 6, 8
-"""Maximum triangles that a fan replaces, and their distance from a bad one; rounds of fans, and attempts."""
+MOST, RINGS, TURNS, RETRIES, AGAIN = 64, 6, 6, 8, 2
+"""Maximum triangles that a fan replaces, and their distance from a bad one; rounds of fans, attempts, and
+rounds after the attempt that succeeds.
+"""
 
 ROUGH = 0.25
 """Wrong triangles of an attempt, relative to its new vertices, above which a surface is too rough for sharp
@@ -213,8 +218,12 @@ class _Missed:
         on = self._on_surface(points)
         return _Points(far[on], points[on], int(sided.sum()))
 
-    def corners(self, mesh: Mesh, which: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Corners of the surface near triangles, each once and with its nearest triangle; no vertices."""
+    def corners(
+        self, mesh: Mesh, which: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
+        """Corners of the surface near triangles, each once and with its nearest triangle, and the vertices
+        that are at corners already.
+        """
         corners = mesh.corners[which]
         points, found = on_three(self.fit, corners, self._voxel)
         away = np.linalg.norm(points - corners.mean(axis=1), axis=1)
@@ -223,13 +232,15 @@ class _Missed:
         on = self._on_surface(points)
         which, points, away = which[on], points[on], away[on]
         kept: list[int] = []
-        apart, taken = 2 * GAP * self._voxel, set[int]()
+        apart, taken, there = 2 * GAP * self._voxel, set[int](), set[int]()
         for k in np.argsort(away, kind="stable").tolist():
-            known = np.concatenate([mesh.vertices, points[kept]])
-            if which[k] not in taken and np.linalg.norm(known - points[k], axis=1).min() > apart:
+            off = np.linalg.norm(np.concatenate([mesh.vertices, points[kept]]) - points[k], axis=1)
+            if off.min() <= apart:
+                there.add(int(off.argmin()))
+            elif which[k] not in taken:
                 kept.append(k)
                 taken.add(int(which[k]))
-        return which[kept], points[kept]
+        return which[kept], points[kept], np.array([v for v in sorted(there) if v < len(mesh.vertices)], int)
 
     def _on_surface(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether points are on the surface: planes also meet outside of what a third one cuts off."""
@@ -311,7 +322,7 @@ class _Sharpened:
 class _Cornered:
     """A part of a surface with some corners."""
 
-    corners: NDArray[np.int64]  # numbers of the corners, which are the last vertices
+    corners: NDArray[np.int64]  # numbers of the corners, the first vertices that were added
     mesh: Mesh  # the part
     parents: NDArray[np.int64]  # triangle that each one was; -1 for new ones
     edges: Edges  # its edges
@@ -323,7 +334,7 @@ class _Sharpening:
 
     def __init__(self, planned: Plan, mesh: Mesh, tips: NDArray[np.float64], work: Work) -> None:
         self._mesh, self._voxel, self._work, self._missed = mesh, planned.voxel, work, _Missed(planned, work)
-        self._fit, self._tips = self._missed.fit, np.isin(rows(mesh.vertices), rows(tips))
+        self._fit, self._fixed = self._missed.fit, np.isin(rows(mesh.vertices), rows(tips))
 
     def made(self) -> _Sharpened | None:
         """The part with as many of the points as there can be; None for none."""
@@ -331,7 +342,8 @@ class _Sharpening:
         edges = edges_of(mesh.triangles)
         sided = np.zeros(len(edges.ends), bool)
         sided[self._missed.of(mesh, edges).edges] = True
-        hosts, corners = self._missed.corners(mesh, np.flatnonzero(sided[edges.sides].any(axis=1)))
+        hosts, corners, there = self._missed.corners(mesh, np.flatnonzero(sided[edges.sides].any(axis=1)))
+        self._fixed[there] = True
         banned, reach, given = np.empty((0, 3)), NEAR * self._voxel, None
         stays, most = np.ones(len(corners), bool), math.inf
         for _ in range(RETRIES):
@@ -344,14 +356,19 @@ class _Sharpening:
             result = self._with(given, splits)
             wrong = self._wrong(result)
             if not len(wrong):
-                return result
+                return self._again(given.corners, result, banned, reach)
             most = min(most, ROUGH * len(result.new_vertices()))
             if len(wrong) >= most:
                 return None
             most = len(wrong)
             at = np.unique(result.mesh.triangles[wrong])
             new = result.mesh.vertices[at[at >= len(mesh.vertices)]]
-            banned = np.concatenate([banned, new, result.mesh.corners[wrong].mean(axis=1)])
+            spots = np.concatenate([new, result.mesh.corners[wrong].mean(axis=1)])
+            twice = splits & self._reached(given) & ~_away(given.missed.points, spots, FAR * self._voxel)
+            if twice.any():  # enough, as a rule
+                banned = np.concatenate([banned, given.missed.points[twice]])
+                continue
+            banned = np.concatenate([banned, spots])
             reach *= GROWTH
             stays = _away(corners, banned, reach)
         return None
@@ -367,12 +384,34 @@ class _Sharpening:
         keep = np.setdiff1d(np.arange(count), hosts[which])
         triangles = np.concatenate([old.triangles[keep], *new])
         mesh = Mesh(np.concatenate([old.vertices, corners[which]]), triangles)
-        parents = np.concatenate([keep, np.full(len(triangles) - len(keep), -1)])
-        edges = edges_of(triangles)
+        return self._cornered(which, mesh, np.concatenate([keep, np.full(len(triangles) - len(keep), -1)]))
+
+    def _cornered(self, corners: NDArray[np.int64], mesh: Mesh, parents: NDArray[np.int64]) -> _Cornered:
+        """The part as it is now, with the points that it lacks."""
+        edges = edges_of(mesh.triangles)
         missed = self._missed.of(mesh, edges)
         inner = np.bincount(edges.sides.ravel(), minlength=len(edges.ends))[missed.edges] == 2
         missed = _Points(missed.edges[inner], missed.points[inner], missed.sided)
-        return _Cornered(which, mesh, parents, edges, missed)
+        return _Cornered(corners, mesh, parents, edges, missed)
+
+    def _reached(self, given: _Cornered) -> NDArray[np.bool_]:
+        """Points that the part has elsewhere: beside a corner, mesh edges may span a whole side."""
+        away = Nearest(given.mesh).points(given.missed.points, self._work.threads)
+        return away < REACHED * self._voxel
+
+    def _again(
+        self, corners: NDArray[np.int64], result: _Sharpened, banned: NDArray[np.float64], reach: float
+    ) -> _Sharpened:
+        """The part with points of sharp edges that fans cut off, as long as it stays sound."""
+        for _ in range(AGAIN):
+            self._work.check()
+            given = self._cornered(corners, result.mesh, result.parents)
+            splits = _away(given.missed.points, banned, reach) & ~self._reached(given)
+            following = self._with(given, splits) if splits.any() else None
+            if following is None or len(self._wrong(following)):
+                break
+            result = following
+        return result
 
     def _with(self, given: _Cornered, splits: NDArray[np.bool_]) -> _Sharpened:
         """The part with corners, and with some of the points of sharp edges."""
@@ -385,8 +424,9 @@ class _Sharpening:
         state = _Sharpened.plain(self._mesh, mesh, parents).measured_at(
             np.flatnonzero(parents < 0), self._fit
         )
-        ends = np.ones(len(given.corners), bool), np.zeros(len(points), bool)
-        fixed = np.concatenate([self._tips, *ends])
+        fixed = np.zeros(len(mesh.vertices), bool)
+        fixed[: len(self._fixed)] = self._fixed
+        fixed[len(self._fixed) + np.arange(len(given.corners))] = True
         bad = state.bad(self._voxel)
         for _ in range(TURNS):
             self._work.check()

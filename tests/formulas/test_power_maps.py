@@ -5,10 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fracslice.formulas import Node, abox, burning_ship, lambda_bulb, mandelbox, mandelbulb, orbit, power_maps
+from fracslice.formulas import (
+    Node,
+    abox,
+    burning_ship,
+    cosine_bulb,
+    lambda_bulb,
+    mandelbox,
+    mandelbulb,
+    orbit,
+    power_maps,
+)
 from fracslice.formulas.escape import sure_distance
 from fracslice.formulas.orbits import growth_of, steps
 from fracslice.formulas.powers import by_angles, triplex
+from fracslice.kernel import reference
 from fracslice.kernel.growth import image
 from fracslice.kernel.orbits import function_of_text
 from fracslice.scene.layout import formulas
@@ -57,11 +68,32 @@ def test_the_bound_holds_beside_tears(root: Node) -> None:
     assert result.points > 2500 and result.violations == 0
 
 
+@pytest.mark.parametrize("power", [2.5, 3.5])
+def test_no_solid_is_nearer_across_a_tear(power: float) -> None:
+    """Of points at all distances from the solid, halved along lines into it: values were up to 10^8 times
+    the distance.
+    """
+    root = cosine_bulb(power=power, iterations=4)
+    field, skipped = reference(root), reference(root.conservative())
+    points = RNG.uniform(-1, 1, (3, 40000)) * np.array(root.bounds.box.hi)[:, None]
+    value = field(*points)
+    outside, inside = points[:, value > 0][:, :10000], points[:, value <= 0]
+    inside = inside[:, RNG.integers(0, inside.shape[1], outside.shape[1])]
+    for _ in range(30):
+        assert (skipped(*outside) <= 2 * np.linalg.norm(outside - inside, axis=0)).all()
+        middle = (outside + inside) / 2
+        away = field(*middle) > 0
+        outside, inside = np.where(away, middle, outside), np.where(away, inside, middle)
+    assert (field(*outside) > 1e3 * np.linalg.norm(outside - inside, axis=0)).any()
+
+
 @pytest.mark.parametrize(
     "root",
     [
         orbit(mandelbulb(power=5)),
         orbit(mandelbulb(power=2.5)),
+        orbit(cosine_bulb(power=2.5)),
+        orbit(cosine_bulb(power=7.3)),
         lambda_bulb(power=3),
         mandelbox(scale=-1.5),
         orbit(mandelbox(scale=2), burning_ship(power=4)),
