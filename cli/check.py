@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -58,7 +59,19 @@ layers of it in which --fix compares what it tries.
 """
 
 MOST_SECONDS = 60.0
-"""CPU seconds of checks with --fix; what would take longer is not tried."""
+"""CPU seconds of all examinations with --fix that are in no finer layers than those of `ACROSS`."""
+
+
+class Deadline(threading.Event):
+    """Cancellation by another event, or once the process has taken an amount of CPU time."""
+
+    def __init__(self, other: threading.Event, until: float) -> None:
+        super().__init__()
+        self.other, self.until = other, until
+
+    def is_set(self) -> bool:
+        """True once either is so, or it was set itself."""
+        return super().is_set() or self.other.is_set() or time.process_time() > self.until
 
 
 def limit(text: str) -> Any:
@@ -320,31 +333,40 @@ def mended_object(
     """The best of the object and its mended variants, and a line on each that was left out.
 
     All settings that the problems name are tried at once, then one by one; then other directions up. They
-    are compared in coarse layers; the best is examined in those that were asked for.
+    are compared in coarse layers while there is time; the best is examined in those that were asked for.
     """
+    from fracslice.errors import Cancelled
     from fracslice.printing.problems import mend_settings
     from fracslice.scene import Scene
 
-    until, lines = time.process_time() - first.seconds + MOST_SECONDS, list[str]()
+    lines = list[str]()
     finest = first.variant.size.longest / ACROSS
     asked = given.slice_job(first.variant.how)
     coarse = finest > min(*asked.pixels, asked.layer[0])
+    until = time.process_time() + MOST_SECONDS - (0 if coarse else first.seconds)
+    limited = replace(work, cancel=Deadline(work.cancel, until))
 
-    def tried(variant: Variant, before: Attempt) -> Attempt | None:
+    def tried(variant: Variant) -> Attempt | None:
         text = " ".join(variant.flags)
-        seconds = before.seconds + (first.seconds if coarse else 0)
-        if time.process_time() + seconds > until:
-            lines.append(f"with {text}: not tried, as it would take more than {MOST_SECONDS:g} s")
-            return None
         work.progress(f"trying {text}", 0.0)
-        return examine_layers(of, variant, given, work, finest)
+        try:
+            limited.check()
+            return examine_layers(of, variant, given, limited, finest)
+        except Cancelled:
+            work.check()
+            lines.append(
+                f"{f'with {text}' if text else 'in coarse layers'}: not finished within {MOST_SECONDS:g} s"
+            )
+            return None
 
     settings = mend_settings(first.problems)
-    base = best = examine_layers(of, first.variant, given, work, finest) if coarse else first
+    base = best = tried(first.variant) if coarse else first
+    if not best:
+        return first, lines
     choices = [settings] if settings else []
     choices += [{name: text} for name, text in settings.items()] if len(settings) > 1 else []
     for choice in choices:
-        now = tried(best.variant.changed(choice), best)
+        now = tried(best.variant.changed(choice))
         if now and now.mends(best):
             best = now
             if choice is settings:
@@ -352,7 +374,7 @@ def mended_object(
         elif now and (len(choice) == 1 or len(choices) == 1):
             lines.append(f"with {' '.join(options_of(choice))}: no better, left out")
     if isinstance(of, Scene) and any("--up" in problem.advice for problem in best.problems):
-        turns = [tried(best.variant.turned(up), best) for up in AXES if up != best.variant.up]
+        turns = [tried(best.variant.turned(up)) for up in AXES if up != best.variant.up]
         helpful = [turned for turned in turns if turned and turned.mends(best)]
         best = min([best, *helpful], key=lambda attempt: attempt.severity)
     if best is base:

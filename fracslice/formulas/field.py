@@ -187,6 +187,10 @@ class Field(Protocol):
             If the field cannot be compiled.
         """
 
+    def sign_kernel(self) -> Kernel:
+        """Kernel of a field with the same signs, which can be faster. Its other digits mean nothing."""
+        return self.kernel()
+
     def cells(self, precision: Precision = "float32") -> Cells | None:
         """Proofs that the field has one sign on cells.
 

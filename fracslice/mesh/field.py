@@ -41,6 +41,10 @@ class MeshField(ArrayField):
         """`Field.kernel`, always on the CPU."""
         return _MeshKernel(self, np.dtype(precision))
 
+    def sign_kernel(self) -> Kernel:
+        """`Field.sign_kernel`: the winding number alone, without distances."""
+        return _MeshKernel(self, np.dtype("float32"), False)
+
     @cached_property
     def nearest(self) -> Nearest:
         """Distance queries."""
@@ -70,8 +74,8 @@ class _MeshKernel(Kernel):
 
     batch = 1 << 14
 
-    def __init__(self, field: MeshField, dtype: np.dtype) -> None:
-        self._field, self.dtype = field, dtype
+    def __init__(self, field: MeshField, dtype: np.dtype, measured: bool = True) -> None:
+        self._field, self.dtype, self._measured = field, dtype, measured
 
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
         """`Kernel.points`."""
@@ -80,7 +84,7 @@ class _MeshKernel(Kernel):
         these, values = np.stack([a[known] for a in axes], 1), np.full(len(known), np.nan)
         inside = np.empty(len(these), np.bool_)
         _inside(these, *self._field.columns, inside)
-        away = self._field.nearest.points(these, threads=1)
+        away = self._field.nearest.points(these, threads=1) if self._measured else 1.0
         values[known] = np.where(inside, -away, away)
         return values.reshape(np.shape(x)).astype(self.dtype, copy=False)
 

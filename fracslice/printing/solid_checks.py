@@ -125,7 +125,9 @@ def check_solid(
     speck = max(limits.speck, SPECK * (bricks.voxel * scale) ** 3) / scale**3
     result = _volumes(bricks, speck)
     missed = thin.walls + tight.walls
-    fine = resolve_connectivity(root, bricks, limits.thin / scale**2, len(result[0]) > 1, work, missed)
+    fine = resolve_connectivity(
+        root, bricks, limits.thin / scale**2, len(result[0]) > 1, work, missed, signs=True
+    )
     if fine is not bricks:
         result = _volumes(fine, speck)
     bodies, cavities = ([v * scale**3 for v in volumes] for volumes in result)

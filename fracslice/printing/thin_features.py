@@ -387,7 +387,13 @@ def sampled_object(root: Field, outer: Box, longest: float, samples: float, work
 
 
 def resolve_connectivity(
-    root: Field, bricks: Bricks, least: float, loose: bool, work: Work, thin: Walls | None = None
+    root: Field,
+    bricks: Bricks,
+    least: float,
+    loose: bool,
+    work: Work,
+    thin: Walls | None = None,
+    signs: bool = False,
 ) -> Bricks:
     """Resample an object finer if its samples may miss walls or gaps: two samples across the thinnest.
 
@@ -395,7 +401,7 @@ def resolve_connectivity(
     "Discrete analytical hyperplanes"). A fractal has walls of every thickness; it is resampled only if it
     appears disconnected.
 
-    `least`: squared scene units.
+    `least`: squared scene units; `signs`: whether the signs of finer samples suffice.
     """
     times = AGAIN if loose else 1.0
     if not root.bounds.exterior_only:
@@ -406,7 +412,8 @@ def resolve_connectivity(
     if times <= 1:
         return bricks
     lattice = Lattice.around(Samples(bricks).bounds.box, bricks.voxel / times)
-    return sample(root.kernel(), root.bounds, lattice, work)
+    kernel = root.kernel()
+    return sample(root.sign_kernel() if signs else kernel, root.bounds, lattice, work, kernel)
 
 
 def _times(bricks: Bricks, thin: Walls, least: float, most: float) -> float:

@@ -5,6 +5,9 @@ from __future__ import annotations
 import base64
 import io
 import json
+import threading
+import time
+from itertools import count
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as Tree
@@ -12,7 +15,7 @@ from xml.etree import ElementTree as Tree
 import numpy as np
 import pytest
 import trimesh
-from fracslice.cli.check import place
+from fracslice.cli.check import Deadline, place
 from fracslice.cli.main import run
 from PIL import Image
 
@@ -177,10 +180,21 @@ def test_fix_keeps_nothing_that_holds_more_resin() -> None:
 def test_fix_ends_in_time(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fracslice.cli.check.MOST_SECONDS", 0.0)
+    """Also within an examination; the verdict is that on the object as it is."""
+    asked = count()
+    monkeypatch.setattr("fracslice.cli.check.Deadline.is_set", lambda _: next(asked) > 3)
     trimesh.util.concatenate([box(PLATE), ball(4, 4)]).export(tmp_path / "loose.stl")
     assert run(["check", str(tmp_path / "loose.stl"), *COARSE, "--fix"]) == 1
-    assert "with --bridge 1mm: not tried" in capfd.readouterr().out
+    out = capfd.readouterr().out
+    assert "1 loose body" in out and "with --bridge 1mm: not finished within 60 s" in out
+
+
+def test_a_deadline_is_of_cpu_time_and_leaves_signals_alone() -> None:
+    signal, now = threading.Event(), time.process_time()
+    late, early = Deadline(signal, now - 1), Deadline(signal, now + 1000)
+    assert late.is_set() and not early.is_set() and not signal.is_set()
+    signal.set()
+    assert early.is_set()
 
 
 def test_options_of_scenes_are_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -81,6 +81,7 @@ def test_bad_input_is_one_line(
         (["--layer", "0.2mm..0.6mm", "--printer", "sl1s"], "has layers of one height"),
         (["--layer", "0.2mm"], "needs --printer, such as sl1;"),
         (["--layer", "0.2mm", "-o", "out.goo"], "needs --printer, such as jupiter-2;"),
+        (["-o", "out.pm3", "--printer", "saturn-2"], "out.pm3: Elegoo Saturn 2 reads encrypted .ctb"),
     ],
 )
 def test_what_an_archive_cannot_say_is_refused_before_the_object_is_changed(
@@ -88,7 +89,8 @@ def test_what_an_archive_cannot_say_is_refused_before_the_object_is_changed(
 ) -> None:
     wrong = ["--hollow", "15mm"]
     assert run(["slice", str(ball), "-o", str(tmp_path / "out.sl1"), *options, *wrong]) == 2
-    assert reported in capfd.readouterr().err
+    error = capfd.readouterr().err
+    assert reported in error and error.count("\n") == 1
     assert [path.name for path in tmp_path.iterdir()] == ["ball.xml"]
 
 

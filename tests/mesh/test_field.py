@@ -7,9 +7,14 @@ import pytest
 import trimesh
 
 from fracslice.formulas import box, sphere
+from fracslice.kernel import Field
 from fracslice.mesh import Mesh
 from fracslice.mesh.field import MeshField
+from fracslice.mesh.spatial import Nearest
+from fracslice.printing.edits import Does, edited_field
 from fracslice.volume import plan
+
+DOES: tuple[Does, ...] = ("cut", "add", "keep")
 
 
 def field_of(*parts: trimesh.Trimesh) -> MeshField:
@@ -54,6 +59,17 @@ def test_runs_of_points_far_near_and_scattered_have_the_distances_of_single_poin
     alone = np.array([field.nearest.points(p[None])[0] for p in points])
     exact = trimesh.proximity.closest_point_naive(field.mesh.to_trimesh(), points)[1]
     assert result == pytest.approx(alone, abs=1e-12) and result == pytest.approx(exact, abs=1e-9)
+
+
+def test_signs_need_no_distances(monkeypatch: pytest.MonkeyPatch) -> None:
+    ball, post = field_of(trimesh.creation.icosphere(3, 5.0)), field_of(trimesh.creation.box((3, 4, 14)))
+    points = np.random.default_rng(0).uniform(-8, 8, (3, 2000))
+    fields: list[Field] = [ball, *(edited_field(ball, does, post) for does in DOES)]
+    fields.append(edited_field(ball, "cut", sphere(radius=4.0)))
+    exact = [field.kernel().points(*points) < 0 for field in fields]
+    monkeypatch.setattr(Nearest, "points", None)
+    for field, inside in zip(fields, exact, strict=True):
+        assert inside.sum() > 0 and ((field.sign_kernel().points(*points) < 0) == inside).all()
 
 
 def test_points_above_each_other_share_the_crossings_of_their_line() -> None:

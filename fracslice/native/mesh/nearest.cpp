@@ -23,6 +23,12 @@ void in_turns(size_t count, const Do& act) {
                       [&](size_t turn) { act(turn * kTurn, std::min(count, (turn + 1) * kTurn)); });
 }
 
+// The square of how far a number is from an interval.
+double outside(double x, double low, double high) {
+    double d = std::max(std::max(low - x, 0.0), x - high);
+    return d * d;
+}
+
 }  // namespace
 
 Nearest::Nearest(const MeshView& mesh, const TreeView& tree, bool closed) : mesh_(mesh), tree_(tree) {
@@ -30,11 +36,16 @@ Nearest::Nearest(const MeshView& mesh, const TreeView& tree, bool closed) : mesh
 }
 
 double Nearest::to_box(const double* p, size_t node) const {
+    const double *low = tree_.low + 3 * node, *high = tree_.high + 3 * node;
     double total = 0;
-    for (size_t k = 0; k < 3; ++k) {
-        double d = std::max({tree_.low[3 * node + k] - p[k], 0.0, p[k] - tree_.high[3 * node + k]});
-        total += d * d;
-    }
+    for (size_t k = 0; k < 3; ++k) total += outside(p[k], low[k], high[k]);
+    return total;
+}
+
+double Nearest::to_box_of_triangle(const double* p, size_t t) const {
+    const double *a = mesh_.corner(t, 0), *b = mesh_.corner(t, 1), *c = mesh_.corner(t, 2);
+    double total = 0;
+    for (size_t k = 0; k < 3; ++k) total += outside(p[k], std::min(std::min(a[k], b[k]), c[k]), std::max(std::max(a[k], b[k]), c[k]));
     return total;
 }
 
@@ -52,6 +63,7 @@ Neighbour Nearest::operator()(const double* p, size_t guess) const {
             size_t leaf = node - tree_.leaves;
             for (size_t i = tree_.first(leaf); i < tree_.last(leaf); ++i) {
                 size_t t = size_t(tree_.order[i]);
+                if (to_box_of_triangle(p, t) >= best.square) continue;
                 if (double d = distance(t).square(p); d < best.square) best = {t, d};
             }
             continue;

@@ -30,7 +30,9 @@ class Nearest {
     void samples(const MeshView& triangles, double spacing, double enough, double* distances) const;
 
   private:
+    // Squares of the distances to the box of a node, and to that of a triangle, which is faster than that to the triangle.
     double to_box(const double* p, size_t node) const;
+    double to_box_of_triangle(const double* p, size_t t) const;
     // The triangles at most `reach` from a point, up to kMost.
     size_t around(const double* p, double reach, TriangleDistance* triangles) const;
     void run(std::span<const double> points, size_t& guess, double* distances) const;
