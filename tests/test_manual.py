@@ -137,6 +137,7 @@ def test_commands_are_understood(line: str, folder: Path, monkeypatch, capfd) ->
         "jobs.mesh.make_mesh",
         "jobs.implicit.make_implicit",
         "slicing.plan_stack",
+        "jobs.slices.plan_layers",
         "rendering.Renderer",
         "animation.Timeline",
         "bench.measurements.measure",
