@@ -33,7 +33,8 @@ CHUNK = 2048
 def bridging_struts(
     components: SolidComponents, bodies: np.ndarray, groups: np.ndarray | None = None, near: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Struts that join n bodies with minimum total length, and all struts shorter than `near` samples.
+    """Struts that join n bodies with minimum total length, and those shorter than `near` samples between
+    bodies larger than crumbs.
 
     Each cell of the empty space belongs to its nearest body, by exact Euclidean distances (Maurer, Qi and
     Raghavan 2003). Bodies whose regions are adjacent are candidate pairs. The minimum spanning tree of the
@@ -63,7 +64,8 @@ def bridging_struts(
     pairs, ends, length = _nearest(body[meeting], place[meeting], times)
     tree = minimum_spanning_tree(coo_array((length, pairs.T), (len(bodies),) * 2)).tocoo()
     chosen = {(int(i), int(j)) for i, j in zip(*tree.coords, strict=True)}
-    kept = [n for n, (i, j) in enumerate(pairs.tolist()) if (i, j) in chosen or length[n] < near]
+    large = (components.count[bodies] >= CRUMB)[pairs].all(1) & (length < near)
+    kept = [n for n, (i, j) in enumerate(pairs.tolist()) if (i, j) in chosen or large[n]]
     points = np.array(solid.origin) + solid.voxel * ends[kept]
     return points[:, 0], points[:, 1]
 
