@@ -188,7 +188,13 @@ class Field(Protocol):
         """
 
     def sign_kernel(self) -> Kernel:
-        """Kernel of a field with the same signs, which can be faster. Its other digits mean nothing."""
+        """Kernel of a field with the same signs, which can be faster.
+
+        Returns
+        -------
+        Kernel
+            Only the signs of its values mean anything.
+        """
         return self.kernel()
 
     def cells(self, precision: Precision = "float32") -> Cells | None:

@@ -422,7 +422,7 @@ def test_a_raft_that_no_voxel_holds_is_refused() -> None:
 
 def test_the_sharp_rim_of_a_drain_hole_is_no_thin_wall(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "fracslice.printing.solid_checks.resolve_connectivity", lambda root, bricks, *others: bricks
+        "fracslice.printing.solid_checks.resolve_connectivity", lambda root, bricks, *others, **more: bricks
     )
     hole = transform(cylinder(radius=1, height=22), translate=(0, 0, 5))
     thing = plan(difference(cone(radius=6, height=22), hole), 100)
