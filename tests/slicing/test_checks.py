@@ -179,7 +179,12 @@ def test_bodies_that_stand_on_the_plate_are_parts_and_others_are_loose() -> None
     assert report.gaps.smallest == pytest.approx(0.6 * 10 / 1.4, abs=0.06)
 
 
-@pytest.mark.parametrize(("radius", "height"), [(10, 20), (10, 5), (3, 3), (2, 10), (1, 6)])
+SLOW = pytest.mark.nightly
+CONES = [(10, 20), pytest.param(10, 5, marks=SLOW), pytest.param(3, 3, marks=SLOW), (2, 10), (1, 6)]
+"""Radius and height of cones that stand on their point, mm."""
+
+
+@pytest.mark.parametrize(("radius", "height"), CONES)
 def test_a_cone_on_its_point_needs_supports_or_a_base(radius: float, height: float) -> None:
     cut = transform(cone(radius=radius, height=height), rotate=(1, 0, 0, 180))
 
@@ -187,8 +192,9 @@ def test_a_cone_on_its_point_needs_supports_or_a_base(radius: float, height: flo
         size = max(extent(root).box.size)
         return check_layers(plan_stack(root, SliceJob(size=size, layer=0.1, pixel=(0.1, 0.1)))).problems
 
-    assert verdict(problems(cut)) == "would print with supports"
-    assert [p.kind for p in problems(cut)] == ["necks"]
+    found = problems(cut)
+    assert verdict(found) == "would print with supports"
+    assert [p.kind for p in found] == ["necks"]
     foot = at(box(size=(3 * radius, 3 * radius, height)), 0, 0, 0.4 * height)  # a foot of 0.4 of the radius
     assert verdict(problems(intersection(cut, foot))) == "would print"
 
