@@ -7,9 +7,8 @@ import threading
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import wraps
-from inspect import Parameter, signature
+from inspect import Parameter, cleandoc, signature
 from pathlib import Path
-from textwrap import indent
 from typing import Any, Literal, ParamSpec, TypeAlias, TypedDict, TypeVar, get_type_hints
 
 from ..common.messages import hint
@@ -169,7 +168,7 @@ def keywords(*records: type[Record]) -> Callable[[Callable[P, R]], Callable[P, R
 
         lines = _option_lines(records, options)
         call.__signature__ = own.replace(parameters=listed)  # type: ignore[attr-defined]
-        call.__doc__ = (function.__doc__ or "").replace("    {options}\n", indent("\n".join(lines), 4 * " "))
+        call.__doc__ = cleandoc(function.__doc__ or "").replace("{options}\n", "\n".join(lines))
         return call
 
     return decorated
