@@ -7,7 +7,10 @@ through in a circle, so maps that do not end as they begin go there and back.
 
 from __future__ import annotations
 
+from typing import get_args
+
 from ..common.parameters import Choice, File, Number, Vector
+from ..records import Colour
 from .box import Box
 from .registry import Node, always_keeps_sign, domain_operator
 
@@ -30,7 +33,7 @@ PALETTES = {
 """sRGB components of the stops, in [0, 1], by name."""
 
 
-TRAPS = ("point", "axes", "planes", "sphere", "steps", "direction")
+TRAPS = get_args(Colour)[1:]
 """Properties of an orbit that a palette shows."""
 
 
