@@ -19,16 +19,17 @@ from ..scene import Scene
 from ..version import __version__
 from ..work import Work, in_background
 from . import surfaces
-from .finishing import Finish
-from .mesh_writing import STL, Writing
 from .planning import Sized, apply_edits, in_mm, plan_mesh
 from .report import Clock, Report, Result, SurfaceError, SurfaceToMesh
 
 if TYPE_CHECKING:
     from ..volume import Plan, SignBricks
     from ..volume.sizing import Sizing
-    from .shared_mesh import MeshRecipe
+    from .shared import MeshRecipe
+    from .steps import Executor
     from .surfaces import Surface
+
+STL = ".stl"
 
 COLOURED = (".ply", ".glb", ".3mf")
 """Formats that hold colours of vertices."""
@@ -177,7 +178,7 @@ class _Job:
     def recipe(self, again: bool) -> MeshRecipe:
         """Recipe of the field, for other processes; `again` if the field chose the bodies."""
         from ..scene.writer import to_xml
-        from .shared_mesh import MeshRecipe
+        from .shared import MeshRecipe
 
         return MeshRecipe(to_xml(self.scene), self.scene.name, self.what, again)
 
@@ -186,21 +187,32 @@ class _Job:
         work = self.clock.work
         if work.cluster is None or work.device != "cpu":
             return surfaces.sample_surface(planned, self.clock)
-        from .shared_mesh import by_pool
+        from .shared import by_pool
 
         job, evaluate = by_pool(self.recipe(again), planned, work.cluster, work)
         signs = surfaces.sample_surface(planned, self.clock, evaluate)
         work.cluster.finished(job)
         return signs
 
-    def surface(self, aside: Callable[[], Path] | None) -> tuple[Sized, Surface]:
-        """Surface, in one piece if it fits in memory, and the choice of bodies that is left."""
-        sized, signs, again = self.sampled()
-        if (pool := self.clock.work.cluster) is not None:
-            if not any(self.needing_all()):
-                from .shared_mesh import shared_surface
+    def surface(self, aside: Callable[[], Path] | None) -> tuple[Sized, Surface, Executor]:
+        """Surface, in one piece if it fits in memory; the choice of bodies that is left; and what makes the
+        steps that follow.
+        """
+        from ..mesh.cleaning import HALO
+        from ..mesh.contouring import layers
+        from ..mesh.pieces import Pieces
+        from .steps import Local, Sampled
 
-                return sized, shared_surface(self.recipe(again), sized.planned, signs, pool, self.clock)
+        sized, signs, again = self.sampled()
+        planned, work = sized.planned, self.clock.work
+        of, halo, executor = Sampled(planned, signs, work.threads), HALO * planned.voxel, Local(work)
+        if (pool := work.cluster) is not None:
+            if not any(self.needing_all()):
+                from .shared import StoredPieces, share_samples
+
+                shared, cuts = share_samples(self.recipe(again), planned, signs, pool, work)
+                stored = StoredPieces(pool.pieces, shared.job, halo)
+                return sized, surfaces.surface_of(of, cuts, stored, shared, self.clock), shared
             if not pool.first:
                 raise SharedError("the samples are made; shard 1 makes the mesh of them and writes the file")
         most, voxel = len(signs), self.size.longest / self.what.voxels(self.size.longest)
@@ -212,14 +224,16 @@ class _Job:
             if aside is None:
                 raise TooLargeError(f"{error}, and an .stl file is written piece after piece") from None
             most = surfaces.BRICKS
-        folder = aside() if aside and most < len(signs) else None
-        return sized, surfaces.surface_of(sized.planned, signs, most, folder, self.clock)
+        pieces = Pieces(aside() if aside and most < len(signs) else None, halo)
+        return sized, surfaces.surface_of(of, layers(signs, most), pieces, executor, self.clock), executor
 
-    def result(self, sized: Sized, surface: Surface) -> tuple[Result, int]:
+    def result(self, sized: Sized, surface: Surface, executor: Executor) -> tuple[Result, int]:
         """Finished mesh and report, and the refinement of the samples that does not lose the object."""
         from ..kernel.depth import shallower
         from ..mesh.touching import touching_note
         from .completeness import lost_size, mesh_amount
+        from .finishing import choose_bodies
+        from .mesh_writing import Writing
 
         what, clock, scale, refined = self.what, self.clock, sized.scale, None
         planned, signs, thin = surface.planned, surface.signs, surface.thin
@@ -227,19 +241,20 @@ class _Job:
             surface, done = surfaces.refine_surface(surface, what.chord / scale, clock)
             refined = done.scaled(scale)
         with clock("finishing"):
-            finish = Finish(surface, sized.left, what.dust_limit, scale, clock)
+            finish, chosen = choose_bodies(surface, sized.left, what.dust_limit, scale, executor)
         whole = what.edits(self.scene).bodies is None
-        measure = partial(mesh_amount, planned, finish.volume, scale, whole, clock.work)
+        measure = partial(mesh_amount, planned, chosen.volume, scale, whole, clock.work)
         with in_background(measure, clock.work.threads) as measured:
-            made = Writing(self.scene, what, clock, self.path).made(surface, finish)
+            made = Writing(self.scene, what, clock, self.path).made(surface, finish, executor)
             written = nullcontext() if self.path is None else keeping(f"{self.path} is written")
             with written, clock("checking"):
                 complete = measured()
         fell = f"{thin}; expected a smaller voxel, or a thickness of {2 * scale * planned.voxel:.2g} mm"
-        low, high = made.report.bbox_mm
-        sides = [scale * side for side in planned.box.size], np.subtract(high, low).tolist(), finish.size
+        mesh = finish.report(made.checks.tally, chosen.misplaced)
+        low, high = mesh.bbox_mm
+        sides = [scale * side for side in planned.box.size], np.subtract(high, low).tolist(), chosen.size
         lost, shorter = lost_size("the mesh is", *sides, spacing=[scale * planned.voxel] * 3)
-        near = finish.near.count
+        near = made.checks.near_bodies
         settings = shallower(planned.root.tree, planned.voxel) if near and planned.root.tree else ()
         report = Report(
             scene=self.scene.name,
@@ -247,9 +262,9 @@ class _Job:
             version=__version__,
             size_mm=self.size.longest,
             voxel_mm=planned.voxel * scale,
-            mesh=made.report,
-            removed=finish.removed,
-            surface_error_mm=SurfaceError.of(scale * made.errors),
+            mesh=mesh,
+            removed=chosen.removed,
+            surface_error_mm=SurfaceError.of(scale * np.concatenate(made.checks.errors)),
             surface_to_mesh_mm=SurfaceToMesh.of(scale * made.back),
             evaluations=signs.evaluations,
             proved=signs.proved,
@@ -268,9 +283,9 @@ class _Job:
                 *touching_note(near, planned.voxel * scale, settings, complete.notes),
             ),
             depths=planned.depths,
-            contact_mm2=float(f"{made.contact:.9g}"),  # sums over pieces differ in the last digit
-            loose_bodies=finish.loose,
-            cavities_mm3=float(f"{finish.cavities + 0.0:.9g}"),
+            contact_mm2=float(f"{made.checks.contact:.9g}"),  # sums over pieces differ in the last digit
+            loose_bodies=chosen.loose,
+            cavities_mm3=float(f"{chosen.cavities + 0.0:.9g}"),
             lost_mm=lost,
             missing_volume_share=round(
                 complete.amount.missing, 9

@@ -12,29 +12,23 @@ import numpy as np
 from ..records import MeshJob
 from ..scene import Scene
 from ..work import ahead
-from .finishing import Check, Finish
+from .finishing import Checks, Finish, surface_distances
 from .report import Clock
+from .steps import Executor, Local
 
 if TYPE_CHECKING:
     from ..mesh import Mesh
-    from ..mesh.checks import MeshReport
     from ..mesh.simplify import Simplified
     from .surfaces import Surface
 
-STL = ".stl"
-
 
 class Made(NamedTuple):
-    """The mesh, if in one piece; its simplification, if any; its checks; and distances between its vertices,
-    or points of the surface, and the other, scene units; area on the plate, mm2.
-    """
+    """A finished mesh."""
 
-    whole: Mesh | None
-    simplified: Simplified | None
-    report: MeshReport
-    errors: np.ndarray
-    back: np.ndarray
-    contact: float
+    whole: Mesh | None  # the mesh, if in one piece
+    simplified: Simplified | None  # its simplification, if any
+    checks: Checks
+    back: np.ndarray  # distances from points of the surface, scene units
 
 
 @dataclass(frozen=True)
@@ -46,58 +40,40 @@ class Writing:
     clock: Clock  # threads, progress, cancellation and timing
     path: Path | None  # file to write
 
-    def made(self, surface: Surface, finish: Finish) -> Made:
+    def made(self, surface: Surface, finish: Finish, executor: Executor) -> Made:
         """Finish, write and check a mesh."""
-        return self._joined(surface, finish) or self._alone(surface, finish)
-
-    def _alone(self, surface: Surface, finish: Finish) -> Made:
-        """Write the file while it is checked, by threads of this process."""
-        from ..mesh.checks import surface_to_mesh
-
-        planned, work = surface.planned, self.clock.work
+        checks = Checks()
         with self.clock("checking"):
-            back = surface_to_mesh(planned, surface.pieces.meshes, 1.0, work)
-        check = Check(finish, len(surface.signs))
-        whole, simplified = self._written(finish, check, finish.tips)
-        return Made(whole, simplified, check.mesh, check.errors, back, check.contact)
+            back = surface_distances(surface, executor, self.clock.work)
+        if isinstance(executor, Local):
+            return Made(*self._written(finish, checks), checks, back)
+        from .shared import Shared
+        from .shared_writing import write_shared
 
-    def _joined(self, surface: Surface, finish: Finish) -> Made | None:
-        """Write the file from the pieces of a pool; None for a surface that was made here."""
-        if self.clock.work.cluster is None:
-            return None
-        from .shared_files import write_shared
-        from .shared_mesh import SharedSurface
+        assert isinstance(executor, Shared)
+        mesh = write_shared(finish, checks, executor, self.path, metadata(self.scene))
+        return Made(mesh, None, checks, back)
 
-        if not isinstance(surface, SharedSurface):
-            return None
-        check, mesh = write_shared(surface, finish, self.path, metadata(self.scene))
-        for near in check.near:
-            finish.near.include(near)
-        errors = np.concatenate(check.off)
-        return Made(mesh, None, finish.report(check.tally), errors, check.back, check.contact)
-
-    def _written(
-        self, finish: Finish, check: Check, tips: np.ndarray
-    ) -> tuple[Mesh | None, Simplified | None]:
-        """Write the file while it is checked. Returns the mesh, if in one piece, and the result of its
-        simplification, if any.
+    def _written(self, finish: Finish, checks: Checks) -> tuple[Mesh | None, Simplified | None]:
+        """Write the file while it is checked, by threads of this process. Returns the mesh, if in one piece,
+        and the result of its simplification, if any.
         """
         from ..export import FORMATS, flushing, replacing
         from ..export.stl import write_pieces
         from ..mesh.cleaning import Finished
         from ..mesh.tips import tips_last
 
-        finished, simplified, mesh = finish.finished(), None, None
+        finished, simplified, mesh = finish.each(self.clock), None, None
         if self.what.simplify is not None:
             from ..mesh.simplify import simplify
 
-            (piece,) = finished
+            ((piece, near),) = finished
             with self.clock("simplifying"):
                 mesh, simplified = simplify(piece.mesh, self.what.simplify, self.clock.work)
-            finished = iter([Finished.whole(mesh)])
-        meshes = ahead(check.passing(finished))
+            finished = iter([(Finished.whole(mesh), near)])
+        meshes = ahead(finish.passing(finished, checks, self.clock))
         if several := len(finish.pieces) > 1:
-            meshes = tips_last(meshes, tips)
+            meshes = tips_last(meshes, finish.tips)
         if self.what.colour is not None:
             meshes = self._painted(meshes, finish)
         if self.path is None:
@@ -112,7 +88,7 @@ class Writing:
 
         about = metadata(self.scene)
         with replacing(self.path) as file, flushing(file):
-            if self.path.suffix.lower() == STL:
+            if self.path.suffix.lower() == ".stl":
                 write_pieces(timed(), file, about, self.clock.work)
             else:
                 for whole in timed():
@@ -124,7 +100,7 @@ class Writing:
         from ..rendering.painting import paint
 
         assert self.what.colour is not None
-        field: Any = finish.planned.root
+        field: Any = finish.of.planned.root
         while field.tree is None:
             field = field.root
         for mesh in meshes:

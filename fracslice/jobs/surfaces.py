@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,16 +13,15 @@ from ..common.memory import available_bytes
 from ..errors import TooLargeError
 from ..volume.lattice import BRICK
 from ..volume.states import distinct
-from ..work import ahead
 from .report import Clock
 
 if TYPE_CHECKING:
     from ..mesh.pieces import Pieces
     from ..mesh.refine import Refined
     from ..mesh.shells import WholeShells
-    from ..mesh.topology import Shells
     from ..volume import Plan, SignBricks
     from ..volume.exploration import Evaluate
+    from .steps import Executor, Sampled
 
 BYTES_A_CROSSING = 140
 """Peak memory by grid edges that the surface crosses, bytes: 125 to 150 measured, on meshes of 66 and 375
@@ -48,10 +46,6 @@ class Surface:
     pieces: Pieces  # labelled pieces of the mesh
     shells: WholeShells  # shells of the mesh
     tips: NDArray[np.float64]  # vertices that were added at tips, and at sharp edges that samples cut off
-
-    def nested(self, bodies: bool, threads: int) -> tuple[Shells, int]:
-        """Nesting of the shells."""
-        return self.shells.nested(self.pieces, bodies, threads)
 
     @property
     def thin(self) -> str:
@@ -108,30 +102,33 @@ def crossings_a_brick(signs: SignBricks) -> float:
     return within / len(some) * BRICK / (BRICK - 1)
 
 
-def surface_of(planned: Plan, signs: SignBricks, most: int, folder: Path | None, clock: Clock) -> Surface:
-    """Mesh the surface of samples, in pieces of about `most` bricks."""
-    from ..mesh.contouring import BLUNT
-    from ..mesh.extract import contour_pieces, contour_whole
-    from ..mesh.pieces import Pieces
+def surface_of(
+    of: Sampled, cuts: list[tuple[int, int]], pieces: Pieces, executor: Executor, clock: Clock
+) -> Surface:
+    """Mesh the surface of samples.
+
+    `cuts`: layers of bricks of each piece; `pieces`: where they are kept, empty.
+    """
     from ..mesh.ridges import with_ridges
     from ..mesh.shells import survey
     from ..mesh.tips import Pointed, with_tips
+    from .steps import Contour
 
-    work, pieces = clock.work, Pieces(folder)
-    pointed, blunt = Pointed(planned.voxel, work.threads), np.empty((0, 3))
+    planned, work = of.planned, clock.work
     with clock("meshing"):
-        if most >= len(signs):
-            made = iter([contour_whole(planned.root, signs, work)])
+        found = executor.summary(Contour(of, cuts, pieces), "meshing")
+        for end, triangles in zip(found.ends.tolist(), found.triangles.tolist(), strict=True):
+            pieces.count(end, triangles)
+        pieces.first_labels = np.cumsum([0, *found.components.counts[:-1]]).tolist()
+        pointed = Pointed(planned.voxel, work.threads)
+        pointed.join(found.pointed, np.inf)
+        changed, tips = with_tips(planned, pieces, pointed.points, work)
+        changed, tips = with_ridges(planned, changed, found.blunt, tips, work)
+        if changed is pieces:
+            shells = found.components.shells()
         else:
-            made = ahead(contour_pieces(planned.root, signs, work, most))  # while the one before is stored
-        for piece in made:
-            pieces.add(piece)
-            pointed.add(piece)
-            blunt = np.concatenate([blunt, piece.blunt])[: BLUNT + 1]
-            work.progress("meshing", min((piece.end - planned.outer.lo[0]) / planned.outer.size[0], 1.0))
-        pieces, tips = with_tips(planned, pieces, pointed.points, work)
-        pieces, tips = with_ridges(planned, pieces, blunt, tips, work)
-        return Surface(planned, signs, pieces, survey(pieces, planned.voxel, work.threads), tips)
+            shells = survey(changed, planned.voxel, work.threads)
+        return Surface(planned, of.signs, changed, shells, tips)
 
 
 def refine_surface(surface: Surface, chord: float, clock: Clock) -> tuple[Surface, Refined]:

@@ -249,18 +249,20 @@ NEARBY, FARTHER = 2.5, 2.0
 
 
 def surface_to_mesh(
-    planned: Plan, pieces: Callable[[], Iterable[Mesh]], scale: float, work: Work
+    planned: Plan, search: Callable[[NDArray[np.float64], float], NDArray[np.float64]], work: Work
 ) -> NDArray[np.float64]:
     """Distances from the extreme points of a field, and from other points on its surface, to the mesh.
 
-    `pieces` in scene units; `scale`: mm per scene unit. Returns float64 (n,), mm.
+    `search`: distances of points, float64 (n, 3), from the triangles within a reach, as `nearest` returns
+    them. All in scene units. Returns float64 (n,).
     """
-
-    def search(points: NDArray[np.float64], reach: float) -> NDArray[np.float64]:
-        return nearest(pieces(), points, reach, work)
-
-    points, voxel = surface_samples(planned, work), planned.voxel
-    return scale * distances(search, points, voxel, search(points, NEARBY * voxel))
+    points, voxel, reach = surface_samples(planned, work), planned.voxel, NEARBY * planned.voxel
+    result = search(points, reach)
+    # Triangles lie within a grid cell: any nearer one has its corners in reach.
+    while (far := result > reach - np.sqrt(3) * voxel).any():
+        reach *= FARTHER
+        result[far] = search(points[far], reach)
+    return result
 
 
 def surface_samples(planned: Plan, work: Work) -> NDArray[np.float64]:
@@ -272,27 +274,6 @@ def surface_samples(planned: Plan, work: Work) -> NDArray[np.float64]:
     tips = tips[surface_error(planned.root, tips, planned.voxel, work) < NEAR * planned.voxel]
     samples = surface_points(planned.root, planned.outer, planned.voxel, POINTS, work)
     return np.concatenate([tips, samples])
-
-
-def distances(
-    search: Callable[[NDArray[np.float64], float], NDArray[np.float64]],
-    points: NDArray[np.float64],
-    voxel: float,
-    nearby: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Distances from points to a mesh.
-
-    For points without a triangle nearby, those farther away are searched.
-
-    `points`: float64 (n, 3); `nearby`: float64 (n,), distances to the triangles within `NEARBY` voxels.
-    Returns float64 (n,).
-    """
-    result, reach = nearby.copy(), NEARBY * voxel
-    # Triangles lie within a grid cell: any nearer one has its corners in reach.
-    while (far := result > reach - np.sqrt(3) * voxel).any():
-        reach *= FARTHER
-        result[far] = search(points[far], reach)
-    return result
 
 
 def nearest(

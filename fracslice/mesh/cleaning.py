@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from .._native import touching, turned
 from ..formulas.algebra import dot, length
 from .model import Mesh
-from .pieces import concatenate_at_seam
+from .pieces import concatenate_at_seam, strip
 from .quantisation import NO_EDITS, NO_PLANES, UNMOVED, Edits, Frame, place_and_round, quantise, weld
 
 PASSES = 8
@@ -206,6 +206,9 @@ triangles are cleaned up to the second. An edit reaches three voxels at most, so
 beyond the halo.
 """
 
+HALO = WAITS + 0.5
+"""Width of the strips at the seams, voxels: wider than the halo that a neighbour takes of them."""
+
 
 @dataclass(frozen=True, eq=False)
 class Finished:
@@ -239,26 +242,6 @@ class Finished:
         """The counted vertices, float64 [k, 3]."""
         vertices = self.mesh.vertices
         return vertices if self.counted.all() else vertices[self.counted]
-
-
-class Strip(NamedTuple):
-    """Some triangles of a mesh."""
-
-    mesh: Mesh  # the triangles and their vertices
-    numbers: NDArray[np.int64]  # indices of the vertices in the mesh, ascending
-    rows: NDArray[np.int64]  # indices of the triangles, ascending
-
-
-def strip(mesh: Mesh, vertices: NDArray[np.bool_], threads: int = 0) -> Strip:
-    """Triangles that use some vertices.
-
-    `vertices`: bool (n,).
-    """
-    rows = touching(mesh.triangles, vertices, threads)
-    triangles, used = mesh.triangles[rows], np.zeros(len(mesh.vertices), bool)
-    used[triangles] = True
-    numbers, place = np.flatnonzero(used), np.cumsum(used, dtype=np.int32) - 1
-    return Strip(Mesh(mesh.vertices[numbers], place[triangles]), numbers, rows)
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._native import near
+from .._native import near, touching
 from ..store import Arrays
 from ..work import Work, chunks
 from .contouring import Piece
@@ -18,12 +19,47 @@ from .model import Mesh
 NOTHING = Mesh(np.empty((0, 3)), np.empty((0, 3), np.int32))
 
 
-class Pieces:
-    """Pieces of a surface, in order, with labels of their vertices; scene units."""
+class Strip(NamedTuple):
+    """Some triangles of a mesh."""
 
-    def __init__(self, folder: Path | None = None) -> None:
-        self.folder, self.ends, self.starts = folder, list[float](), list[int]()
-        self.fresh = list[int]()
+    mesh: Mesh  # the triangles and their vertices
+    numbers: NDArray[np.int64]  # indices of the vertices in the mesh, ascending
+    rows: NDArray[np.int64]  # indices of the triangles, ascending
+
+
+def strip(mesh: Mesh, vertices: NDArray[np.bool_], threads: int = 0) -> Strip:
+    """Triangles that use some vertices.
+
+    `vertices`: bool (n,).
+    """
+    rows = touching(mesh.triangles, vertices, threads)
+    triangles, used = mesh.triangles[rows], np.zeros(len(mesh.vertices), bool)
+    used[triangles] = True
+    numbers, place = np.flatnonzero(used), np.cumsum(used, dtype=np.int32) - 1
+    return Strip(Mesh(mesh.vertices[numbers], place[triangles]), numbers, rows)
+
+
+HEAD, TAIL = "head", "tail"
+"""Sides of a piece: the strips at its begin and at its end."""
+
+
+def strip_at(mesh: Mesh, side: str, seam: float, halo: float, threads: int = 0) -> Strip:
+    """Strip of a piece at the seam x = `seam`, of width `halo`."""
+    x = mesh.vertices[:, 0]
+    return strip(mesh, x < seam + halo if side == HEAD else x > seam - halo, threads)
+
+
+class Pieces:
+    """Pieces of a surface, in order, with labels of their vertices; scene units.
+
+    A label is a connected component of a piece; labels count from the first piece on. `halo`: width of the
+    strips at the seams.
+    """
+
+    def __init__(self, folder: Path | None = None, halo: float = 0.0) -> None:
+        self.folder, self.halo = folder, halo
+        self.ends, self.starts = list[float](), list[int]()
+        self.fresh, self.first_labels = list[int](), list[int]()
         self._count = 0
         self._held: dict[str, Arrays] = {}
 
@@ -37,12 +73,19 @@ class Pieces:
 
     def anew(self) -> Pieces:
         """Return an empty collection in the same place, whose pieces replace those of this one."""
-        return Pieces(self.folder)
+        return Pieces(self.folder, self.halo)
 
     def add(self, piece: Piece, fresh: int = 0) -> None:
         """Append a piece."""
-        self._put(f"mesh{len(self)}", vertices=piece.mesh.vertices, triangles=piece.mesh.triangles)
+        self.put(len(self), piece.mesh, self.start(len(self)), piece.end)
         self.count(piece.end, len(piece.mesh.triangles), fresh)
+
+    def put(self, number: int, mesh: Mesh, start: float, end: float) -> None:
+        """Store a piece, which `count` appends.
+
+        `start`, `end`: x between which it lies.
+        """
+        self.keep(f"mesh{number}", vertices=mesh.vertices, triangles=mesh.triangles)
 
     def count(self, end: float, triangles: int, fresh: int = 0) -> None:
         """Append a piece that is stored already."""
@@ -52,18 +95,18 @@ class Pieces:
         self._count += triangles
 
     def label(self, number: int, labels: NDArray[np.int32]) -> None:
-        """Store the labels of a piece.
+        """Store the labels of a piece, counted from 0.
 
         `labels`: int32 (n,).
         """
-        self._put(f"labels{number}", labels=labels)
+        self.keep(f"labels{number}", labels=labels)
 
     def mesh(self, number: int) -> Mesh:
         """Load a piece.
 
         Returns `Mesh` in scene units.
         """
-        arrays = self._get(f"mesh{number}")
+        arrays = self.arrays(f"mesh{number}")
         return Mesh(arrays["vertices"], arrays["triangles"])
 
     def labels(self, number: int) -> NDArray[np.int32]:
@@ -71,16 +114,50 @@ class Pieces:
 
         Returns int32 (n,).
         """
-        return self._get(f"labels{number}")["labels"]
+        labels, first = self.arrays(f"labels{number}")["labels"], self.first_labels[number]
+        return labels + np.int32(first) if first else labels
+
+    def start(self, number: int) -> float:
+        """X at which a piece begins."""
+        return self.ends[number - 1] if number else -np.inf
+
+    def fresh_rows(self, number: int) -> NDArray[np.int64]:
+        """Triangles of a piece that were not made by contouring: its last ones.
+
+        Returns int64 (k,).
+        """
+        first, end = [*self.starts, self._count][number : number + 2]
+        return np.arange(end - first - self.fresh[number], end - first)
+
+    def strip(self, number: int, side: str, threads: int = 0) -> Strip:
+        """Load the strip of a piece at a seam."""
+        seam = self.start(number) if side == HEAD else self.ends[number]
+        return strip_at(self.mesh(number), side, seam, self.halo, threads)
+
+    def finish(self, number: int, mesh: Mesh) -> None:
+        """Store the finished triangles of a piece, whose vertices are float32 numbers.
+
+        `mesh` in mm.
+        """
+        self.keep(f"finished{number}", vertices=mesh.vertices.astype(np.float32), triangles=mesh.triangles)
+
+    def finished(self, number: int) -> Mesh:
+        """Load the finished triangles of a piece.
+
+        Returns `Mesh` in mm.
+        """
+        arrays = self.arrays(f"finished{number}")
+        return Mesh(arrays["vertices"].astype(np.float64), arrays["triangles"])
 
     def meshes(self) -> Iterator[Mesh]:
         """Iterate over the pieces."""
         return (self.mesh(number) for number in range(len(self)))
 
-    def drop(self, number: int) -> None:
-        """Release a piece that is held in memory."""
-        for name in ("mesh", "labels"):
-            self._held.pop(f"{name}{number}", None)
+    def drop(self, end: int) -> None:
+        """Release the pieces before number `end` that are held in memory."""
+        for number in range(end):
+            for name in ("mesh", "labels"):
+                self._held.pop(f"{name}{number}", None)
 
     def near(self, points: NDArray[np.float64], reach: float) -> tuple[Mesh, NDArray[np.int64]]:
         """Triangles with a corner near points, as one mesh.
@@ -105,7 +182,7 @@ class Pieces:
             mesh = join_at_seam(mesh, self.mesh(number), self.ends[number - 1], seam)
         return mesh
 
-    def _put(self, name: str, **arrays: NDArray[np.generic]) -> None:
+    def keep(self, name: str, **arrays: NDArray[np.generic]) -> None:
         """Store arrays in memory or in the folder."""
         if self.folder is None:
             self._held[name] = arrays
@@ -115,7 +192,7 @@ class Pieces:
                 path.unlink(missing_ok=True)  # the array may be the mapped file itself
                 np.save(path, array)
 
-    def _get(self, name: str) -> Arrays:
+    def arrays(self, name: str) -> Arrays:
         """Load arrays from memory or from the folder."""
         if self.folder is None:
             return self._held[name]

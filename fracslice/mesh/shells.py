@@ -59,19 +59,8 @@ class WholeShells:
         """
         return self.tips(which).reshape(2, 3, 3).diagonal(axis1=1, axis2=2)
 
-    def nested(self, pieces: Pieces, bodies: bool = True, threads: int = 0) -> tuple[Shells, int]:
-        """Nesting of the shells, by rays.
-
-        The ray of each shell starts at its point of least x. This point lies within a cell, so that a ray
-        across x stays in one piece.
-        """
-        searched = self.searched(bodies)
-        numbers = sorted(set(self.piece[searched].tolist()))
-        rays = (self.rays(n, pieces.mesh(n), pieces.labels(n), searched, threads) for n in numbers)
-        return self.nested_by(searched, dict(zip(numbers, rays, strict=True)))
-
     def searched(self, bodies: bool) -> NDArray[np.bool_]:
-        """Shells whose surroundings are searched by rays; see `nested`.
+        """Cavities, and with `bodies` all shells: those whose surroundings are searched by `rays`.
 
         Returns bool (s,).
         """
@@ -89,14 +78,16 @@ class WholeShells:
     ) -> Nesting:
         """Surroundings of the searched shells whose rays are in a piece.
 
+        The ray of each shell starts at its point of least x. This point lies within a cell, so that a ray
+        across x stays in one piece.
+
         `labels`: int32 (n,); `searched`: bool (s,).
         """
-
         first = np.where(searched & (self.piece == number), self.first, -1)
         return nesting(mesh, self.of(labels, threads), self.volumes, first, threads)
 
-    def nested_by(self, searched: NDArray[np.bool_], nestings: Mapping[int, Nesting]) -> tuple[Shells, int]:
-        """Join the results of `rays` of all pieces; see `nested`.
+    def nested(self, searched: NDArray[np.bool_], nestings: Mapping[int, Nesting]) -> tuple[Shells, int]:
+        """Nesting of the shells, and how many are inside out, from the `rays` of all pieces.
 
         `searched`: bool (s,).
         """
@@ -141,7 +132,8 @@ def survey(pieces: Pieces, voxel: float, threads: int = 0) -> WholeShells:
             for number, mesh in enumerate(pieces.meshes())
         )
         for number, (labels, sums) in enumerate(ahead(parts)):
-            pieces.label(number, labels + np.int32(first) if first else labels)
+            pieces.label(number, labels)
+            pieces.first_labels.append(first)
             first += len(sums.volumes)
             yield sums
 

@@ -4,7 +4,7 @@ ends.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import product
 from typing import NamedTuple
 
@@ -222,14 +222,32 @@ def tips_last(meshes: Iterable[Mesh], tips: NDArray[np.float64]) -> Iterator[Mes
 
     `meshes` in mm; `tips`: float64 (k, 3), mm.
     """
-    late: list[tuple[int, NDArray[np.float64]]] = []
+    late = list[Late]()
     for mesh in meshes:
-        of = at_tips(mesh, tips)
-        at = np.flatnonzero(of >= 0)
-        late += zip(of[at].tolist(), mesh.corners[at], strict=True)
-        yield mesh.selected(of < 0) if len(at) else mesh
-    if late:
+        plain, own = without_tips(mesh, tips)
+        late.append(own)
+        yield plain
+    if sum(len(own.tips) for own in late):
         yield by_tip(late)
+
+
+class Late(NamedTuple):
+    """Triangles at tips."""
+
+    tips: NDArray[np.int64]  # tip of each triangle
+    corners: NDArray[np.float64]  # corners, mm, float64 [k, 3, 3]
+
+
+def without_tips(mesh: Mesh, tips: NDArray[np.float64], threads: int = 0) -> tuple[Mesh, Late]:
+    """Separate the triangles at tips from the others.
+
+    `mesh` in mm; `tips`: float64 (k, 3), mm.
+    """
+    of = at_tips(mesh, tips)
+    at = np.flatnonzero(of >= 0)
+    return mesh.selected(of < 0, threads) if len(at) else mesh, Late(
+        of[at], mesh.vertices[mesh.triangles[at]]
+    )
 
 
 def at_tips(mesh: Mesh, tips: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -247,9 +265,10 @@ def at_tips(mesh: Mesh, tips: NDArray[np.float64]) -> NDArray[np.int64]:
     return of_triangle
 
 
-def by_tip(triangles: list[tuple[int, NDArray[np.float64]]]) -> Mesh:
-    """Mesh of triangles at tips, tip after tip."""
-    corners = np.array([corners for _, corners in sorted(triangles, key=lambda pair: pair[0])])
+def by_tip(late: Sequence[Late]) -> Mesh:
+    """Mesh of the triangles at tips of all pieces, tip after tip."""
+    order = np.argsort(np.concatenate([own.tips for own in late]), kind="stable")
+    corners = np.concatenate([own.corners for own in late])[order]
     count = 3 * len(corners)
     return Mesh(corners.reshape(-1, 3), np.arange(count, dtype=np.int32).reshape(-1, 3))
 
@@ -315,12 +334,6 @@ class Pointed:
     def __init__(self, voxel: float, threads: int = 0) -> None:
         self._voxel, self._threads, self._points = voxel, threads, [np.empty((0, 3))]
         self._tail, self._seam = NOTHING, -np.inf
-
-    def add(self, piece: Piece) -> None:
-        """Add a piece."""
-        if not self.rough:
-            pointed = pointed_in(piece.mesh, self._seam, piece.end, self._voxel, self._threads)
-            self.join(pointed, piece.end)
 
     def join(self, piece: PointedPiece, end: float) -> None:
         """Add the pointed vertices of a piece, or of consecutive ones, and those at its seam with the piece

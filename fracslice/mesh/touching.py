@@ -25,53 +25,40 @@ class NearBodies:
     `stays`: bool (s,).
     """
 
-    def __init__(self, shells: WholeShells, stays: NDArray[np.bool_], voxel: float, threads: int = 0) -> None:
+    def __init__(self, shells: WholeShells, stays: NDArray[np.bool_], voxel: float) -> None:
         body = stays & (shells.volumes > 0)
-        self._several = body.sum() > 1
+        self.several = bool(body.sum() > 1)
+        """False for a single body, which is near none."""
         self._body = np.where(body, np.arange(len(body)), -1).astype(np.int32)[shells.of_label]
-        self._largest = int(np.argmax(np.where(body, shells.areas, 0)))
+        self._largest, self._count = int(np.argmax(np.where(body, shells.areas, 0))), len(body)
         x, y, z = shells.bounds()[0].tolist()
-        self._origin, self._edge, self._threads = (x, y, z), REACH * voxel, threads
-        self._near = np.zeros(len(body), bool)
-        self._end = -np.inf
-        self._before = np.empty((0, 3)), np.empty(0, np.int32)
+        self._origin, self._edge = (x, y, z), REACH * voxel
 
-    @property
-    def count(self) -> int:
-        """Number of near bodies of the pieces so far; cavities are none."""
-        return int(self._near.sum())
+    def within(
+        self, points: NDArray[np.float64], labels: NDArray[np.int32], threads: int = 0
+    ) -> NDArray[np.int64]:
+        """Near bodies of a piece; cavities are none.
 
-    @property
-    def bodies(self) -> NDArray[np.int64]:
-        """Shells of the near bodies of the pieces so far, ascending."""
-        return np.flatnonzero(self._near)
-
-    def include(self, bodies: NDArray[np.int64]) -> None:
-        """Add near bodies that another process searched.
-
-        `bodies`: int64 (k,).
+        `points`: float64 (n, 3); `labels`: int32 (n,). Returns int64 (k,), ascending.
         """
-        self._near[bodies] = True
+        at = self._origin, self._edge, threads
+        return near_bodies(points, labels, self._body, self._count, self._largest, *at)
 
-    def add(self, points: NDArray[np.float64], labels: NDArray[np.int32], end: float) -> None:
-        """Add the next piece.
+    def across(
+        self,
+        seam: float,
+        one: tuple[NDArray[np.float64], NDArray[np.int32]],
+        other: tuple[NDArray[np.float64], NDArray[np.int32]],
+        threads: int = 0,
+    ) -> NDArray[np.int64]:
+        """Near bodies at the seam x = `seam` of two pieces, given as for `within`.
 
-        `points`: float64 (n, 3); `labels`: int32 (n,).
+        Returns int64 (k,), ascending.
         """
-        if not self._several:
-            return
-        self._meet(points, labels)
-        if np.isfinite(self._end):
-            first = points[:, 0] < self._end + self._edge
-            others, theirs = self._before
-            self._meet(np.concatenate([others, points[first]]), np.concatenate([theirs, labels[first]]))
-        if np.isfinite(end):
-            last = points[:, 0] > end - self._edge
-            self._end, self._before = end, (points[last], labels[last])
-
-    def _meet(self, points: NDArray[np.float64], labels: NDArray[np.int32]) -> None:
-        at = self._origin, self._edge, self._threads
-        self._near[near_bodies(points, labels, self._body, len(self._near), self._largest, *at)] = True
+        last, first = one[0][:, 0] > seam - self._edge, other[0][:, 0] < seam + self._edge
+        points = np.concatenate([one[0][last], other[0][first]])
+        labels = np.concatenate([one[1][last], other[1][first]])
+        return self.within(points, labels, threads)
 
 
 def touching_note(near: int, voxel: float, settings: Sequence[str], off: Sequence[str]) -> tuple[str, ...]:

@@ -21,7 +21,7 @@ from fracslice.cluster.workers import Identity
 from fracslice.errors import Cancelled, ClusterError, FracsliceWarning
 from fracslice.export.layer_files import write_slices
 from fracslice.formulas import mandelbulb, sphere
-from fracslice.jobs import shared_mesh
+from fracslice.jobs import shared
 from fracslice.jobs.mesh import make_mesh
 from fracslice.jobs.slices import SliceRecipe
 from fracslice.mesh import shells
@@ -109,10 +109,10 @@ def no_workers_of_other_tests(cluster: Cluster) -> Iterator[None]:
 @pytest.fixture(autouse=True)
 def small_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(progressive, "PIXELS", 1024)
-    monkeypatch.setattr(shared_mesh, "LEAST", 1)
+    monkeypatch.setattr(shared, "LEAST", 1)
     monkeypatch.setattr(shells, "FAN", 2)
     monkeypatch.setattr(exploration, "MANY", 1)
-    monkeypatch.setattr(shared_mesh, "BRICKS", 32)
+    monkeypatch.setattr(shared, "BRICKS", 32)
     monkeypatch.setattr(workers, "CONNECT", SECONDS)  # the machine may be busy
 
 
@@ -164,16 +164,16 @@ def test_a_worker_that_hangs(
 
 SHARED = {
     "slice": (["--layer", "0.1mm", "--pixel", "0.05mm"], "layers-*", "a.cli"),
-    "mesh": (["--resolution", "40", "--dust", "5"], "surface-*", "a.stl"),
+    "mesh": (["--resolution", "40", "--dust", "5"], "contour-*", "a.stl"),
     "render": (["--size", "96x72", "--samples", "3"], "../*.npz", "a.png"),
     "animate": (["--size", "32x24", "--samples", "4", "--fps", "12"], "frame-*", "frames"),
 }
 """Options, pieces and file of a command."""
 PASSES = 4
 """Passes of the rendered command."""
-STARTED = """from fracslice.jobs import shared_mesh
+STARTED = """from fracslice.jobs import shared
 from fracslice.rendering import progressive
-shared_mesh.LEAST = 1
+shared.LEAST = 1
 progressive.PIXELS = 1024
 from fracslice.cli.main import main; main()"""
 

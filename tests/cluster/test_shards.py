@@ -17,7 +17,7 @@ from fracslice.errors import ClusterError, SharedError
 from fracslice.export import packages
 from fracslice.export.layer_files import write_slices
 from fracslice.formulas import box, cone, flake, sphere
-from fracslice.jobs import shared_files, shared_mesh
+from fracslice.jobs import shared, shared_writing
 from fracslice.jobs.mesh import Result, make_mesh
 from fracslice.mesh import shells
 from fracslice.records import MeshJob
@@ -92,19 +92,17 @@ def test_shards_of_a_mesh_make_one_file(tmp_path: Path, monkeypatch: pytest.Monk
 
     Tasks write the triangles to their places: the file is the one that they wrote, under another name.
     """
-    monkeypatch.setattr(shared_mesh, "LEAST", 1)
-    monkeypatch.setattr(shared_files, "FIRST", 7)
-    monkeypatch.setattr(shared_files, "ROWS", 1000)
+    monkeypatch.setattr(shared, "LEAST", 1)
+    monkeypatch.setattr(shared_writing, "FIRST", 7)
+    monkeypatch.setattr(shared_writing, "ROWS", 1000)
     monkeypatch.setattr(files, "append_file", None)
-    places, make = list[str](), shared_files.PlaceTask.make
+    places, place = list[int](), shared_writing.Place.result
     monkeypatch.setattr(
-        shared_files.PlaceTask, "make", lambda of, work: (places.append(of.name), make(of, work))[1]
+        shared_writing.Place, "result", lambda of, n, work: (places.append(n), place(of, n, work))[1]
     )
     monkeypatch.setattr(shells, "FAN", 2)
-    joins, join = list[str](), shared_mesh.JoinTask.make
-    monkeypatch.setattr(
-        shared_mesh.JoinTask, "make", lambda of, work: (joins.append(of.name), join(of, work))[1]
-    )
+    joins, join = list[str](), shared.JoinTask.make
+    monkeypatch.setattr(shared.JoinTask, "make", lambda of, work: (joins.append(of.name), join(of, work))[1])
     shape = cone(radius=0.5, height=2.0) | sphere(radius=0.05).translate((0.8, 0.0, 0.0))
     turned = scene(shape.rotate(70.0, (0.0, 1.0, 0.2)), size="20mm")
     job = MeshJob(resolution=32, dust=2.0)
@@ -139,31 +137,33 @@ def test_shards_of_a_mesh_make_one_file(tmp_path: Path, monkeypatch: pytest.Monk
 
 
 def test_other_formats_are_joined(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(shared_mesh, "LEAST", 1)
+    monkeypatch.setattr(shared, "LEAST", 1)
     hollowed, job = scene(box() - sphere(radius=0.6), size="20mm"), MeshJob(resolution=16)
     shard = Shard(ResultFolder(str(tmp_path / "pieces")), 1, 1)
     one, two = (tmp_path / f"{name}.ply" for name in ("one", "two"))
     make_mesh(hollowed, job, Work(1), one)
-    shared = make_mesh(hollowed, job, Work(1, cluster=shard), two)
+    joined = make_mesh(hollowed, job, Work(1, cluster=shard), two)
     assert one.read_bytes() == two.read_bytes()
-    assert shared.mesh.is_watertight
+    assert joined.mesh.is_watertight
 
 
 def test_a_3mf_file_is_concatenated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """By two shards; vertices at seams and at a tip's triangles, which come last, are numbered once."""
-    monkeypatch.setattr(shared_mesh, "LEAST", 1)
+    monkeypatch.setattr(shared, "LEAST", 1)
     monkeypatch.setattr(packages, "ROWS", 256)
-    monkeypatch.setattr(shared_files, "BLOCKS", 2)
-    monkeypatch.setattr(shared_files, "joined_pieces", None)
+    monkeypatch.setattr(shared_writing, "BLOCKS", 2)
+    monkeypatch.setattr(shared_writing, "joined_pieces", None)
     turned = scene(cone(radius=0.5, height=2.0).rotate(70.0, (0.0, 1.0, 0.2)), size="20mm")
     shards = [Shard(ResultFolder(str(tmp_path / "pieces")), number, 2, patience=600) for number in (1, 2)]
     files, made = {number: tmp_path / f"{number}.3mf" for number in (0, 1, 2)}, list[str]()
-    make = shared_files.EncodeTask.make
+    encode = shared_writing.Encode.result
     monkeypatch.setattr(
-        shared_files.EncodeTask, "make", lambda of, work: (made.append(of.name), make(of, work))[1]
+        shared_writing.Encode,
+        "result",
+        lambda of, n, work: (made.append(f"{of.name}-{n}"), encode(of, n, work))[1],
     )
 
-    def shared(shard: Shard) -> str:
+    def made_by(shard: Shard) -> str:
         try:
             make_mesh(turned, MeshJob(resolution=32), Work(1, cluster=shard), files[shard.number])
         except SharedError as error:
@@ -171,7 +171,7 @@ def test_a_3mf_file_is_concatenated(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         return ""
 
     with ThreadPoolExecutor(2) as pool:
-        first, second = pool.map(shared, shards)
+        first, second = pool.map(made_by, shards)
     make_mesh(turned, MeshJob(resolution=32), Work(1), files[0])
     assert first == "" and second.startswith("this shard made ") and "pieces; shard 1 writes" in second
     assert files[1].read_bytes() == files[0].read_bytes()
@@ -185,7 +185,7 @@ def test_a_3mf_file_is_concatenated(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 def test_what_needs_the_whole_mesh_is_sampled_by_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Chord and simplification are of the whole mesh, so shard 1 makes them of the shared samples."""
     monkeypatch.setattr(exploration, "MANY", 1)
-    monkeypatch.setattr(shared_mesh, "BRICKS", 8)
+    monkeypatch.setattr(shared, "BRICKS", 8)
     ball, job = scene(sphere(), size="20mm"), MeshJob(resolution=16, chord=0.2, simplify=0.3)
     pieces, made = ResultFolder(str(tmp_path / "pieces")), list[str]()
     write = ResultFolder.write
@@ -225,13 +225,13 @@ def test_options_that_exclude_each_other(line: list[str], capsys: pytest.Capture
     assert "expected local, local:N" in capsys.readouterr().err
 
 
-def test_a_shared_mesh_has_the_note_on_near_bodies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_shared_has_the_note_on_near_bodies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In a file of pieces, whose bodies meet in pieces and over seams."""
-    monkeypatch.setattr(shared_mesh, "LEAST", 1)
+    monkeypatch.setattr(shared, "LEAST", 1)
     flakes = scene(flake(solid="tetrahedron", level=1), size="40mm", name="flakes")
     shard = Shard(ResultFolder(str(tmp_path / "pieces")), 1, 1, patience=0)
-    shared, alone = (
+    joined, alone = (
         make_mesh(flakes, MeshJob(resolution=32), work, tmp_path / "a.stl")
         for work in (Work(1, cluster=shard), Work(1))
     )
-    assert shared.report.notes == alone.report.notes and "two voxels" in shared.report.notes[0]
+    assert joined.report.notes == alone.report.notes and "two voxels" in joined.report.notes[0]

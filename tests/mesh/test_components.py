@@ -44,15 +44,20 @@ def surveyed(mesh: Mesh) -> tuple[Pieces, WholeShells]:
     return pieces, survey(pieces, 1.0)
 
 
+def nested(pieces: Pieces, whole: WholeShells) -> Shells:
+    searched = whole.searched(bodies=True)
+    rays = {n: whole.rays(n, pieces.mesh(n), pieces.labels(n), searched) for n in range(len(pieces))}
+    return whole.nested(searched, rays)[0]
+
+
 def shells(mesh: Mesh) -> Shells:
-    pieces, whole = surveyed(mesh)
-    return whole.nested(pieces)[0]
+    return nested(*surveyed(mesh))
 
 
 def select(mesh: Mesh, **how: str | float) -> tuple[Mesh, Removed]:
     """The shells that are chosen."""
     pieces, whole = surveyed(mesh)
-    stays, removed = choose(whole.nested(pieces)[0], **how)  # type: ignore[arg-type]
+    stays, removed = choose(nested(pieces, whole), **how)  # type: ignore[arg-type]
     return mesh.selected(stays[whole.of_label][pieces.labels(0)][mesh.triangles[:, 0]]), removed
 
 

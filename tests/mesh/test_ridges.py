@@ -16,7 +16,7 @@ from fracslice.mesh.pieces import Pieces
 from fracslice.mesh.quantisation import quantise_mesh
 from fracslice.mesh.ridges import with_ridges
 from fracslice.mesh.spatial import Nearest
-from fracslice.mesh.tips import Pointed, with_tips
+from fracslice.mesh.tips import pointed_in, with_tips
 from fracslice.volume import plan, sample_scene
 from fracslice.work import Work
 
@@ -65,9 +65,8 @@ def made(root: Node, resolution: float, threads: int = 2) -> tuple[Mesh, Mesh, f
     """With tips only, with sharp edges too; the voxel."""
     planned, work = plan(root, resolution), Work(threads=threads)
     piece = contour_whole(planned.root, sample_scene(planned, work), work)
-    pieces, pointed = Pieces(), Pointed(planned.voxel)
-    for part in (pieces, pointed):
-        part.add(piece)
+    pieces, pointed = Pieces(), pointed_in(piece.mesh, -np.inf, np.inf, planned.voxel)
+    pieces.add(piece)
     tipped, tips = with_tips(planned, pieces, pointed.points, work)
     sharp, _ = with_ridges(planned, tipped, piece.blunt, tips, work)
     return tipped.mesh(0), sharp.mesh(0), planned.voxel

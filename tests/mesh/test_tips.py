@@ -14,7 +14,7 @@ from fracslice.mesh.contouring import Piece
 from fracslice.mesh.extract import contour
 from fracslice.mesh.pieces import Pieces
 from fracslice.mesh.quantisation import quantise_mesh
-from fracslice.mesh.tips import Pointed, with_tips
+from fracslice.mesh.tips import pointed_in, with_tips
 from fracslice.scene import scene
 from fracslice.volume import plan, sample_scene
 from fracslice.work import Work
@@ -24,9 +24,8 @@ def made(root: Node, resolution: float, threads: int = 2) -> tuple[Mesh, Mesh, f
     """Without and with tips; the voxel."""
     planned, work = plan(root, resolution), Work(threads=threads)
     mesh = contour(planned.root, sample_scene(planned, work), work)
-    pieces, pointed = Pieces(), Pointed(planned.voxel)
-    for part in (pieces, pointed):
-        part.add(Piece(mesh, np.inf))
+    pieces, pointed = Pieces(), pointed_in(mesh, -np.inf, np.inf, planned.voxel)
+    pieces.add(Piece(mesh, np.inf))
     tipped, _ = with_tips(planned, pieces, pointed.points, work)
     return mesh, tipped.mesh(0), planned.voxel
 

@@ -122,6 +122,6 @@ def test_bodies_meet_across_a_seam() -> None:
         np.arange(2, dtype=np.int32), np.ones(2), np.ones(2), ends, np.zeros(2, np.int32), np.arange(2)
     )
     near = NearBodies(shells, np.ones(2, bool), 0.2)
-    for body, end in ((0, 0.0), (1, np.inf)):
-        near.add(ends[body], np.full(6, body, np.int32), end)
-    assert near.count == 2
+    one, other = ((ends[body], np.full(6, body, np.int32)) for body in (0, 1))
+    assert near.several and near.within(*one).size == near.within(*other).size == 0
+    assert near.across(0.0, one, other).tolist() == [0, 1]

@@ -25,7 +25,7 @@ from fracslice.cluster import Contents, Pool, ResultFolder, Task, Workers, conne
 from fracslice.cluster.pool import run_task as make_piece
 from fracslice.export.layer_files import write_slices
 from fracslice.formulas import mandelbulb
-from fracslice.jobs import shared_mesh
+from fracslice.jobs import shared
 from fracslice.jobs.mesh import make_mesh
 from fracslice.jobs.slices import SliceRecipe
 from fracslice.records import MeshJob
@@ -239,7 +239,7 @@ def rows(
     workers: tuple[int, ...] = (1, 10, 100, 300, 1000),
     plot: str = "",
 ) -> Iterator[Row]:
-    shared_mesh.LEAST, exploration.MANY = bricks, bricks  # samples are tasks, as in the larger job
+    shared.LEAST, exploration.MANY = bricks, bricks  # samples are tasks, as in the larger job
     threads, sizes = run.threads[0], (pixels, layers, voxels, width, frames)
     kinds, smaller = jobs(*sizes), jobs(pixels, 8, voxels // 2, width // 2, 1)
     nothing = [Nothing("nothing", number) for number in range(empty)]
@@ -249,8 +249,8 @@ def rows(
         with connect(f"local:{threads}", f"{name}/pieces", threads) as plain:
             pool = MeasuredWorkers(plain.client, plain.pieces)
             for kind, job in kinds.items():
-                shared, alone = Work(threads, cluster=pool), Work(threads)
-                acts[f"{kind} by workers"] = partial(cpu_of, partial(job, shared, folder), pool)
+                pooled, alone = Work(threads, cluster=pool), Work(threads)
+                acts[f"{kind} by workers"] = partial(cpu_of, partial(job, pooled, folder), pool)
                 acts[f"{kind} by threads"] = partial(cpu_of, partial(job, alone, folder), None)
                 first[kind] = acts[f"{kind} by workers"]()["cpu_s"]
             acts["empty"] = partial(cpu_of, partial(by_pool, pool, nothing), pool)
