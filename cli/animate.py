@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import ClassVar
 
 import click
 
 from fracslice.common.messages import format_count
+from fracslice.records import RenderJob
 
 from .inputs import check_folder, check_targets, load_scene, refuse_moved, refuse_options
 from .options import (
     DEVICE,
     INTERVAL,
-    PIXELS,
     POSITIVE,
-    SAMPLES,
     ClusterOptions,
     Parsed,
+    Records,
     SceneOptions,
     argument,
     command,
@@ -44,6 +45,8 @@ def read_frames(text: str) -> range:
 class FilmOptions(ClusterOptions, SceneOptions):
     """Options of `animate`."""
 
+    records: ClassVar[Records] = (RenderJob,)
+    without = frozenset(RenderJob.kinds()) - {"size", "samples"}
     source: str = argument("SCENE")
     output: str = output(
         "OUT",
@@ -54,8 +57,8 @@ class FilmOptions(ClusterOptions, SceneOptions):
         Parsed(read_frames, "N[..N]"), "Frames to render, counted from 0; all by default."
     )
     fps: float | None = option(POSITIVE, "Frames per second; the scene's by default.")
-    size: tuple[int, int] | None = option(PIXELS, "Pixels across and down; the scene's by default.")
-    samples: int | None = SAMPLES
+    size: tuple[int, int] | None
+    samples: int | None
     fly: float | None = option(
         INTERVAL,
         "Fly along the surface for this time, such as 10s; the field makes the path. With OUT an .xml file, "

@@ -8,7 +8,6 @@ import inspect
 import io
 import math
 import os
-import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import replace
@@ -20,7 +19,9 @@ import click
 from fracslice.common.parameters import (
     Choice,
     Count,
+    Duration,
     Flag,
+    Grid,
     Heights,
     Listed,
     Number,
@@ -28,6 +29,7 @@ from fracslice.common.parameters import (
     Percent,
     Record,
     Vector,
+    picture_size,
 )
 from fracslice.errors import ClusterError, SceneError, VolumeError
 from fracslice.records import MeshJob, Part, Print, RasterOptions, SliceJob
@@ -141,7 +143,10 @@ def metavar(kind: Parameter) -> str:
         return "LENGTH[..LENGTH]"
     if isinstance(kind, Number | Vector):
         return kind.unit.upper() or ("N" if isinstance(kind, Number) else "X Y Z")
-    return "N%[,N%,N%]" if isinstance(kind, Percent) else "LENGTH"
+    if isinstance(kind, Grid):
+        return kind.letters
+    names = {Percent: "N%[,N%,N%]", Duration: "TIME"}
+    return names.get(type(kind), "LENGTH")
 
 
 def kind_option(kind: Parameter, default: Any, text: str = "") -> Any:
@@ -228,7 +233,6 @@ DEVICE = option(
     "The device that computes; auto by default: the GPU, if there is one and starting it pays.",
     default="auto",
 )
-SAMPLES = option(Whole(1, 1_000_000), "Maximum number of samples per pixel; the scene's by default, or 64.")
 
 
 def run_formulas(context: click.Context, option: click.Parameter, files: Sequence[str]) -> None:
@@ -369,35 +373,7 @@ class MeshOptions(PreparationOptions):
         return MeshJob(**self.values(MeshJob), printing=self.printing(scene.printing))
 
 
-UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0}
-
-
-def read_pixels(text: str) -> tuple[int, int]:
-    """Parse a size such as 1280x720 into pixels across and down."""
-    match = re.fullmatch(r"\s*(\d{1,5})\s*x\s*(\d{1,5})\s*", text)
-    if not match or not all(1 <= int(n) <= 32768 for n in match.groups()):
-        raise ValueError("pixels across and down, such as 1280x720, from 1 to 32768")
-    return int(match[1]), int(match[2])
-
-
-def read_part(text: str) -> tuple[int, ...]:
-    """Parse a part of a picture such as 100,50,640,480: left, top, width and height."""
-    match = re.fullmatch(r"\s*(\d{1,5})" + 3 * r"\s*,\s*(\d{1,5})" + r"\s*", text)
-    if not match:
-        raise ValueError("left, top, width and height, such as 100,50,640,480")
-    return tuple(map(int, match.groups()))
-
-
-def read_duration(text: str) -> float:
-    """Parse a time such as 10s into seconds."""
-    match = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*(s|min|h)?\s*", text)
-    if not match or not 0 < float(match[1]) < 1e6:
-        raise ValueError("a time above zero, such as 10s, 2min or 1h")
-    return float(match[1]) * UNITS[match[2] or "s"]
-
-
-PIXELS, PART = Parsed(read_pixels, "WxH"), Parsed(read_part, "X,Y,W,H")
-DURATION = Parsed(read_duration, "TIME")
+PIXELS = OfKind(picture_size(None, ""))
 
 
 def printer(context: click.Context, _: click.Parameter, name: str | None) -> Printer | None:

@@ -75,6 +75,7 @@ _WHERE = {
     "Node": "formulas",
     "Picture": "api.pictures",
     "Print": "scene",
+    "RenderJob": "records",
     "Report": "jobs.report",
     "Result": "jobs.report",
     "Scene": "scene",

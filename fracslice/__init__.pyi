@@ -75,6 +75,7 @@ from .jobs.report import Report as Report
 from .jobs.report import Result as Result
 from .mesh import Mesh as Mesh
 from .records import MeshJob as MeshJob
+from .records import RenderJob as RenderJob
 from .scene import Print as Print
 from .scene import Scene as Scene
 from .scene import read as read

@@ -1,4 +1,4 @@
-"""Records of what a job makes: the options of meshes and layers, and the edits that make an object printable.
+"""Records of what a job makes: the options of meshes, layers and pictures, and the edits for printing.
 
 An option is a field here and nowhere else: commands, Python signatures, the schema and the documentation are
 made from it.
@@ -15,8 +15,10 @@ from .common.parameters import (
     AnyScale,
     Choice,
     Count,
+    Duration,
     Flag,
     Given,
+    Grid,
     Heights,
     Length,
     Listed,
@@ -29,15 +31,18 @@ from .common.parameters import (
     Vector,
     attribute,
     described,
+    of_kind,
+    picture_size,
     record,
     validate,
 )
-from .errors import SceneError, SliceError
+from .errors import RenderError, SceneError, SliceError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from .scene import Scene
+    from .scene.view import View
     from .slicing.printers import Printer
 
 RESOLUTION = 256.0
@@ -388,3 +393,52 @@ class SliceJob(Placed, RasterOptions):
     def pixels(self) -> tuple[float, float]:
         """Width and height of a pixel, mm."""
         return self.pixel or (self.printer.pixel if self.printer else (PIXEL, PIXEL))
+
+
+@record
+class RenderJob(Record):
+    """Parameters of a picture.
+
+    Raises
+    ------
+    RenderError
+        For an invalid value.
+    """
+
+    size: Given[Sequence[int] | str | None, tuple[int, int] | None] = of_kind(
+        picture_size(None, "pixels across and down; by default the scene's")
+    )
+    samples: int | None = attribute(
+        Count, None, "maximum number of samples per pixel; by default the scene's", least=1, most=1_000_000
+    )
+    crop: Given[Sequence[int] | str | None, tuple[int, int, int, int] | None] = attribute(
+        Grid,
+        None,
+        "only this part: left, top, width and height in pixels. Its pixels are those of the whole picture, "
+        "except in modes depth, distance and position, which show the range of the part",
+    )
+    seed: int = attribute(Count, 0, "seed of the random samples", least=0, most=2**31 - 1)
+    time: Given[float | str | None, float | None] = attribute(
+        Duration, None, "time after which rendering stops, denoising included, such as 10s, 2min or 1h"
+    )
+    denoise: bool = attribute(Flag, False, "removes the noise that is left")
+    layers: bool = attribute(Flag, False, "adds depth, normal, position, albedo and samples to an .exr file")
+    bits: int = attribute(Listed, 8, "bits per channel of a .png file", (8, 16))
+
+    def __post_init__(self) -> None:
+        validate(self, RenderError)
+
+    def film(self, view: View) -> tuple[int, int]:
+        """Pixels across and down of a picture of a view.
+
+        Parameters
+        ----------
+        view : View
+            View of the scene.
+
+        Returns
+        -------
+        tuple of int
+            Those of the job, or else of the view's film.
+        """
+        return self.size or (view.film.width, view.film.height)

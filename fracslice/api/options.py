@@ -17,13 +17,14 @@ from ..errors import SceneError
 from ..formulas import Formula, Node, get
 from ..formulas import names as formula_names
 from ..kernel.devices import choose_device
-from ..records import Colour, MeshJob, SliceJob
+from ..records import Colour, MeshJob, RenderJob, SliceJob
 from ..scene import Print, Scene, library, read, scene
 from ..work import Work
 
 P = ParamSpec("P")
 R = TypeVar("R")
 J = TypeVar("J", MeshJob, SliceJob)
+K = TypeVar("K", MeshJob, SliceJob, RenderJob)
 
 
 class WorkKeywords(TypedDict, total=False):
@@ -67,6 +68,19 @@ class MeshKeywords(PlacedKeywords, total=False):
     dust: float | None
     colour: Colour | None
     proved: bool | None
+
+
+class RenderKeywords(WorkKeywords, total=False):
+    """A picture: the fields of `RenderJob`, and execution."""
+
+    size: Sequence[int] | str | None
+    samples: int | None
+    crop: Sequence[int] | str | None
+    seed: int | None
+    time: float | str | None
+    denoise: bool | None
+    layers: bool | None
+    bits: int | None
 
 
 class LayerKeywords(PlacedKeywords, total=False):
@@ -134,7 +148,20 @@ def job_of(job: J, scene: Scene, options: Mapping[str, Any]) -> J:
     options : mapping
         Fields of the job and of `Print` to override; None keeps the field.
     """
-    return replace(job, **_given_options(options, job.kinds()), printing=print_of(scene, options))
+    return replace(job_with(job, options), printing=print_of(scene, options))
+
+
+def job_with(job: K, options: Mapping[str, Any]) -> K:
+    """Job with the given options.
+
+    Parameters
+    ----------
+    job : MeshJob, SliceJob or RenderJob
+        The base record.
+    options : mapping
+        Fields of the job to override; None keeps the field.
+    """
+    return replace(job, **_given_options(options, job.kinds()))
 
 
 def _given_options(options: Mapping[str, Any], names: Iterable[str]) -> dict[str, Any]:

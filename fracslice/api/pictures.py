@@ -5,18 +5,18 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, Unpack
 
 import numpy as np
 
-from ..common.parameters import validate_value
-from ..errors import RenderError
+from ..errors import TooLargeError
 from ..formulas import Node
-from ..kernel.devices import for_picture
-from ..rendering import Renderer
-from ..rendering.progressive import SIZE
+from ..jobs.pictures import make_picture
+from ..records import RenderJob
+from ..scene import Scene
 from ..scene.view import Camera, Film, Light, View
-from .options import Source, WorkKeywords, keywords, resolve, work_of
+from .options import RenderKeywords, Source, job_with, keywords, resolve, work_of
 
 FILM = Film(width=640, height=480, samples=16)
 """Film of a shape without a scene, for a quick picture."""
@@ -35,26 +35,31 @@ class Picture(np.ndarray):
         return file.getvalue()
 
 
-@keywords()
+@keywords(RenderJob)
 def render(
     shape: Source,
+    job: RenderJob | None = None,
     *,
-    size: tuple[int, int] | None = None,
-    samples: int | None = None,
+    path: str | Path | None = None,
     camera: Camera | None = None,
     lights: Sequence[Light] | None = None,
-    **options: Unpack[WorkKeywords],
+    **options: Unpack[RenderKeywords],
 ) -> Picture:
     """Render a picture of a shape.
+
+    Keywords set the fields of `RenderJob` and `Work`, and override those of the record. A shape without a
+    scene has 640 x 480 pixels of 16 samples by default.
 
     Parameters
     ----------
     shape : Node, Scene, str or path
         As for `make_mesh`.
-    size : two whole numbers, optional
-        Pixels across and down; by default the scene's, or 640 x 480 for a shape.
-    samples : int, optional
-        Maximum number of samples per pixel; by default the scene's, or 16 for a shape.
+    job : RenderJob, optional
+        Settings of the picture, as a record.
+    path : str or path, optional
+        The file to write, in the format of its extension: .png, .jpg, .webp, or linear floats as .exr or
+        .tif. A .png, .exr or .tif file may be larger than memory: the picture is then only in that file,
+        and `TooLargeError` says so.
     camera : Camera, optional
         The camera, in scene units; by default the scene's, or one that shows the whole shape.
     lights : sequence of Light, optional
@@ -68,7 +73,11 @@ def render(
     Raises
     ------
     SceneError, RenderError
-        For an invalid shape, view or size.
+        For an invalid shape, view or value.
+    ExportError
+        For a file that cannot be written.
+    TooLargeError
+        For a picture that does not fit in memory; one with a path is in the file.
     TypeError
         For an unknown keyword.
     Cancelled
@@ -87,19 +96,15 @@ def render(
         isinstance(lights, Sequence) and all(isinstance(lamp, Light) for lamp in lights)
     ):
         raise TypeError(f"lights={lights!r}: expected a sequence of Light")
-    what, work = resolve(shape), work_of(options)
-    root, view = (what, View(film=FILM)) if isinstance(what, Node) else (what.root, what.view)
+    what, work = resolve(shape), work_of({**options, "device": None})
+    scene = Scene(what, 1.0, view=View(film=FILM)) if isinstance(what, Node) else what
     given: dict[str, Any] = {"camera": camera, "lights": None if lights is None else tuple(lights)}
-    view = replace(view, **{name: value for name, value in given.items() if value is not None})
-    most = view.film.samples if samples is None else samples
-    most = validate_value("samples", most, Film.kinds()["samples"], RenderError)
-    pixels = (view.film.width, view.film.height) if size is None else size
-    film = validate_value("size", pixels, SIZE, RenderError)
-    device = for_picture(options.get("device") or "auto", film, most)
-    renderer = Renderer(root, view, film, work, device)
-    seen = renderer.seen()
-    for seen in renderer.passes(most):
-        work.progress("rendering", min(seen.samples / most, 1.0))
-    picture = seen.shown.view(Picture)
-    picture.flags.writeable = False
-    return picture
+    view = replace(scene.view, **{name: value for name, value in given.items() if value is not None})
+    picture = job_with(job or RenderJob(), options)
+    device = options.get("device") or "auto"
+    done = make_picture(replace(scene, view=view), picture, work, path, device=device).done
+    if done is None:
+        raise TooLargeError(f"{path}: holds the picture, which does not fit in memory")
+    array = done.shown.view(Picture)
+    array.flags.writeable = False
+    return array

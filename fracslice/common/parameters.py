@@ -385,8 +385,12 @@ class Given(Generic[G, H]):
 
 def attribute(kind: type[Parameter], *values: Any, **limits: Any) -> Any:
     """Return a dataclass field of a parameter kind."""
-    made = kind(*values, **limits)
-    return field(default=made.default, metadata={"kind": made})
+    return of_kind(kind(*values, **limits))
+
+
+def of_kind(kind: Parameter) -> Any:
+    """Return a dataclass field of a parameter kind that is made already."""
+    return field(default=kind.default, metadata={"kind": kind})
 
 
 def described(default: Any, doc: str, **settings: Any) -> Any:
@@ -662,3 +666,93 @@ class Percent(Parameter):
     def text(self, value: Any) -> str:
         """Format one percentage, or three; see `Parameter.text`."""
         return ",".join(f"{100 * v:g}%" for v in (value if len(set(value)) > 1 else value[:1]))
+
+
+@dataclass(frozen=True)
+class Grid(Parameter):
+    """Parameter kind of whole numbers of pixels with a sign between, such as 1280x720.
+
+    Attributes
+    ----------
+    sign : str
+        What separates the numbers in text.
+    names : tuple of str
+        Name of each number.
+    example, letters : str
+        Text of a value, and what stands for it in the help of a command.
+    least, most : int
+        Inclusive limits of each number.
+    """
+
+    sign: str = ","
+    names: tuple[str, ...] = ("left", "top", "width", "height")
+    example: str = "100,50,640,480"
+    letters: str = "X,Y,W,H"
+    least: int = 0
+    most: int = 32768
+
+    @property
+    def expects(self) -> str:
+        """Description of the accepted values."""
+        *others, last = self.names
+        names = f"{', '.join(others)} and {last}"
+        return f"{names}, such as {self.example}, from {self.least} to {self.most}"
+
+    def read(self, text: str) -> tuple[int, ...]:
+        """Parse numbers with the sign between; see `Parameter.read`."""
+        words = [word.strip() for word in text.split(self.sign)]
+        if not all(re.fullmatch(r"\d{1,9}", word) for word in words):
+            raise ValueError(self.expects)
+        return self.check(tuple(map(int, words)))
+
+    def check(self, value: Any) -> tuple[int, ...]:
+        """Validate text or numbers; see `Parameter.check`."""
+        if isinstance(value, str):
+            return self.read(value)
+        numbers = [finite(v) for v in items(value)]
+        whole = tuple(int(n) for n in numbers if n is not None and n == int(n))
+        if len(numbers) != len(self.names) or whole != tuple(numbers):
+            raise ValueError(self.expects)
+        if not all(self.least <= n <= self.most for n in whole):
+            raise ValueError(self.expects)
+        return whole
+
+    def text(self, value: Any) -> str:
+        """Format the numbers; see `Parameter.text`."""
+        return self.sign.join(map(str, value))
+
+
+def picture_size(default: Any, doc: str) -> Grid:
+    """Return the kind of a picture's size, pixels."""
+    return Grid(default, doc, "x", ("pixels across", "down"), "1280x720", "WxH", least=1)
+
+
+SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
+"""Units of durations, seconds."""
+
+
+@dataclass(frozen=True)
+class Duration(Parameter):
+    """Parameter kind of a time: text with a unit, or a number of seconds. Its value is in seconds."""
+
+    expects = "a time above zero, such as 10s, 2min or 1h"
+
+    def read(self, text: str) -> float:
+        """Parse text with an optional unit; see `Parameter.read`."""
+        match = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*(s|min|h)?\s*", text)
+        if not match:
+            raise ValueError(self.expects)
+        return self.check(float(match[1]) * SECONDS[match[2] or "s"])
+
+    def check(self, value: Any) -> float:
+        """Validate text or a number of seconds; see `Parameter.check`."""
+        if isinstance(value, str):
+            return self.read(value)
+        seconds = finite(value)
+        if seconds is None or not 0 < seconds < 1e9:
+            raise ValueError(self.expects)
+        return seconds
+
+    def text(self, value: float) -> str:
+        """Format a time; see `Parameter.text`."""
+        return f"{value:g}s"

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..common.cache import key, program
 from ..common.memory import available_bytes
-from ..common.parameters import Number, Vector, validate_value
+from ..common.parameters import Number, picture_size, validate_value
 from ..errors import ClusterError, RenderError
 from ..formulas.registry import Node
 from ..kernel.devices import choose_device
@@ -281,7 +281,7 @@ TOLERANCE = 0.002
 """Standard error of displayed brightness at which a pixel has converged: half a level of 256."""
 
 
-SIZE = Vector(None, "pixels across and down", sizes=(2,), least=1, most=32768, whole=True)
+SIZE = picture_size(None, "pixels across and down")
 
 
 def _backend(device: str) -> tuple[Callable[..., Any], Callable[[HostAccumulator], Accumulator]]:

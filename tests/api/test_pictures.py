@@ -4,12 +4,25 @@ from __future__ import annotations
 
 import io
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from fracslice import Camera, Light, Mesh, Picture, box, cylinder, make_mesh, render, slice_layers, sphere
+from fracslice import (
+    Camera,
+    Light,
+    Mesh,
+    Picture,
+    RenderJob,
+    box,
+    cylinder,
+    make_mesh,
+    render,
+    slice_layers,
+    sphere,
+)
 from fracslice.errors import Cancelled, RenderError, SceneError
 from fracslice.scene import scene
 from fracslice.scene.view import Film, View
@@ -63,7 +76,7 @@ def test_progress_is_reported_and_work_is_cancelled() -> None:
     ("options", "error", "message"),
     [
         ({"sample": 1}, TypeError, r"render\(\) has no argument 'sample'; did you mean samples\?"),
-        ({"size": (0, 10)}, RenderError, r"size=\(0, 10\): expected 2 whole numbers"),
+        ({"size": (0, 10)}, RenderError, r"size=\(0, 10\): expected pixels across and down"),
         ({"camera": (3, 3, 2)}, TypeError, r"camera=\(3, 3, 2\): expected a Camera"),
         ({"lights": Light()}, TypeError, "expected a sequence of Light"),
         ({"samples": 0}, RenderError, "samples=0: expected a whole number"),
@@ -97,3 +110,31 @@ def test_the_picture_of_a_mesh_has_its_colours() -> None:
     picture = shown(mesh)
     red, green, _ = picture[picture[..., 3] == 255][:, :3].max(0)
     assert red > 200 and green < 40
+
+
+def test_a_part_without_noise_in_a_file(picture: Picture, tmp_path: Path) -> None:
+    """What the command can, Python can: a crop has the pixels of the whole, a file those of the array."""
+    part = render(SHAPE, **SMALL, crop=(12, 8, 16, 10))
+    assert np.array_equal(part, picture[8:18, 12:28])
+    path = tmp_path / "part.png"
+    clean = render(SHAPE, RenderJob(crop="12,8,16,10", denoise=True), path=path, time="1min", **SMALL)
+    assert clean.shape == part.shape and (clean != part).any()
+    assert abs(np.asarray(Image.open(path)).astype(int) - clean).max() <= 1
+    other = render(SHAPE, **SMALL, seed=1)
+    assert (other != picture).any() and abs(other.mean() - picture.mean()) < 5
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"bits": 16}, "bits 16: expected a .png file"),
+        ({"bits": 9}, "bits=9: expected 8 or 16"),
+        ({"layers": True}, "layers: expected an .exr file"),
+        ({"time": "soon"}, "time='soon': expected a time above zero"),
+        ({"crop": "1,2,3"}, "crop='1,2,3': expected left, top, width and height"),
+        ({"crop": (40, 0, 20, 20)}, "expected a part of 48 x 32 pixels"),
+    ],
+)
+def test_settings_that_cannot_be_are_named(options: dict, message: str) -> None:
+    with pytest.raises(RenderError, match=message):
+        render(SHAPE, **SMALL, **options)

@@ -7,16 +7,14 @@ import re
 import signal
 import time
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from fracslice.cli import render as command
 from fracslice.cli.main import run
-from fracslice.cli.render import describe_pass
 from PIL import Image
 
+from fracslice.jobs import pictures
 from fracslice.rendering import Pass, Renderer, bands, cpu, denoising
 from fracslice.rendering.accumulator import CHANNELS, COARSE, COUNT, PassPlan
 from fracslice.rendering.crops import BYTES
@@ -139,7 +137,7 @@ def test_pass_images_and_going_on_from_a_state(scene: Path, tmp_path: Path) -> N
     ("options", "message"),
     [
         (["--size", "0x10"], "expected pixels across and down"),
-        (["--samples", "0"], "not in the range"),
+        (["--samples", "0"], "expected a whole number from 1 to 1000000"),
         (["--time", "never"], "expected a time"),
         (["--set", "camera.eye=0.3 0 0.2"], "outside the solid"),
         (["--set", "camera.up=3 -2 1"], "other than the one the camera looks in"),
@@ -274,7 +272,7 @@ def test_a_signal_while_noise_is_removed_keeps_the_picture(
 def test_a_time_limit_includes_the_removal_of_noise(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    limits, limited = list[float](), command.limit_time
+    limits, limited = list[float](), pictures._limit_time
 
     def seen(renderer: Renderer, samples: int | None, limit: float) -> Any:
         limits.append(limit)
@@ -286,7 +284,7 @@ def test_a_time_limit_includes_the_removal_of_noise(
 
     remove = denoising.denoise
     monkeypatch.setattr(denoising, "denoise", slow)
-    monkeypatch.setattr(command, "limit_time", seen)
+    monkeypatch.setattr(pictures, "_limit_time", seen)
     options = ["--denoise", "--time", "60s", "--device", "cpu", "-o", str(tmp_path / "a.png")]
     assert run(["render", str(scene), *options]) == 0
     assert 6 <= limits[0] < 58.01
@@ -315,8 +313,5 @@ def test_noise_is_removed_from_a_picture_of_light(
 
 
 def test_the_error_of_less_than_a_sample_is_unknown():
-    assert (
-        describe_pass(SimpleNamespace(samples=0.25, error=float("inf")))
-        == "0.2 samples a pixel, error unknown"
-    )
-    assert describe_pass(SimpleNamespace(samples=4.0, error=0.0123)) == "4.0 samples a pixel, error 0.012"
+    assert pictures.describe_samples(0.25, float("inf")) == "0.2 samples a pixel, error unknown"
+    assert pictures.describe_samples(4.0, 0.0123) == "4.0 samples a pixel, error 0.012"

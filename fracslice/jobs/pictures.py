@@ -1,0 +1,330 @@
+"""The picture job: from a scene to a picture, in a file too if one is named."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+import numpy as np
+
+from ..errors import Cancelled, KeptError, RenderError, SharedError
+from ..export.images import BANDED, LINEAR, check_image, write_bands, write_image
+from ..kernel.devices import for_picture
+from ..records import RenderJob
+from ..rendering import Pass, Renderer
+from ..rendering.bands import check_bands, render_bands, rows_of_bands
+from ..rendering.crops import BYTES, MARGIN
+from ..rendering.progressive import layers
+from ..rendering.sequence import SampleRange
+from ..scene import Scene
+from ..work import Work
+
+Shown = Callable[[Iterator[Pass], Renderer], Iterator[Pass]]
+"""Passes them on, and shows or keeps each."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rendered:
+    """A rendered picture."""
+
+    size: tuple[int, int]  # pixels across and down
+    samples: float  # mean samples per pixel
+    error: float  # root mean square of the pixels' standard errors, in displayed brightness
+    done: Pass | None = None  # the picture; None if it is only in its file
+    renderer: Renderer | None = None
+
+    @property
+    def description(self) -> str:
+        """Size, samples and error as text."""
+        width, height = self.size
+        return f"{width} x {height} pixels, {describe_samples(self.samples, self.error)}"
+
+
+def describe_samples(samples: float, error: float) -> str:
+    """Samples per pixel and their error, which less than a sample does not tell, as text."""
+    many = f"{samples:.1f}" if samples >= 1 else f"{samples:.1g}"
+    return f"{many} samples a pixel, " + (f"error {error:.2g}" if math.isfinite(error) else "error unknown")
+
+
+def make_picture(
+    scene: Scene,
+    job: RenderJob | None = None,
+    work: Work | None = None,
+    path: str | Path | None = None,
+    *,
+    device: str = "auto",
+    state: str | None = None,
+    shown: Shown | None = None,
+) -> Rendered:
+    """Render a picture of a scene, as its camera, lights and materials say.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    job : RenderJob, optional
+        Size, samples and what else is done to the picture.
+    work : Work, optional
+        Threads, progress, cancellation and pool.
+    path : str or Path, optional
+        File to write; the extension selects the format. A picture larger than the memory is rendered into a
+        .png, .tif or .exr file in bands.
+    device : {"cpu", "cuda", "auto"}
+        Device that traces the rays; by default the GPU if there is one and starting it pays.
+    state : str, optional
+        An .npz file from which rendering goes on if it exists, and to which it is saved after every pass.
+    shown : callable, optional
+        Receives the iterator over the passes and the renderer; returns an iterator over the same passes, and
+        reports their progress.
+
+    Returns
+    -------
+    Rendered
+        The picture, its samples and its error.
+
+    Raises
+    ------
+    SceneError, RenderError, ExportError
+        For a view that cannot be rendered, a job that does not fit the scene or the kind of file, or a file
+        that cannot be written.
+    Cancelled
+        When the work is cancelled before the first sample, or without a file; `KeptError` if what there was
+        is in the file.
+    """
+    job, work = job or RenderJob(), work or Work()
+    refuse(scene, job, path)
+    film = job.film(scene.view)
+    if (rows := rows_in_memory(scene, job)) < film[1]:
+        return _in_bands(scene, job, work, path, rows, device, state)
+    return _Picture(scene, job, work, None if path is None else Path(path), state).made(device, shown)
+
+
+def refuse(scene: Scene, job: RenderJob, path: str | Path | None) -> None:
+    """Raise the errors of a job that does not fit the scene or the kind of file."""
+    kind = "" if path is None else check_image(path)
+    if job.layers and kind != ".exr":
+        raise RenderError("layers: expected an .exr file, which holds them")
+    if job.bits == 16 and kind != ".png":
+        raise RenderError("bits 16: expected a .png file")
+    if job.denoise and scene.view.shading.mode != "light":
+        raise RenderError('denoise: expected a scene with shading mode="light"')
+
+
+def rows_in_memory(scene: Scene, job: RenderJob) -> int:
+    """Rows of the bands in which a picture is rendered; all of its rows if it fits into the memory."""
+    film = job.film(scene.view)
+    return film[1] if job.crop else rows_of_bands(film)
+
+
+def announcement(film: tuple[int, int], rows: int) -> str:
+    """Line on the memory that a picture needs, whole and in bands."""
+    width, height = film
+    whole, part = (BYTES * width * n / 1e9 for n in (height, min(rows + 2 * MARGIN, height)))
+    return (
+        f"{width} x {height} pixels need {whole:,.1f} GB of memory, more than is free: "
+        f"rendered in {-(-height // rows)} bands of {rows} rows, {part:,.1f} GB each"
+    )
+
+
+WHOLE = "expected a picture that fits into the memory; a larger one is rendered in bands"
+
+
+def _in_bands(
+    scene: Scene,
+    job: RenderJob,
+    work: Work,
+    path: str | Path | None,
+    rows: int,
+    device: str,
+    state: str | None,
+) -> Rendered:
+    """Render a picture larger than the memory into a file."""
+    view, film, taken, squares = scene.view, job.film(scene.view), list[float](), list[float]()
+    whole = {"layers": job.layers, "denoise": job.denoise, "time": job.time, "state": state}
+    whole["cluster or shard"] = work.cluster is not None
+    if path is None or check_image(path) not in BANDED:
+        raise RenderError(f"{path or 'size'}: {WHOLE}, as {', '.join(BANDED)}")
+    for name, value in whole.items():
+        if value:
+            raise RenderError(f"{name}: {WHOLE}")
+    check_bands(view, display=check_image(path) == ".png")
+    sequence = SampleRange(seed=job.seed)
+
+    def bands() -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        made = render_bands(scene.root, view, film, rows, work, device, sequence, job.samples)
+        for k, band in enumerate(made, 1):
+            taken.append(band.samples)
+            squares.append(band.error**2)
+            work.progress("bands", k * rows / film[1])
+            yield band.developed, light_of(band)
+
+    write_bands(path, film, bands(), 4 if view.film.transparent else 3, job.bits, metadata(scene), work)
+    return Rendered(film, sum(taken) / len(taken), (sum(squares) / len(squares)) ** 0.5)
+
+
+def light_of(done: Pass) -> Any:
+    """Linear light of a pass, with alpha if the film is transparent."""
+    return done.mean if done.view.film.transparent else done.image
+
+
+def metadata(scene: Scene) -> dict[str, str]:
+    """Metadata of every picture of a scene."""
+    from ..export import application
+
+    return {"Title": scene.name, "Software": application(), "scene_hash": scene.hash}
+
+
+def save(
+    path: str | Path,
+    done: Pass,
+    scene: Scene,
+    bits: int = 8,
+    threads: int = 0,
+    more: Mapping[str, np.ndarray] | None = None,
+) -> None:
+    """Write the picture of a pass, with the scene and the samples in its metadata.
+
+    `more`: layers of an .exr file, float32 (height, width, 3).
+    """
+    text = {**metadata(scene), "samples": f"{done.samples:.2f}"}
+    picture = light_of(done) if check_image(path) in LINEAR else done.developed
+    write_image(path, picture, picture, bits, text, Work(threads) if threads else Work(), more)
+
+
+@dataclass(frozen=True)
+class _Picture:
+    """A picture in one piece."""
+
+    scene: Scene
+    job: RenderJob
+    work: Work
+    path: Path | None  # file of the picture
+    state: str | None  # file of the sums
+
+    def made(self, device: str, shown: Shown | None) -> Rendered:
+        """Render and write the picture."""
+        scene, job, pool = self.scene, self.job, self.work.cluster
+        film, view, crop = job.film(scene.view), scene.view, job.crop
+        samples = job.samples or view.film.samples
+        device = for_picture(device, crop[2:] if crop else film, samples)
+        renderer = Renderer(scene.root, view, film, self.work, device, SampleRange(seed=job.seed), crop)
+        aside = None if pool is None or self.state else pool.pieces.path(f"{renderer.key}.npz")
+        try:
+            guides, limit = _plan_denoising(renderer, job)
+            self._passes(renderer, self.state or aside, limit, shown)
+            if pool and not pool.first:
+                raise SharedError("the samples are made; shard 1 writes the file")
+            more = layers(renderer) if job.layers else None
+            done = _without_noise(renderer, guides) if job.denoise else renderer.seen()
+        except Cancelled:
+            kept = renderer.seen()
+            if self.path is None or not kept.samples or (pool and not pool.first):
+                raise
+            self._save(kept)
+            raise KeptError(f"{self.path}: {_rendered(renderer, kept).description}") from None
+        self._save(done, more)
+        if pool and aside:
+            Path(aside).unlink(missing_ok=True)
+        return _rendered(renderer, done)
+
+    def _save(self, done: Pass, more: Mapping[str, np.ndarray] | None = None) -> None:
+        if self.path is not None:
+            save(self.path, done, self.scene, self.job.bits, self.work.threads, more)
+
+    def _passes(
+        self, renderer: Renderer, state: str | None, limit: float | None, shown: Shown | None
+    ) -> None:
+        """Render pass after pass, from a state and into it."""
+        work, samples = self.work, self.job.samples or renderer.setup.view.film.samples
+        keep = state if work.cluster is None or work.cluster.first else None
+        if state and Path(state).exists():
+            renderer.resume(state)
+        try:
+            passes = _limit_time(renderer, samples, limit)
+            for done in shown(passes, renderer) if shown else passes:
+                if not shown:
+                    work.progress("rendering", share(done, renderer, self.job))
+                if keep:
+                    _save_state(renderer, keep)
+            if limit and keep:
+                _save_state(renderer, keep)  # of a pass that the limit interrupted
+        except Cancelled:
+            if keep and renderer.seen().samples:
+                _save_state(renderer, keep)
+            raise
+
+
+def share(done: Pass, renderer: Renderer, job: RenderJob) -> float:
+    """Completed fraction of the samples, from 0 to 1."""
+    return min(done.samples / (job.samples or renderer.setup.view.film.samples), 1.0)
+
+
+def _rendered(renderer: Renderer, done: Pass) -> Rendered:
+    return Rendered((renderer.width, renderer.height), done.samples, done.error, done, renderer)
+
+
+def _plan_denoising(renderer: Renderer, job: RenderJob) -> tuple[list[np.ndarray] | None, float | None]:
+    """Guides of denoising where the time is limited, and the time that is left for the passes, seconds.
+
+    Removing noise takes as long from an empty picture as from the one at the end.
+    """
+    if not job.denoise or job.time is None:
+        return None, job.time
+    from ..rendering.denoising import denoise, guides
+
+    start = monotonic()
+    made = guides(renderer)
+    guided = monotonic()
+    denoise(renderer, made)
+    taken = monotonic() - start + (monotonic() - guided)
+    return made, max(job.time - taken, job.time / 10)
+
+
+def _without_noise(renderer: Renderer, guides: list[np.ndarray] | None) -> Pass:
+    """Picture of a renderer without noise."""
+    from ..rendering.denoising import denoise
+
+    return denoise(renderer, guides)
+
+
+def _limit_time(renderer: Renderer, samples: int, limit: float | None) -> Iterator[Pass]:
+    """Iterate over passes until a time limit, in seconds, which interrupts a pass.
+
+    A limit that ends before the first sample is doubled.
+    """
+    cancel, expired = renderer.work.cancel, threading.Event()
+
+    def expire() -> None:
+        expired.set()
+        cancel.set()
+
+    if limit is None:
+        yield from renderer.passes(samples)
+        return
+    timer = threading.Timer(limit, expire)
+    timer.start()
+    try:
+        yield from renderer.passes(samples)
+        return
+    except Cancelled:
+        if not expired.is_set():
+            raise
+    finally:
+        timer.cancel()
+        if expired.is_set():
+            cancel.clear()
+    if not renderer.seen().samples:
+        yield from _limit_time(renderer, samples, 2 * limit)
+
+
+def _save_state(renderer: Renderer, path: str) -> None:
+    """Write the state of a renderer, from which it can resume."""
+    from ..common.files import replacing
+
+    with replacing(path) as file:
+        renderer.save(file)
