@@ -494,6 +494,19 @@ class Reduction:
     ) -> tuple[NDArray[int32], NDArray[bool_], NDArray[int32], NDArray[bool_], NDArray[int32]]:
         """See `fracslice.mesh.simplify.Collapsed`."""
 
+class MeshField:
+    """See `fracslice.mesh.field.MeshField`. Refers to the arrays during its lifetime."""
+
+    def __init__(
+        self,
+        vertices: NDArray[float64],
+        triangles: NDArray[int32],
+        order: NDArray[int64],
+        low: NDArray[float64],
+        high: NDArray[float64],
+    ) -> None: ...
+    def points(self, points: NDArray[float64], measured: bool) -> NDArray[float64]: ...
+
 class Nearest:
     """See `fracslice.mesh.spatial.Nearest`. Refers to the arrays during its lifetime."""
 

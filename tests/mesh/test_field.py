@@ -55,21 +55,41 @@ def test_runs_of_points_far_near_and_scattered_have_the_distances_of_single_poin
     line = np.linspace(-9, 9, 70)
     spread = np.random.default_rng(0).uniform(-9, 9, (3, 200))
     points = np.ascontiguousarray(np.concatenate([np.stack([line, line / 3, 0 * line + 1], 1), spread.T]))
-    result = field.nearest.points(points)
-    alone = np.array([field.nearest.points(p[None])[0] for p in points])
+    nearest = Nearest(field.mesh)
+    result = nearest.points(points)
+    alone = np.array([nearest.points(p[None])[0] for p in points])
     exact = trimesh.proximity.closest_point_naive(field.mesh.to_trimesh(), points)[1]
     assert result == pytest.approx(alone, abs=1e-12) and result == pytest.approx(exact, abs=1e-9)
 
 
-def test_signs_need_no_distances(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("away", [0.0, 1e4])
+def test_bricks_have_the_least_of_the_distances_of_all_triangles(away: float) -> None:
+    corners_of = [[0, 0, 0], [9, 1e-9, 0], [4, 0, 0], [2, 3, 1]]
+    needles = trimesh.Trimesh(corners_of, [[0, 1, 2], [0, 1, 3], [3, 3, 3]])
+    parts = trimesh.creation.icosphere(4, 5.0), trimesh.creation.box((3, 4, 14)), needles
+    field = field_of(*(moved(part, away, away / 2, 0) for part in parts))
+    corners = 8 * np.indices((4, 4, 4)).reshape(3, -1).T.astype(np.int32)[::5].copy()
+    kernel, origin, voxel = field.kernel("cpu", "float64"), (away - 9.0, away / 2 - 8.9, -8.8), 0.57
+    values = np.empty((len(corners), 512))
+    kernel.bricks(corners, origin, voxel, values)
+    inner = np.indices((8, 8, 8)).reshape(3, 512)
+    points = np.array([origin[k] + voxel * (corners[:, k, None] + inner[k]) for k in range(3)]).reshape(3, -1)
+    assert (kernel.points(*points) == values.ravel()).all()
+    some = np.ascontiguousarray(points.T[::97])
+    ones = [Nearest(Mesh(field.mesh.vertices, one[None])).points(some) for one in field.mesh.triangles]
+    assert (np.abs(values.ravel()[::97]) == np.min(ones, axis=0)).all()
+
+
+def test_signs_need_no_distances() -> None:
     ball, post = field_of(trimesh.creation.icosphere(3, 5.0)), field_of(trimesh.creation.box((3, 4, 14)))
     points = np.random.default_rng(0).uniform(-8, 8, (3, 2000))
     fields: list[Field] = [ball, *(edited_field(ball, does, post) for does in DOES)]
     fields.append(edited_field(ball, "cut", sphere(radius=4.0)))
     exact = [field.kernel().points(*points) < 0 for field in fields]
-    monkeypatch.setattr(Nearest, "points", None)
     for field, inside in zip(fields, exact, strict=True):
-        assert inside.sum() > 0 and ((field.sign_kernel().points(*points) < 0) == inside).all()
+        signs = field.sign_kernel().points(*points)
+        assert inside.sum() > 0 and ((signs < 0) == inside).all()
+        assert (np.abs(signs) == 1).all() or field is fields[-1]
 
 
 def test_points_above_each_other_share_the_crossings_of_their_line() -> None:

@@ -1,7 +1,7 @@
-// Fewer triangles, and how far they are: classes of fracslice._native that keep the arrays they look into.
+// Fewer triangles, how far they are, and a mesh as a field: classes of fracslice._native that keep the arrays they look into.
 #include "../unlocked.h"
 #include "input.h"
-#include "nearest.h"
+#include "mesh_field.h"
 #include "reduction.h"
 
 namespace fracslice::mesh {
@@ -82,6 +82,33 @@ class BoundNearest {
     Nearest nearest_;
 };
 
+class BoundMeshField {
+  public:
+    BoundMeshField(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<int64_t>& order,
+                   const Rows<double>& low, const Rows<double>& high)
+        : vertices_(vertices), low_(low), high_(high), triangles_(triangles), order_(order), field_(unlocked(0, [&] {
+              MeshView mesh = mesh_of(vertices, triangles);
+              if (!mesh.count) throw std::invalid_argument("an empty mesh is no field");
+              return MeshField(mesh, tree_of(mesh, order, low, high));
+          })) {}
+
+    // Calls come from many threads: each takes one.
+    nb::object points(const Rows<double>& points, bool measured) const {
+        Array<double> values(points.shape(0), 1);
+        {
+            nb::gil_scoped_release released;
+            field_.points(span_of(points), measured, values.data.get());
+        }
+        return to_numpy(std::move(values), {points.shape(0)});
+    }
+
+  private:
+    Rows<double> vertices_, low_, high_;
+    Rows<int32_t> triangles_;
+    Vector<int64_t> order_;
+    MeshField field_;
+};
+
 }  // namespace
 
 void bind_reduction(nb::module_& module) {
@@ -99,6 +126,10 @@ void bind_reduction(nb::module_& module) {
         .def("bounds", &BoundNearest::bounds, "vertices"_a, "triangles"_a, "hints"_a, "tolerance"_a, "threads"_a = 0)
         .def("points", &BoundNearest::points, "points"_a, "threads"_a = 0)
         .def("samples", &BoundNearest::samples, "vertices"_a, "triangles"_a, "spacing"_a, "enough"_a, "threads"_a = 0);
+    nb::class_<BoundMeshField>(module, "MeshField")
+        .def(nb::init<const Rows<double>&, const Rows<int32_t>&, const Vector<int64_t>&, const Rows<double>&, const Rows<double>&>(),
+             "vertices"_a, "triangles"_a, "order"_a, "low"_a, "high"_a)
+        .def("points", &BoundMeshField::points, "points"_a, "measured"_a);
 }
 
 }  // namespace fracslice::mesh

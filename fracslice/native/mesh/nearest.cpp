@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <memory>
 
 #include "corner_table.h"
 
@@ -12,8 +13,10 @@ namespace {
 
 // Triangles that one thread looks at in turn, each beginning where the one before was: always the same ones.
 constexpr size_t kTurn = 256;
-// Points that share a search, and the most triangles that it may find.
-constexpr size_t kRun = 64, kMost = 48;
+// Points that share a search, those that share a part of what it finds, and the most leaves that it may find.
+constexpr size_t kRun = 64, kGroup = 8, kMost = 512;
+// Points that are sorted in space, and cells along each side of their box.
+constexpr size_t kSorted = 512, kCells = 8;
 // The longest way over neighbouring triangles.
 constexpr int kSteps = 32;
 
@@ -24,15 +27,178 @@ void in_turns(size_t count, const Do& act) {
 }
 
 // The square of how far a number is from an interval.
-double outside(double x, double low, double high) {
-    double d = std::max(std::max(low - x, 0.0), x - high);
+template <class T>
+T outside(T x, T low, T high) {
+    T d = std::max(std::max(low - x, T(0)), x - high);
     return d * d;
 }
 
+// A number, or 0 if it is negative, without a branch.
+float positive(float x) { return (x + std::abs(x)) / 2; }
+
+// Boxes are kept as floats: larger by more than the rounding of coordinates, which are at most `scale`, and of points up to
+// twice as far. Squares of distances are compared after a factor that covers their own rounding, and that of other points.
+constexpr double kLarger = 1e-6;
+constexpr float kSure = 1 - 2e-6f, kUnsure = 4e-6f;
+
+// A point as floats.
+struct Rounded {
+    float x[3];
+
+    explicit Rounded(const double* p) : x{float(p[0]), float(p[1]), float(p[2])} {}
+};
+
+// Numbers below kCells with two zeros behind each bit.
+constexpr uint16_t kSpread[kCells] = {0, 1, 8, 9, 64, 65, 72, 73};
+
+// Sorts up to kSorted points [n, 3] by the cells of their box in Morton order: of a brick, 64 and 8 consecutive ones are cubes.
+void sort(const double* points, size_t count, uint16_t* order) {
+    uint16_t cells[kSorted] = {}, starts[kCells * kCells * kCells + 1] = {};
+    for (size_t k = 0; k < 3; ++k) {
+        double low = points[k], high = low;
+        for (size_t i = 1; i < count; ++i) low = std::min(low, points[3 * i + k]), high = std::max(high, points[3 * i + k]);
+        const double side = high > low ? high - low : 1;
+        for (size_t i = 0; i < count; ++i) {
+            const size_t cell = size_t((points[3 * i + k] - low) / side * (double(kCells) - 0.001));
+            cells[i] |= uint16_t(kSpread[cell] << (2 - k));
+        }
+    }
+    for (size_t i = 0; i < count; ++i) ++starts[cells[i] + 1];
+    for (size_t cell = 1; cell < std::size(starts); ++cell) starts[cell] = uint16_t(starts[cell] + starts[cell - 1]);
+    for (size_t i = 0; i < count; ++i) order[starts[cells[i]]++] = uint16_t(i);
+}
+
+// Around points [n, 3].
+struct Ball {
+    double centre[3], radius = 0;
+
+    explicit Ball(std::span<const double> points) {
+        for (size_t x = 0; x < 3; ++x) {
+            double low = points[x], high = points[x];
+            for (size_t i = x; i < points.size(); i += 3) low = std::min(low, points[i]), high = std::max(high, points[i]);
+            centre[x] = (low + high) / 2, radius += (high - low) * (high - low) / 4;
+        }
+        radius = std::sqrt(radius);
+    }
+    // The triangle nearest to one of its points is at most its diameter farther from the centre than the one nearest to the
+    // centre: the square of that distance.
+    double reach(double nearest) const {
+        double reach = (std::sqrt(nearest) + 2 * radius) * (1 + 1e-9);
+        return reach * reach;
+    }
+};
+
 }  // namespace
 
-Nearest::Nearest(const MeshView& mesh, const TreeView& tree, bool closed) : mesh_(mesh), tree_(tree) {
+template <size_t kCount>
+void Nearest::Boxes<kCount>::set(size_t i, const double* lowest, const double* highest, double more) {
+    for (size_t k = 0; k < 3; ++k) low[k][i] = float(lowest[k] - more), high[k][i] = float(highest[k] + more);
+}
+
+// The squares of the distances of the first boxes.
+template <size_t kCount>
+void Nearest::Boxes<kCount>::squares(const float* p, size_t count, float* out) const {
+    for (size_t i = 0; i < count; ++i) {
+        out[i] = (outside(p[0], low[0][i], high[0][i]) + outside(p[1], low[1][i], high[1][i]) + outside(p[2], low[2][i], high[2][i])) * kSure;
+    }
+}
+
+void Nearest::Circles::set(size_t i, const MeshView& mesh, size_t t, double more) {
+    double middle[3], along[3], square = 0;
+    for (size_t k = 0; k < 3; ++k) middle[k] = (mesh.corner(t, 0)[k] + mesh.corner(t, 1)[k] + mesh.corner(t, 2)[k]) / 3;
+    for (int corner = 0; corner < 3; ++corner) {
+        double d = 0;
+        for (size_t k = 0; k < 3; ++k) d += (mesh.corner(t, corner)[k] - middle[k]) * (mesh.corner(t, corner)[k] - middle[k]);
+        square = std::max(square, d);
+    }
+    TriangleDistance(mesh, t).normal(along);
+    const double length = std::sqrt(along[0] * along[0] + along[1] * along[1] + along[2] * along[2]);
+    for (size_t k = 0; k < 3; ++k) centre[k][i] = float(middle[k]), normal[k][i] = length > 0 ? float(along[k] / length) : 0;
+    radius[i] = float(std::sqrt(square) + more);
+}
+
+// Squares of what the distances of the triangles are at least: of their planes, and beside the circles in them.
+void Nearest::Circles::squares(const float* p, float more, float* out) const {
+    float whole[kLeaf], up[kLeaf], beside[kLeaf];  // squares of distances from centres, heights above planes
+    for (size_t i = 0; i < kLeaf; ++i) {
+        const float x = p[0] - centre[0][i], y = p[1] - centre[1][i], z = p[2] - centre[2][i];
+        whole[i] = x * x + y * y + z * z, up[i] = std::abs(x * normal[0][i] + y * normal[1][i] + z * normal[2][i]);
+    }
+    for (size_t i = 0; i < kLeaf; ++i) beside[i] = std::sqrt(whole[i] * (1 + kUnsure) - up[i] * up[i]) - radius[i];
+    for (size_t i = 0; i < kLeaf; ++i) {
+        const float above = positive(up[i] - more), away = positive(beside[i]);
+        out[i] = above * above + away * away - 3 * kUnsure * whole[i];
+    }
+}
+
+// Leaves that a search found.
+struct Nearest::Found {
+    size_t count = 0, leaves[kMost];
+    Boxes<kMost> boxes;
+};
+
+// Distances of runs of points: leaves in which the nearest triangles of a run may be, of them those of a group.
+class Nearest::Run {
+  public:
+    explicit Run(const Nearest& nearest) : nearest_(nearest) {}
+
+    void operator()(std::span<const double> points, double* distances) {
+        Ball ball(points);
+        Neighbour nearest = nearest_(ball.centre, guess_);
+        guess_ = nearest.triangle;
+        const bool all = nearest_.around(ball.centre, ball.reach(nearest.square), around_);
+        for (size_t first = 0, count = points.size() / 3; first < count; first += kGroup) {
+            const size_t last = std::min(first + kGroup, count);
+            if (all) choose(points.subspan(3 * first, 3 * (last - first)));
+            for (size_t i = first; i < last; ++i) {
+                Neighbour one = all ? among(chosen_, &points[3 * i]) : nearest_(&points[3 * i], guess_);
+                guess_ = one.triangle, distances[i] = std::sqrt(one.square);
+            }
+        }
+    }
+
+  private:
+    // The nearest triangle in leaves that hold all that may be nearest.
+    Neighbour among(const Found& found, const double* p) {
+        const Rounded rounded(p);
+        found.boxes.squares(rounded.x, found.count, squares_);
+        Neighbour best{guess_, nearest_.distance(guess_).square(p)};
+        for (size_t i = 0; i < found.count; ++i) {
+            if (squares_[i] < best.square) nearest_.search(found.leaves[i], p, rounded.x, best);
+        }
+        return best;
+    }
+
+    void choose(std::span<const double> group) {
+        Ball ball(group);
+        Neighbour nearest = among(around_, ball.centre);
+        const double reach = ball.reach(nearest.square);
+        guess_ = nearest.triangle;
+        chosen_.count = 0;
+        for (size_t i = 0; i < around_.count; ++i) {
+            if (squares_[i] > reach) continue;
+            for (size_t k = 0; k < 3; ++k) {
+                chosen_.boxes.low[k][chosen_.count] = around_.boxes.low[k][i];
+                chosen_.boxes.high[k][chosen_.count] = around_.boxes.high[k][i];
+            }
+            chosen_.leaves[chosen_.count++] = around_.leaves[i];
+        }
+    }
+
+    const Nearest& nearest_;
+    size_t guess_ = 0;
+    Found around_, chosen_;
+    float squares_[kMost];
+};
+
+Nearest::Nearest(const MeshView& mesh, const TreeView& tree, bool closed) : mesh_(mesh), tree_(tree), circles_(tree.leaves) {
     if (closed) across_ = opposite_corners(mesh);
+    double scale = 0;
+    for (size_t k = 0; k < 3; ++k) scale = std::max({scale, std::abs(tree.low[3 + k]), std::abs(tree.high[3 + k])});
+    larger_ = kLarger * scale;
+    tbb::parallel_for(size_t(0), tree.leaves, [&](size_t leaf) {
+        for (size_t i = 0; i < kLeaf; ++i) circles_[leaf].set(i, mesh, size_t(tree.order[std::min(tree.first(leaf) + i, tree.count - 1)]), larger_);
+    });
 }
 
 double Nearest::to_box(const double* p, size_t node) const {
@@ -42,30 +208,19 @@ double Nearest::to_box(const double* p, size_t node) const {
     return total;
 }
 
-double Nearest::to_box_of_triangle(const double* p, size_t t) const {
-    const double *a = mesh_.corner(t, 0), *b = mesh_.corner(t, 1), *c = mesh_.corner(t, 2);
-    double total = 0;
-    for (size_t k = 0; k < 3; ++k) total += outside(p[k], std::min(std::min(a[k], b[k]), c[k]), std::max(std::max(a[k], b[k]), c[k]));
-    return total;
-}
-
 Neighbour Nearest::operator()(const double* p, size_t guess) const {
     struct Open {
         size_t node;
         double square;
     } open[128];
+    const Rounded rounded(p);
     Neighbour best{guess, distance(guess).square(p)};
     open[0] = {1, 0};
     for (int height = 1; height > 0;) {
         auto [node, square] = open[--height];
         if (square >= best.square) continue;
         if (node >= tree_.leaves) {
-            size_t leaf = node - tree_.leaves;
-            for (size_t i = tree_.first(leaf); i < tree_.last(leaf); ++i) {
-                size_t t = size_t(tree_.order[i]);
-                if (to_box_of_triangle(p, t) >= best.square) continue;
-                if (double d = distance(t).square(p); d < best.square) best = {t, d};
-            }
+            search(node - tree_.leaves, p, rounded.x, best);
             continue;
         }
         Open one{2 * node, to_box(p, 2 * node)}, two{2 * node + 1, to_box(p, 2 * node + 1)};
@@ -73,6 +228,16 @@ Neighbour Nearest::operator()(const double* p, size_t guess) const {
         open[height++] = one, open[height++] = two;
     }
     return best;
+}
+
+void Nearest::search(size_t leaf, const double* p, const float* rounded, Neighbour& best) const {
+    float squares[kLeaf];
+    circles_[leaf].squares(rounded, float(larger_), squares);
+    for (size_t first = tree_.first(leaf), i = first; i < tree_.last(leaf); ++i) {
+        if (squares[i - first] >= best.square) continue;
+        size_t t = size_t(tree_.order[i]);
+        if (double d = distance(t).square(p); d < best.square) best = {t, d};
+    }
 }
 
 // From neighbour to neighbour as long as that comes nearer: mostly all the way.
@@ -107,55 +272,39 @@ std::vector<Nearest::Pair> Nearest::bounds(const MeshView& triangles, std::span<
 
 void Nearest::points(std::span<const double> points, double* distances) const {
     in_turns(points.size() / 3, [&](size_t first, size_t last) {
-        size_t guess = 0;
-        for (size_t i = first; i < last; i += kRun) {
-            run(points.subspan(3 * i, 3 * std::min(kRun, last - i)), guess, distances + i);
-        }
+        near(points.subspan(3 * first, 3 * (last - first)), distances + first);
     });
 }
 
-// The triangle nearest to a point of a ball is at most the ball's diameter farther from the centre than the one nearest to the
-// centre.
-void Nearest::run(std::span<const double> points, size_t& guess, double* distances) const {
-    const size_t count = points.size() / 3;
-    double centre[3], radius = 0;
-    for (size_t x = 0; x < 3; ++x) {
-        double low = points[x], high = points[x];
-        for (size_t i = 1; i < count; ++i) low = std::min(low, points[3 * i + x]), high = std::max(high, points[3 * i + x]);
-        centre[x] = (low + high) / 2, radius += (high - low) * (high - low) / 4;
-    }
-    Neighbour nearest = (*this)(centre, guess);
-    guess = nearest.triangle;
-    TriangleDistance near[kMost + 1];
-    size_t known = around(centre, (std::sqrt(nearest.square) + 2 * std::sqrt(radius)) * (1 + 1e-9), near);
-    for (size_t i = 0; i < count; ++i) {
-        const double* p = &points[3 * i];
-        double best = std::numeric_limits<double>::infinity();
-        if (known > kMost) {
-            Neighbour one = (*this)(p, guess);
-            guess = one.triangle, best = one.square;
-        }
-        for (size_t t = 0; known <= kMost && t < known; ++t) best = std::min(best, near[t].square(p));
-        distances[i] = std::sqrt(best);
+void Nearest::near(std::span<const double> points, double* distances) const {
+    auto run = std::make_unique<Run>(*this);
+    uint16_t order[kSorted];
+    double sorted[3 * kSorted], found[kSorted];
+    for (size_t first = 0, count = points.size() / 3; first < count; first += kSorted) {
+        const size_t n = std::min(kSorted, count - first);
+        const double* p = &points[3 * first];
+        sort(p, n, order);
+        for (size_t i = 0; i < n; ++i) std::copy_n(p + 3 * order[i], 3, sorted + 3 * i);
+        for (size_t i = 0; i < n; i += kRun) (*run)({sorted + 3 * i, 3 * std::min(kRun, n - i)}, found + i);
+        for (size_t i = 0; i < n; ++i) distances[first + order[i]] = found[i];
     }
 }
 
-size_t Nearest::around(const double* p, double reach, TriangleDistance* triangles) const {
-    size_t open[128] = {1}, count = 0;
-    for (int height = 1; height > 0 && count <= kMost;) {
+bool Nearest::around(const double* p, double reach, Found& found) const {
+    found.count = 0;
+    size_t open[128] = {1};
+    for (int height = 1; height > 0;) {
         size_t node = open[--height];
-        if (to_box(p, node) > reach * reach) continue;
+        if (to_box(p, node) > reach) continue;
         if (node < tree_.leaves) {
             open[height++] = 2 * node, open[height++] = 2 * node + 1;
             continue;
         }
-        size_t leaf = node - tree_.leaves;
-        for (size_t i = tree_.first(leaf); i < tree_.last(leaf) && count <= kMost; ++i) {
-            triangles[count] = distance(size_t(tree_.order[i]));
-            count += triangles[count].square(p) <= reach * reach;
-        }
+        if (found.count == kMost) return false;
+        found.boxes.set(found.count, tree_.low + 3 * node, tree_.high + 3 * node, larger_);
+        found.leaves[found.count++] = node - tree_.leaves;
     }
-    return count;
+    return true;
 }
 
 void Nearest::samples(const MeshView& triangles, double spacing, double enough, double* distances) const {

@@ -23,23 +23,44 @@ class Nearest {
     // besides: a triangle, and one here.
     using Pair = std::array<int32_t, 2>;
     std::vector<Pair> bounds(const MeshView& triangles, std::span<const int32_t> hints, double tolerance, double* distances) const;
-    // The distance of each of the points [n, 3]. Runs of points that lie close together are fast.
+    // The distance of each of the points [n, 3], on all threads or on this one. Points that lie close together are fast.
     void points(std::span<const double> points, double* distances) const;
+    void near(std::span<const double> points, double* distances) const;
     // For each triangle how far its samples are at most: exactly, but for distances below `enough`. Samples are at most `spacing`
     // apart along its edges.
     void samples(const MeshView& triangles, double spacing, double enough, double* distances) const;
 
   private:
-    // Squares of the distances to the box of a node, and to that of a triangle, which is faster than that to the triangle.
+    // Side by side, a little larger than they are.
+    template <size_t kCount>
+    struct Boxes {
+        float low[3][kCount], high[3][kCount];
+
+        void set(size_t i, const double* lowest, const double* highest, double more);
+        void squares(const float* p, size_t count, float* out) const;
+    };
+    // Circles around triangles, side by side: centres, unit normals, radii.
+    struct Circles {
+        float centre[3][kLeaf], normal[3][kLeaf], radius[kLeaf];
+
+        void set(size_t i, const MeshView& mesh, size_t t, double more);
+        void squares(const float* p, float more, float* out) const;
+    };
+    struct Found;
+    class Run;
+
+    // The square of the distance to the box of a node.
     double to_box(const double* p, size_t node) const;
-    double to_box_of_triangle(const double* p, size_t t) const;
-    // The triangles at most `reach` from a point, up to kMost.
-    size_t around(const double* p, double reach, TriangleDistance* triangles) const;
-    void run(std::span<const double> points, size_t& guess, double* distances) const;
+    // Looks for a nearer triangle in a leaf.
+    void search(size_t leaf, const double* p, const float* rounded, Neighbour& best) const;
+    // The leaves whose boxes are within a distance of a point, given its square; false if there are too many.
+    bool around(const double* p, double reach, Found& found) const;
     double sampled(const MeshView& triangles, size_t t, double spacing, double limit, size_t& guess) const;
 
     MeshView mesh_;
     TreeView tree_;
+    std::vector<Circles> circles_;  // of the triangles of each leaf
+    double larger_;                 // by what boxes and circles are larger
     std::vector<int32_t> across_;
 };
 

@@ -1,0 +1,47 @@
+// A closed mesh as a field: distances, negative where the mesh winds around a point.
+#pragma once
+#include <span>
+#include <vector>
+
+#include "nearest.h"
+
+namespace fracslice::mesh {
+
+// Winding numbers by vertical rays, which find their triangles in a grid over x and y.
+class Winding {
+  public:
+    explicit Winding(const MeshView& mesh);
+
+    // Whether the mesh winds around points [n, 3]. Consecutive points above each other share the crossings of their line.
+    void inside(std::span<const double> points, bool* inside) const;
+
+  private:
+    struct Crossing {
+        double height;
+        int turn;  // 1 where the triangle faces up, else -1
+    };
+
+    size_t cell(double value, size_t axis) const;
+    void cross(double x, double y, std::vector<Crossing>& crossings) const;
+
+    MeshView mesh_;
+    double low_[2], scale_[2];  // the lower corner of the grid, and cells per unit
+    size_t side_;               // cells along each axis
+    std::vector<size_t> starts_;
+    std::vector<uint32_t> triangles_;  // of each cell
+};
+
+class MeshField {
+  public:
+    // A mesh and its tree outlive this.
+    MeshField(const MeshView& mesh, const TreeView& tree) : nearest_(mesh, tree, false), winding_(mesh) {}
+
+    // Values at points [n, 3]; NaN where one is not finite. Only signs mean anything if they are not measured.
+    void points(std::span<const double> points, bool measured, double* values) const;
+
+  private:
+    Nearest nearest_;
+    Winding winding_;
+};
+
+}  // namespace fracslice::mesh
