@@ -63,7 +63,7 @@ def on_creases(
         there = there + move * np.minimum(1, length / np.maximum(size, 1e-300))[:, None]
         directions = points - there[:, None]
         directions /= np.maximum(np.linalg.norm(directions, axis=2, keepdims=True), 1e-300)
-        spacing = np.clip(2 * size, NEAREST * length, spacing / 2)
+        spacing = np.maximum(np.minimum(2 * size, spacing / 2), NEAREST * length)
         points = there[:, None] + spacing[:, None, None] * directions
     result = ((first * normals).sum(axis=2) > SAME).all(axis=1) & (size < NEAREST / 4 * length)
     result &= np.linalg.norm(there - middles, axis=1) < REACH * length
