@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._native import connected_components
-from ..common.compiled import connected_components as components_of
 from ..volume import Plan
 from ..volume.lattice import values_at
 from ..work import Work
@@ -480,7 +479,8 @@ class _Sharpening:
         mesh, some = state.mesh, np.zeros(len(state.mesh.triangles), bool)
         some[off] = True
         taken = set(edges_of(mesh.triangles[with_neighbours(mesh, some)]).keys.tolist())
-        of, count = components_of(len(off), *edges_of(mesh.triangles[off]).beside.T)
+        pairs = edges_of(mesh.triangles[off]).beside.astype(np.int32)
+        of, count = connected_components(pairs[:, [0, 1, 1]], len(off))
         patches: list[Disk] = []
         for old in (off[of == number].tolist() for number in range(count)):
             triangles = mesh.triangles[old].tolist()
