@@ -118,7 +118,7 @@ def with_ridges(
     caps = [Cap(numbers[crumb < 0][cap.old], cap.fan) for cap in made.caps()]
     for one in np.unique(crumb[crumb >= 0]):
         _take_in(caps, Cap(numbers[crumb == one], mesh.corners[crumb == one]), WITHIN * planned.voxel)
-    points = np.concatenate([tips, made.new_vertices()])
+    points = np.concatenate([tips, made.marks()])
     result, near = pieces.anew(), planned.voxel / 2
     for first, last in spans(caps, pieces, near):
         part, start = pieces.together(first, last, near), pieces.starts[first]
@@ -311,6 +311,14 @@ class _Sharpened:
         """Vertices that were added and are used, [k, 3]."""
         taken = np.unique(self.mesh.triangles)
         return self.mesh.vertices[taken[taken >= len(self.old.vertices)]]
+
+    def marks(self) -> NDArray[np.float64]:
+        """Vertices that all new triangles are at, [k, 3]: those that were added, and one of each triangle
+        without any.
+        """
+        new, first = self.mesh.triangles[self.parents < 0], len(self.old.vertices)
+        without = new[(new < first).all(axis=1)]
+        return self.mesh.vertices[np.union1d(new[new >= first], without[:, 0])]
 
     def is_apart(self, least: float) -> bool:
         """True if no other vertex is as near to a new one: where bodies touch, both have an edge there."""
