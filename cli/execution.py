@@ -99,7 +99,7 @@ def stopped_at_once() -> Iterator[None]:
     except BaseException:
         if not received:
             raise
-    if received:  # also where a parser, as trimesh's, went on after the exception
+    if received:  # also where a parser went on after the exception
         raise StoppedError(received[0], NOTHING)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import json
 import re
 import struct
 import warnings
@@ -19,6 +21,7 @@ from ..common.files import open_regular
 from ..common.messages import format_count
 from ..errors import MeshError
 from .model import Mesh, concatenate
+from .pieces import NOTHING
 from .quantisation import quantise_mesh
 
 MILLIMETRES = {
@@ -477,35 +480,186 @@ def _ascii_corners(data: bytes) -> NDArray[np.float64]:
         raise MeshError("not an STL file: a coordinate is not a number") from None
 
 
-def _read_by_trimesh(path: Path) -> Mesh:
-    """OBJ and GLB, by trimesh. Any exception of its parsers means an invalid file."""
-    import trimesh
+def _read_obj(path: Path) -> Mesh:
+    """OBJ: its vertices and faces; polygons become fans of triangles."""
+    vertices, corners, lengths = array("d"), array("q"), array("q")
+    try:
+        for line in io.BytesIO(CONTINUED.sub(b" ", _contents(path))):
+            kind, *words = line.split() or [b""]
+            if kind == b"v":
+                x, y, z = words[:3]
+                vertices.extend((float(x), float(y), float(z)))
+            elif kind == b"f":
+                if b"/" in line:
+                    words = [word.partition(b"/")[0] for word in words]
+                named = list(map(int, words))
+                if b"-" in line:  # from the last vertex on
+                    named = [k + (k < 0) * (len(vertices) // 3 + 1) for k in named]
+                corners.extend(named)
+                lengths.append(len(named))
+    except (ValueError, OverflowError) as error:
+        raise MeshError("not a whole OBJ file: it is cut short, broken or of another kind") from error
+    at = np.array(corners, np.int64) - 1
+    points = np.array(vertices, np.float64).reshape(-1, 3)
+    if len(at) and not 0 <= at.min() <= at.max() < len(points):
+        raise MeshError("not a valid OBJ file: a face names a vertex that does not exist")
+    return Mesh(points, _fans(np.array(lengths, np.int64), at.astype(np.int32)))
 
-    with open_regular(path) as file:
-        try:
-            scene = trimesh.load_scene(
-                file, file_type=path.suffix.lower()[1:], process=False, skip_materials=True
-            )
-            mesh = scene.to_mesh()
-            triangles = np.asarray(mesh.faces, dtype=np.int32).reshape(-1, 3)
-            model = Mesh(np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3), triangles)
-        except Exception as error:
-            kind = path.suffix[1:].upper()
-            raise MeshError(f"not a whole {kind} file: it is cut short, broken or of another kind") from error
-    return model
+
+CONTINUED = re.compile(rb"\\\r?\n")
+"""End of a line of an OBJ file that goes on."""
+
+COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+WIDTHS = {"SCALAR": 1, "VEC3": 3}
+TRIANGLES, STRIP, FAN = 4, 5, 6
+"""Modes of a primitive of GLB."""
+
+BROKEN = ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError
+"""What Python raises for JSON of other types and sizes than expected."""
+
+LONGEST_TREE = 1 << 24
+"""Most bytes of the JSON of a GLB file, which is parsed at once."""
+
+TRANSFORMS = {"matrix", "rotation", "scale", "translation"}
+GLTF_AXES = 1000 * np.array([(1, 0, 0), (0, 0, 1), (0, -1, 0)])
+"""From metres with y up, rows, to mm with z up."""
 
 
 def _read_glb(path: Path) -> Mesh:
     """GLB, converted from metres to mm and from y up to z up."""
-    model = _read_by_trimesh(path)
-    x, y, z = model.vertices.T * 1000
-    return Mesh(np.stack([x, -z, y], axis=1), model.triangles)
+    try:
+        whole = _Tree(_contents(path)).laid_out()
+    except (*BROKEN, struct.error) as error:
+        raise MeshError("not a whole GLB file: it is cut short, broken or of another kind") from error
+    return Mesh(whole.vertices @ GLTF_AXES, whole.triangles)
+
+
+class _Tree:
+    """The nodes of a binary glTF 2.0 file, with their meshes. Files of another kind raise built-in errors."""
+
+    def __init__(self, data: bytes) -> None:
+        magic, version, length = struct.unpack_from("<4sII", data)
+        if magic != b"glTF" or version != 2 or length > len(data):
+            raise ValueError("not the head of a GLB file")
+        chunks, at = dict[bytes, bytes](), 12
+        while at < length:
+            size, kind = struct.unpack_from("<I4s", data, at)
+            chunks.setdefault(kind, data[at + 8 : at + 8 + size])
+            at += 8 + size
+        if len(chunks[b"JSON"]) > LONGEST_TREE:
+            raise MeshError(f"not a valid GLB file: its JSON has more than {LONGEST_TREE >> 20} MB")
+        self.json, self.body = json.loads(chunks[b"JSON"]), chunks.get(b"BIN\0", b"")
+        self.meshes = dict[int, Mesh]()
+        self.placed = [NOTHING]
+        self.count = self.size = 0
+
+    def laid_out(self) -> Mesh:
+        """All meshes of the scene where its nodes have them."""
+        for node in self.item("scenes", self.json.get("scene", 0))["nodes"]:
+            self.place(node, np.eye(4), 0)
+        return concatenate(self.placed)
+
+    def counted(self, mesh: Mesh) -> Mesh:
+        """A part, unless the file names parts again and again."""
+        self.count, self.size = self.count + 1, self.size + _count(mesh)
+        most = max(LARGEST, COPIES * len(self.body) // 12)
+        if self.count > MOST_PARTS or self.size > most:
+            parts = f"{MOST_PARTS} nodes and parts or {most} vertices and triangles"
+            raise MeshError(f"not a valid GLB file: it has more than {parts}")
+        return mesh
+
+    def item(self, kind: str, index: Any) -> Any:
+        """An item of the lists at the top."""
+        items = self.json[kind]
+        if not isinstance(index, int) or not 0 <= index < len(items):
+            raise ValueError(f"no such item of {kind}: {index}")
+        return items[index]
+
+    def place(self, index: Any, matrix: NDArray[np.float64], depth: int) -> None:
+        """Place the mesh of a node and those of its children."""
+        if depth > DEEPEST:
+            raise MeshError(f"not a valid GLB file: it has more than {DEEPEST} levels of nodes")
+        node = self.item("nodes", index)
+        if not TRANSFORMS.isdisjoint(node):
+            matrix = matrix @ _node_matrix(node)
+        mesh = self.counted(self.mesh(node["mesh"]) if "mesh" in node else NOTHING)
+        if len(mesh.triangles):
+            vertices = mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+            order = -1 if np.linalg.det(matrix[:3, :3]) < 0 else 1
+            self.placed.append(Mesh(vertices, mesh.triangles[:, ::order]))
+        for child in node.get("children", ()):
+            self.place(child, matrix, depth + 1)
+
+    def mesh(self, index: Any) -> Mesh:
+        """The triangles of a mesh; points and lines are none."""
+        if index not in self.meshes:
+            primitives = self.item("meshes", index)["primitives"]
+            some = [one for one in primitives if one.get("mode", TRIANGLES) in (TRIANGLES, STRIP, FAN)]
+            self.meshes[index] = concatenate([NOTHING, *(self.counted(self.primitive(one)) for one in some)])
+        return self.meshes[index]
+
+    def primitive(self, primitive: dict[str, Any]) -> Mesh:
+        """Triangles of a list, a strip or a fan."""
+        for name in primitive.get("extensions", ()):
+            if name.endswith("_compression"):
+                raise MeshError(f"the GLB file is compressed ({name[:60]}): expected one that is not")
+        vertices = self.values(primitive["attributes"]["POSITION"], "VEC3").astype(np.float64)
+        corners = np.arange(len(vertices))
+        if "indices" in primitive:
+            corners = self.values(primitive["indices"], "SCALAR").ravel().astype(np.int64)
+        if len(corners) and not 0 <= corners.min() <= corners.max() < len(vertices):
+            raise MeshError("not a valid GLB file: a triangle names a vertex that does not exist")
+        mode, count = primitive.get("mode", TRIANGLES), np.arange(max(len(corners) - 2, 0))
+        if mode == STRIP:
+            corners = corners[np.stack([count, count + 1 + count % 2, count + 2 - count % 2], axis=1)]
+        elif mode == FAN:
+            corners = corners[np.stack([count + 1, count + 2, 0 * count], axis=1)]
+        return Mesh(vertices, corners.reshape(-1, 3).astype(np.int32))
+
+    def values(self, index: Any, kind: str) -> Numbers:
+        """Numbers of an accessor, [n, 1 or 3]."""
+        accessor = self.item("accessors", index)
+        if "bufferView" not in accessor or "sparse" in accessor:
+            raise MeshError("the GLB file has an accessor without data, or a sparse one")
+        view = self.item("bufferViews", accessor["bufferView"])
+        if view.get("buffer") != 0 or "uri" in self.item("buffers", 0):
+            raise MeshError("the GLB file has data in other files: expected one that has all")
+        dtype, width = np.dtype(COMPONENTS[accessor["componentType"]]), WIDTHS[kind]
+        if accessor["type"] != kind:
+            raise ValueError(f"not {kind}")
+        row, start = width * dtype.itemsize, view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
+        step, count = view.get("byteStride", row), accessor["count"]
+        if step < row or min(start, count) < 0:
+            raise ValueError("rows that overlap, or numbers below 0")
+        values: Numbers = np.ndarray((count, width), dtype, self.body, start, (step, dtype.itemsize))
+        return values / np.iinfo(dtype).max if accessor.get("normalized") else values
+
+
+def _node_matrix(node: dict[str, Any]) -> NDArray[np.float64]:
+    """Transform of a node of glTF, float64 [4, 4]. Raises ValueError."""
+    if "matrix" in node:
+        matrix = np.array(node["matrix"], np.float64).reshape(4, 4).T
+    else:
+        x, y, z, w = node.get("rotation", (0, 0, 0, 1))
+        turn = np.array(
+            [
+                (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
+                (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
+                (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
+            ]
+        )
+        matrix = np.eye(4)
+        matrix[:3, :3] = turn * np.array(node.get("scale", (1, 1, 1)), np.float64).reshape(3)
+        matrix[:3, 3] = node.get("translation", (0, 0, 0))
+    if not np.isfinite(matrix).all():
+        raise ValueError("a transform that is not of finite numbers")
+    return matrix
 
 
 READERS = {
     ".stl": _read_stl,
     ".3mf": read_3mf,
     ".ply": read_ply,
-    ".obj": _read_by_trimesh,
+    ".obj": _read_obj,
     ".glb": _read_glb,
 }

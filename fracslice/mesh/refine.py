@@ -63,7 +63,7 @@ def on_creases(
         there = there + move * np.minimum(1, length / np.maximum(size, 1e-300))[:, None]
         directions = points - there[:, None]
         directions /= np.maximum(np.linalg.norm(directions, axis=2, keepdims=True), 1e-300)
-        spacing = np.clip(2 * size, NEAREST * length, spacing / 2)
+        spacing = np.maximum(np.minimum(2 * size, spacing / 2), NEAREST * length)
         points = there[:, None] + spacing[:, None, None] * directions
     result = ((first * normals).sum(axis=2) > SAME).all(axis=1) & (size < NEAREST / 4 * length)
     result &= np.linalg.norm(there - middles, axis=1) < REACH * length
@@ -71,26 +71,23 @@ def on_creases(
 
 
 def on_three(
-    fit: Fit, corners: NDArray[np.float64], size: float
+    fit: Fit, around: NDArray[np.float64], size: float
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Corners of the surface near triangles, where three of its sides meet.
+    """Corners of the surface near some points each, where three of its sides meet.
 
-    As `on_creases`, with the three of the tangent planes near the triangle that differ most.
+    As `on_creases`, with the three of the tangent planes at the points that differ most.
 
-    `corners`: float64 (n, 3, 3); `size` in scene units. Returns float64 (n, 3); bool (n,).
+    `around`: float64 (n, k, 3); `size` in scene units. Returns float64 (n, 3); bool (n,).
     """
-    there = corners.mean(axis=1)
-    around = np.concatenate(
-        [0.9 * corners + 0.1 * there[:, None], (corners + np.roll(corners, 1, axis=1)) / 2], 1
-    )
-    normals, each = fit.planes(around.reshape(-1, 3))[:, :3].reshape(-1, 6, 3), np.arange(len(corners))
+    there, each = around.mean(axis=1), np.arange(len(around))
+    normals = fit.planes(around.reshape(-1, 3))[:, :3].reshape(around.shape)
     second = (normals * normals[:, :1]).sum(axis=2).argmin(axis=1)
     across = np.cross(normals[:, 0], normals[each, second])
     third = np.abs((normals * across[:, None]).sum(axis=2)).argmax(axis=1)
     points = np.stack([around[:, 0], around[each, second], around[each, third]], axis=1)
-    result = np.ones(len(corners), bool)
+    result = np.ones(len(around), bool)
     first: NDArray[np.float64] = np.empty(0)
-    moved = spacing = np.full(len(corners), size / 4, np.float64)
+    moved = spacing = np.full(len(around), size / 4, np.float64)
     for step in range(STEPS):
         planes = fit.planes(points.reshape(-1, 3)).reshape(-1, 3, 4)
         normals = planes[..., :3]
@@ -140,9 +137,17 @@ class Edges(NamedTuple):
         return result
 
     @property
+    def pairs(self) -> NDArray[np.int64]:
+        """Sides, 3 * triangle + number, at each edge that two triangles share, int64 [k, 2]."""
+        order = np.argsort(self.sides.ravel(), kind="stable")
+        at = self.sides.ravel()[order]
+        first = np.flatnonzero(at[1:] == at[:-1])
+        return np.stack([order[first], order[first + 1]], axis=1)
+
+    @property
     def beside(self) -> NDArray[np.int64]:
-        """The two triangles at each edge, int64 [e, 2]."""
-        return np.argsort(self.sides.ravel(), kind="stable").reshape(-1, 2) // 3
+        """The two triangles at each edge that two share, int64 [k, 2]."""
+        return self.pairs // 3
 
 
 def edges_of(triangles: NDArray[np.int32]) -> Edges:
@@ -291,10 +296,7 @@ def _candidates(
     """
     some = np.flatnonzero(with_neighbours(mesh, due))
     edges = edges_of(mesh.triangles[some])
-    order = np.argsort(edges.sides.ravel(), kind="stable")
-    at = edges.sides.ravel()[order]
-    first = np.flatnonzero(at[1:] == at[:-1])
-    half = np.stack([order[first], order[first + 1]], axis=1)
+    half = edges.pairs
     old = some[half // 3]
     half = half[due[old].any(axis=1)]
     old, side = some[half // 3], half % 3

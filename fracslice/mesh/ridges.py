@@ -2,7 +2,8 @@
 
 Edges of the mesh whose ends lie on different sides of a sharp edge are split at it (Attene, Falcidieno,
 Rossignac and Spagnuolo 2005, "Sharpen&Bend"); triangles that turn over are replaced, with their neighbours,
-by fans.
+by fans. Where that leaves triangles off the surface, they give way to the triangulation of their rim that
+fits best (Barequet and Sharir 1995, "Filling gaps in the boundary of a polyhedron").
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import chain, combinations, pairwise, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,10 +78,14 @@ NEAR, GROWTH = 0.05, 2.0
 factor by which it grows.
 """
 
-MOST, RINGS, TURNS, RETRIES, AGAIN = 64, 6, 6, 8, 2
-"""Maximum triangles that a fan replaces, and their distance from a bad one; rounds of fans, attempts, and
-rounds after the attempt that succeeds.
-"""
+MOST, RINGS, TURNS, RETRIES = 64, 6, 6, 8
+"""Maximum triangles that a fan replaces, and their distance from a bad one; rounds of fans, and attempts."""
+
+RIM = 20
+"""Maximum corners of a rim that is triangulated anew."""
+
+INWARDS = 0.8 * np.eye(3) + np.full((3, 3), 0.2 / 3)
+"""Barycentric coordinates of points near the corners of a triangle."""
 
 ROUGH = 0.25
 """Wrong triangles of an attempt, relative to its new vertices, above which a surface is too rough for sharp
@@ -113,7 +118,7 @@ def with_ridges(
     caps = [Cap(numbers[crumb < 0][cap.old], cap.fan) for cap in made.caps()]
     for one in np.unique(crumb[crumb >= 0]):
         _take_in(caps, Cap(numbers[crumb == one], mesh.corners[crumb == one]), WITHIN * planned.voxel)
-    points = np.concatenate([tips, made.new_vertices()])
+    points = np.concatenate([tips, made.marks()])
     result, near = pieces.anew(), planned.voxel / 2
     for first, last in spans(caps, pieces, near):
         part, start = pieces.together(first, last, near), pieces.starts[first]
@@ -224,23 +229,31 @@ class _Missed:
         """Corners of the surface near triangles, each once and with its nearest triangle, and the vertices
         that are at corners already.
         """
+        from scipy.spatial import cKDTree
+
         corners = mesh.corners[which]
-        points, found = on_three(self.fit, corners, self._voxel)
-        away = np.linalg.norm(points - corners.mean(axis=1), axis=1)
+        middles, sides = corners.mean(axis=1), (corners + np.roll(corners, 1, axis=1)) / 2
+        around = np.concatenate([0.9 * corners + 0.1 * middles[:, None], sides], axis=1)
+        both = edges_of(mesh.triangles[which]).beside
+        points, found = on_three(
+            self.fit, np.concatenate([around[both[:, 0]], around[both[:, 1]]], 1), self._voxel
+        )
+        off = np.linalg.norm(points[:, None] - middles[both], axis=2)
+        nearest, away = which[both[np.arange(len(both)), off.argmin(axis=1)]], off.min(axis=1)
         found &= away < FAR * self._voxel
-        which, points, away = which[found], points[found], away[found]
+        points, nearest, away = points[found], nearest[found], away[found]
         on = self._on_surface(points)
-        which, points, away = which[on], points[on], away[on]
+        points, nearest, away = points[on], nearest[on], away[on]
+        apart = 2 * GAP * self._voxel
+        off, vertices = cKDTree(mesh.vertices).query(points)
+        known = off <= apart
         kept: list[int] = []
-        apart, taken, there = 2 * GAP * self._voxel, set[int](), set[int]()
-        for k in np.argsort(away, kind="stable").tolist():
-            off = np.linalg.norm(np.concatenate([mesh.vertices, points[kept]]) - points[k], axis=1)
-            if off.min() <= apart:
-                there.add(int(off.argmin()))
-            elif which[k] not in taken:
+        order = np.argsort(away, kind="stable")
+        for k in order[~known[order]].tolist():
+            new = np.linalg.norm(points[kept] - points[k], axis=1).min(initial=math.inf) > apart
+            if new and nearest[k] not in nearest[kept]:
                 kept.append(k)
-                taken.add(int(which[k]))
-        return which[kept], points[kept], np.array([v for v in sorted(there) if v < len(mesh.vertices)], int)
+        return nearest[kept], points[kept], np.unique(vertices[known])
 
     def _on_surface(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether points are on the surface: planes also meet outside of what a third one cuts off."""
@@ -299,6 +312,14 @@ class _Sharpened:
         taken = np.unique(self.mesh.triangles)
         return self.mesh.vertices[taken[taken >= len(self.old.vertices)]]
 
+    def marks(self) -> NDArray[np.float64]:
+        """Vertices that all new triangles are at, [k, 3]: those that were added, and one of each triangle
+        without any.
+        """
+        new, first = self.mesh.triangles[self.parents < 0], len(self.old.vertices)
+        without = new[(new < first).all(axis=1)]
+        return self.mesh.vertices[np.union1d(new[new >= first], without[:, 0])]
+
     def is_apart(self, least: float) -> bool:
         """True if no other vertex is as near to a new one: where bodies touch, both have an edge there."""
         from scipy.spatial import cKDTree
@@ -345,7 +366,7 @@ class _Sharpening:
         hosts, corners, there = self._missed.corners(mesh, np.flatnonzero(sided[edges.sides].any(axis=1)))
         self._fixed[there] = True
         banned, reach, given = np.empty((0, 3)), NEAR * self._voxel, None
-        stays, most = np.ones(len(corners), bool), math.inf
+        stays, before = np.ones(len(corners), bool), math.inf
         for _ in range(RETRIES):
             self._work.check()
             if given is None or not stays[given.corners].all():
@@ -353,19 +374,18 @@ class _Sharpening:
             splits = _away(given.missed.points, banned, reach)
             if not splits.any() and not stays.any():
                 return None
-            result = self._with(given, splits)
+            result, fixed = self._with(given, splits)
             wrong = self._wrong(result)
             if not len(wrong):
-                return self._again(given.corners, result, banned, reach)
-            most = min(most, ROUGH * len(result.new_vertices()))
-            if len(wrong) >= most:
+                return self._patched(result, fixed)
+            fewer, before = len(wrong) < before, len(wrong)
+            if before >= ROUGH * len(result.new_vertices()):
                 return None
-            most = len(wrong)
             at = np.unique(result.mesh.triangles[wrong])
             new = result.mesh.vertices[at[at >= len(mesh.vertices)]]
             spots = np.concatenate([new, result.mesh.corners[wrong].mean(axis=1)])
             twice = splits & self._reached(given) & ~_away(given.missed.points, spots, FAR * self._voxel)
-            if twice.any():  # enough, as a rule
+            if fewer and twice.any():  # enough, as a rule
                 banned = np.concatenate([banned, given.missed.points[twice]])
                 continue
             banned = np.concatenate([banned, spots])
@@ -376,7 +396,7 @@ class _Sharpening:
     def _given(
         self, hosts: NDArray[np.int64], corners: NDArray[np.float64], which: NDArray[np.int64]
     ) -> _Cornered:
-        """The part with some corners, which split their triangles."""
+        """The part with some corners, which split their triangles, and the points that it lacks."""
         old, count = self._mesh, len(self._mesh.triangles)
         number = (len(old.vertices) + np.arange(len(which))).astype(np.int32)
         a, b, c = old.triangles[hosts[which]].T
@@ -384,37 +404,20 @@ class _Sharpening:
         keep = np.setdiff1d(np.arange(count), hosts[which])
         triangles = np.concatenate([old.triangles[keep], *new])
         mesh = Mesh(np.concatenate([old.vertices, corners[which]]), triangles)
-        return self._cornered(which, mesh, np.concatenate([keep, np.full(len(triangles) - len(keep), -1)]))
-
-    def _cornered(self, corners: NDArray[np.int64], mesh: Mesh, parents: NDArray[np.int64]) -> _Cornered:
-        """The part as it is now, with the points that it lacks."""
-        edges = edges_of(mesh.triangles)
+        parents = np.concatenate([keep, np.full(len(triangles) - len(keep), -1)])
+        edges = edges_of(triangles)
         missed = self._missed.of(mesh, edges)
         inner = np.bincount(edges.sides.ravel(), minlength=len(edges.ends))[missed.edges] == 2
         missed = _Points(missed.edges[inner], missed.points[inner], missed.sided)
-        return _Cornered(corners, mesh, parents, edges, missed)
+        return _Cornered(which, mesh, parents, edges, missed)
 
     def _reached(self, given: _Cornered) -> NDArray[np.bool_]:
         """Points that the part has elsewhere: beside a corner, mesh edges may span a whole side."""
         away = Nearest(given.mesh).points(given.missed.points, self._work.threads)
         return away < REACHED * self._voxel
 
-    def _again(
-        self, corners: NDArray[np.int64], result: _Sharpened, banned: NDArray[np.float64], reach: float
-    ) -> _Sharpened:
-        """The part with points of sharp edges that fans cut off, as long as it stays sound."""
-        for _ in range(AGAIN):
-            self._work.check()
-            given = self._cornered(corners, result.mesh, result.parents)
-            splits = _away(given.missed.points, banned, reach) & ~self._reached(given)
-            following = self._with(given, splits) if splits.any() else None
-            if following is None or len(self._wrong(following)):
-                break
-            result = following
-        return result
-
-    def _with(self, given: _Cornered, splits: NDArray[np.bool_]) -> _Sharpened:
-        """The part with corners, and with some of the points of sharp edges."""
+    def _with(self, given: _Cornered, splits: NDArray[np.bool_]) -> tuple[_Sharpened, NDArray[np.bool_]]:
+        """The part with corners and some of the points of sharp edges, and which vertices are corners."""
         mesh, edges, points = given.mesh, given.edges, given.missed.points[splits]
         split = np.zeros(len(edges.ends), bool)
         split[given.missed.edges[splits]] = True
@@ -436,7 +439,7 @@ class _Sharpening:
             # the others were tried, and nothing near them has changed
             near = _rings(following.mesh, np.flatnonzero(following.parents == FAN))
             state, bad = following, np.intersect1d(following.bad(self._voxel), near)
-        return state
+        return state, fixed
 
     def _wrong(self, state: _Sharpened) -> NDArray[np.int64]:
         """New triangles that are turned over or too thin, or intersect others after quantisation."""
@@ -444,7 +447,87 @@ class _Sharpening:
         as_written = quantise(mesh, used_vertices(mesh), threads=self._work.threads).mesh
         new = state.parents < 0
         crossing = self_intersecting_triangles(as_written, threads=self._work.threads, among=new)
-        return np.union1d(state.bad(self._voxel, 0.0), np.flatnonzero(crossing))
+        bad = state.bad(self._voxel, 0.0)
+        return np.union1d(bad[~self._across(state, bad)], np.flatnonzero(crossing))
+
+    def _across(self, state: _Sharpened, some: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Whether triangles lie across a sharp edge, close to it, and face as one of its sides does."""
+        corners, own = state.mesh.corners[some], state.mesh.normals[some]
+        own /= np.maximum(np.linalg.norm(own, axis=1, keepdims=True), 1e-300)
+        normals = self._fit.planes((INWARDS @ corners).reshape(-1, 3))[:, :3].reshape(-1, 3, 3)
+        facing = (normals * own[:, None]).sum(axis=2).max(axis=1) > UP
+        close = state.measured[some, OFF] <= LOOSE * self._voxel
+        result: NDArray[np.bool_] = facing & close & (heights(corners) >= THIN * self._voxel)
+        return result
+
+    def _patched(self, state: _Sharpened, fixed: NDArray[np.bool_]) -> _Sharpened:
+        """The part without the triangles off the surface that edges with missed points are at, as far as it
+        stays sound.
+        """
+        mesh, edges = state.mesh, edges_of(state.mesh.triangles)
+        beside = np.asarray(np.isin(edges.sides, self._missed.of(mesh, edges).edges).any(axis=1))
+        near = np.flatnonzero(with_neighbours(mesh, with_neighbours(mesh, beside)))
+        state = state.measured_at(near, self._fit)
+        patches = self._patches(state, fixed, near[state.measured[near, OFF] > LOOSE * self._voxel])
+        while patches:
+            self._work.check()
+            fans = np.array([triangle for _, patch in patches for triangle in patch], np.int32)
+            measured = self._fit.triangles(state.mesh.vertices[fans])
+            result = state.fanned([t for old, _ in patches for t in old], fans, measured)
+            wrong = self._wrong(result) - (len(result.mesh.triangles) - len(fans))
+            if not len(wrong):
+                return result
+            of = np.repeat(np.arange(len(patches)), [len(patch) for _, patch in patches])
+            blamed = set(of[wrong[wrong >= 0]].tolist())
+            patches = [patch for number, patch in enumerate(patches) if blamed and number not in blamed]
+        return state
+
+    def _patches(self, state: _Sharpened, fixed: NDArray[np.bool_], off: NDArray[np.int64]) -> list[Disk]:
+        """Connected parts of some triangles, and the triangulations of their rims that fit best."""
+        mesh, some = state.mesh, np.zeros(len(state.mesh.triangles), bool)
+        some[off] = True
+        taken = set(edges_of(mesh.triangles[with_neighbours(mesh, some)]).keys.tolist())
+        pairs = edges_of(mesh.triangles[off]).beside.astype(np.int32)
+        of, count = connected_components(pairs[:, [0, 1, 1]], len(off))
+        patches: list[Disk] = []
+        for old in (off[of == number].tolist() for number in range(count)):
+            triangles = mesh.triangles[old].tolist()
+            rim = _rim(triangles, fixed)
+            if rim is None or len(rim) > RIM:
+                continue
+            own = edges_of(mesh.triangles[old])
+            inner = own.keys[own.sides.ravel()[own.pairs[:, 0]]].tolist()
+            patch = self._best(mesh.vertices, rim, taken.difference(inner))
+            if patch:
+                patches.append((old, patch))
+                taken.update(edges_of(np.array(patch, np.int32)).keys.tolist())
+        return patches
+
+    def _best(
+        self, vertices: NDArray[np.float64], rim: list[int], taken: set[int]
+    ) -> list[tuple[int, int, int]] | None:
+        """Triangulation of a rim that is off the surface by least in total; without edges that are taken."""
+        count = len(rim)
+        ways = list(combinations(range(count), 3))
+        corners = vertices[np.array(rim)[np.array(ways)]]
+        measured = self._fit.triangles(corners)
+        good = (measured[:, UPRIGHT] > UP) & (measured[:, OFF] <= LOOSE * self._voxel)
+        good &= heights(corners) >= THIN * self._voxel
+        costs = dict(zip(ways, np.where(good, measured[:, OFF], math.inf).tolist(), strict=True))
+        best = {(i, i + 1): (0.0, -1) for i in range(count - 1)}
+        for i, k in ((i, i + gap) for gap in range(2, count) for i in range(count - gap)):
+            low, high = sorted((rim[i], rim[k]))
+            free = k - i == count - 1 or (low << 32 | high) not in taken
+            split = min((best[i, j][0] + best[j, k][0] + costs[i, j, k], j) for j in range(i + 1, k))
+            best[i, k] = split if free else (math.inf, -1)
+        result, left = [], [(0, count - 1)]
+        while left and best[0, count - 1][0] < math.inf:
+            i, k = left.pop()
+            j = best[i, k][1]
+            if j >= 0:
+                result.append((rim[i], rim[j], rim[k]))
+                left += [(i, j), (j, k)]
+        return result or None
 
     def _fanned(
         self, state: _Sharpened, fixed: NDArray[np.bool_], bad: NDArray[np.int64]
@@ -488,15 +571,15 @@ class _Disks:
         keys, back = ((a << 32 | b).ravel() for a, b in ((corners, after), (after, corners)))
         order = np.argsort(keys)
         place = np.minimum(np.searchsorted(keys, back, sorter=order), len(keys) - 1)
-        beyond = np.where(keys[order[place]] == back, order[place] // 3, -1).reshape(-1, 3)
-        self._beyond, self._triangles = beyond.tolist(), corners.tolist()
+        beyond = np.where(keys[order[place]] == back, order[place] // 3, -1)
+        # flat, as lists of many small lists are slow to make
+        self._beyond, self._triangles = beyond.tolist(), corners.ravel().tolist()
         self._order = np.argsort(corners, axis=None, kind="stable")
         self._starts = np.searchsorted(corners.ravel()[self._order], np.arange(len(self._vertices) + 1))
-        self._points = state.mesh.vertices[self._vertices].tolist()
+        self._points = state.mesh.vertices[self._vertices].ravel().tolist()
         self._fixed = fixed[self._vertices].tolist()
-        measured = state.measured[self._which, :3]
-        self._normals = measured.tolist()
-        self._alike = [tuple(normal) for normal in np.round(measured, 3).tolist()]
+        measured = state.measured[self._which, :3].ravel()
+        self._normals, self._alike = measured.tolist(), np.round(measured, 3).tolist()
 
     def grown(self, first: int, apex: int) -> Disk | None:
         """A disk with a triangle and the star of a vertex, grown until the fan around that vertex faces as
@@ -518,11 +601,13 @@ class _Disks:
         while more and len(disk) + len(more) <= MOST:
             disk |= more
             for t in sorted(more):
-                normals.setdefault(self._alike[t], self._normals[t])
+                own = slice(3 * t, 3 * t + 3)
+                normals.setdefault(tuple(self._alike[own]), self._normals[own])
             rim, more = list[tuple[int, int]](), set[int]()
             for t in sorted(disk):
-                a, b, c = self._triangles[t]
-                for beyond, edge in zip(self._beyond[t], ((a, b), (b, c), (c, a)), strict=True):
+                own = slice(3 * t, 3 * t + 3)
+                a, b, c = self._triangles[own]
+                for beyond, edge in zip(self._beyond[own], ((a, b), (b, c), (c, a)), strict=True):
                     if beyond in disk:
                         continue
                     if apex not in edge and self._seen(edge, apex, normals.values()):
@@ -535,9 +620,7 @@ class _Disks:
 
     def _seen(self, edge: tuple[int, int], apex: int, normals: Iterable[list[float]]) -> bool:
         """Whether the triangle of an edge and a vertex faces as one of the normals says, and is not thin."""
-        ax, ay, az = self._points[edge[0]]
-        bx, by, bz = self._points[edge[1]]
-        cx, cy, cz = self._points[apex]
+        (ax, ay, az), (bx, by, bz), (cx, cy, cz) = (self._points[3 * v : 3 * v + 3] for v in (*edge, apex))
         ux, uy, uz, vx, vy, vz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az
         x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
         wx, wy, wz = vx - ux, vy - uy, vz - uz
@@ -549,20 +632,31 @@ class _Disks:
 
     def _fan(self, disk: list[int], rim: list[tuple[int, int]], apex: int) -> Disk | None:
         """The disk, and the fan around the apex; None if it is no disk."""
-        following = dict(rim)
-        if not rim or len(following) < len(rim):
+        triangles = [self._triangles[3 * t : 3 * t + 3] for t in disk]
+        loop = _loop(triangles, rim)
+        if loop is None or any(self._fixed[v] for v in {*chain(*triangles)} - {*loop, apex}):
             return None
-        first = here = min(following)
-        fan = []
-        while here in following:
-            there = following.pop(here)
-            fan.append((here, there, apex))
-            here = there
-        inside = {v for t in disk for v in self._triangles[t]} - {a for a, _ in rim} - {apex}
-        euler = len(inside) + len(rim) + 1 - (3 * len(disk) + len(rim)) // 2 + len(disk)
-        if here != first or following or euler != 1 or any(self._fixed[v] for v in inside):
-            return None
-        return disk, fan
+        return disk, [(here, there, apex) for here, there in pairwise([*loop, loop[0]])]
+
+
+def _rim(triangles: list[list[int]], fixed: NDArray[np.bool_]) -> list[int] | None:
+    """Vertices on the rim of a disk, in order; None for what is no disk, or has a corner inside."""
+    sides = {side for a, b, c in triangles for side in ((a, b), (b, c), (c, a))}
+    loop = _loop(triangles, [(a, b) for a, b in sides if (b, a) not in sides])
+    return None if loop is None or fixed[list({*chain(*triangles)} - {*loop})].any() else loop
+
+
+def _loop(triangles: list[list[int]], rim: list[tuple[int, int]]) -> list[int] | None:
+    """Vertices on the rim of triangles, in order, from the least on; None for what is no disk."""
+    following = dict(rim)
+    if not rim or len(following) < len(rim):
+        return None
+    loop = [min(following)]
+    while (there := following.pop(loop[-1], -1)) >= 0:
+        loop.append(there)
+    vertices, count = {*chain(*triangles)}, len(triangles)
+    euler = len(vertices) - (3 * count + len(rim)) // 2 + count
+    return loop[:-1] if loop[-1] == loop[0] and not following and euler == 1 else None
 
 
 def _rings(mesh: Mesh, some: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from ..formulas.material import material, stops
 from ..formulas.registry import Fixed, Node
 from ..kernel.linker import Linker
+from .setup import Optics
 from .units import glowing
 from .units.glossy import highlight
 from .units.pixel import linear
@@ -71,6 +72,12 @@ def _numbers(low: Sequence[float], high: Sequence[float], power: float) -> tuple
     half = [(b - a) / 2 for a, b in zip(low, high, strict=True)]
     least = THINNEST * max(half)
     return (*((a + b) / 2 for a, b in zip(low, high, strict=True)), *(max(h, least) for h in half), power)
+
+
+def wholly_met(bodies: list[tuple[float, ...]], eye: Sequence[float], seen: Optics) -> float:
+    """Part of a pixel's width that is no wider than any body, at most 1: rays pass what is narrower."""
+    parts = [max(b[3:6]) / (seen.cone * math.dist(eye, b[:3]) + seen.least) for b in bodies]
+    return min([1.0, *parts])
 
 
 def bind(linker: Linker, bodies: list[tuple[float, ...]]) -> list[str]:

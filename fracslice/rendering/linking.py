@@ -17,7 +17,7 @@ from ..formulas.registry import Fixed, Node
 from ..formulas.vocabulary import maximum, minimum
 from ..kernel.linker import Linked, Linker
 from ..scene.view import Camera, View
-from .glow import Drawn
+from .glow import Drawn, glowing_bodies, wholly_met
 from .lighting import Lighting
 from .materials import Look, text_of
 from .scattering import onward
@@ -190,7 +190,8 @@ class _Frame:
         lo = tuple(max(a, e - seen.far) for a, e in zip(box.lo, self.camera.eye, strict=True))
         hi = tuple(min(a, e + seen.far) for a, e in zip(box.hi, self.camera.eye, strict=True))
         self.linker.bind("span_box", march.span, {"lo": lo, "hi": hi})
-        width = {"cone": seen.cone, "least": seen.least}
+        part = wholly_met(glowing_bodies(self.root), self.camera.eye, seen) if self.paths else 1.0
+        width = {"cone": part * seen.cone, "least": max(part * seen.least, seen.rounding)}
         rounded = {"rounding": seen.rounding, "glass": Fixed(self.inside)}
         stepping = {"steepness": steepness, **width, **rounded}
         self.linker.bind("step_ray", march.advance, stepping)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import json
+import math
 import re
+import signal
 import struct
 import time
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -331,3 +335,156 @@ def test_ply_that_is_wrong(tmp_path: Path, old: bytes, new: bytes) -> None:
     (tmp_path / "wrong.ply").write_bytes(data.replace(old, new, 1))
     with pytest.raises(MeshError, match="PLY"):
         read_mesh(tmp_path / "wrong.ply")
+
+
+def obj(path: Path, face: str = "{}", *, below: bool = False, more: str = "") -> Path:
+    """OBJ of the prism; `face` has the words of each corner."""
+    lines = [f"v {x} {y} {z}" for x, y, z in PRISM]
+    lines += ["f " + " ".join(face.format(k - 10 if below else k + 1) for k in side) for side in PRISM_SIDES]
+    path.write_text("\n".join(["# of another program", "o prism", *lines, more, ""]))
+    return path
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        {},
+        {"face": "{}/7/7"},
+        {"face": "{}//7"},
+        {"face": "{}/7", "below": True},
+        {"face": "{} \\\n"},
+        {"face": "{} \\\r\n"},
+        {"more": "vn 0 0 1\nf 1 2\nl 1 2"},
+    ],
+)
+def test_obj_of_faces_of_four_and_five_corners(tmp_path: Path, how: dict[str, Any]) -> None:
+    report = check_mesh(read_mesh(obj(tmp_path / "prism.obj", **how)))
+    assert report.printable
+    assert (report.triangles, report.volume_mm3) == (16, pytest.approx(1250))
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ("f 1 2 11", "a vertex that does not exist"),
+        ("f 1 2 0", "a vertex that does not exist"),
+        ("f 1 2 -11", "a vertex that does not exist"),
+        ("f 1 2 x", "not a whole OBJ file"),
+        ("f 1 2 99999999999999999999", "not a whole OBJ file"),
+        ("v 1 2", "not a whole OBJ file"),
+        ("v 1 2 x", "not a whole OBJ file"),
+        ("v 1 2 nan\nf 1 2 11", "not a finite number"),
+    ],
+)
+def test_obj_that_is_wrong(tmp_path: Path, more: str, message: str) -> None:
+    with pytest.raises(MeshError, match=message):
+        read_mesh(obj(tmp_path / "wrong.obj", more=more))
+
+
+def test_a_signal_ends_reading_an_obj_of_mixed_faces(tmp_path: Path) -> None:
+    """trimesh swallowed it until the file was read."""
+    path = obj(tmp_path / "mixed.obj", more="f 1//1 2//1 3//1\nf 1//1 2//1 3//1 4//1\n" * 200_000)
+
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGVTALRM, stop)
+    signal.setitimer(signal.ITIMER_VIRTUAL, 0.1)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            read_mesh(path)
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+        signal.signal(signal.SIGVTALRM, before)
+
+
+def glb(path: Path, *, body: bytes | None = None, **changes: Any) -> Path:
+    """GLB of a tetrahedron with sides of 1 m, with changes to its JSON."""
+    corners = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], "<f4").tobytes()
+    sides = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)], "<u2").tobytes()
+    body = corners + sides if body is None else body
+    tree: dict[str, Any] = {
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5123, "count": 12, "type": "SCALAR"},
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": 48},
+            {"buffer": 0, "byteOffset": 48, "byteLength": 24},
+        ],
+        "buffers": [{"byteLength": len(body)}],
+    }
+    text = json.dumps({**tree, **changes}).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(body), b"BIN\0") + body
+    path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks)
+    return path
+
+
+HALF_TURN = {"mesh": 0, "rotation": [0, 1, 0, 0], "scale": [1, 2, 1], "translation": [5, 0, 0]}
+MIRRORED = {"mesh": 0, "matrix": [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -3, 0, 0, 1]}
+
+
+def test_glb_of_nodes(tmp_path: Path) -> None:
+    nodes = [{"mesh": 0, "children": [1, 2]}, HALF_TURN, MIRRORED]
+    mesh = read_mesh(glb(tmp_path / "nodes.glb", nodes=nodes))
+    report = check_mesh(mesh)
+    assert report.printable
+    assert (report.components, report.volume_mm3) == (3, pytest.approx(4 / 6 * 1e9))
+    assert np.array_equal(mesh.vertices.min(axis=0), [-4000, -1000, 0])
+    assert np.array_equal(mesh.vertices.max(axis=0), [5000, 1000, 2000])
+
+
+@pytest.mark.parametrize(("mode", "corners"), [(5, (0, 2, 1, 3, 0, 2)), (6, (0, 2, 1, 3, 2))])
+def test_glb_of_strips_and_fans(tmp_path: Path, mode: int, corners: tuple[int, ...]) -> None:
+    path = glb(tmp_path / "whole.glb")
+    body = path.read_bytes()[-72:-24] + np.array(corners, "<u2").tobytes()
+    primitives = [{"attributes": {"POSITION": 0}, "indices": 1, "mode": mode}]
+    accessors = [
+        {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
+        {"bufferView": 1, "componentType": 5123, "count": len(corners), "type": "SCALAR"},
+    ]
+    read = read_mesh(glb(path, body=body, meshes=[{"primitives": primitives}], accessors=accessors))
+    whole = read_mesh(glb(path))
+
+    def faces(mesh: Mesh) -> set[tuple[tuple[float, ...], ...]]:
+        turned = [np.roll(side, -k, axis=0) for side in mesh.corners for k in range(3)]
+        return {tuple(map(tuple, side.tolist())) for side in turned}
+
+    assert len(faces(read) & faces(whole)) == 3 * (4 if mode == 5 else 3)
+
+
+VIEW = {"buffer": 0, "byteLength": 72}
+PLACES = {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (
+            {"accessors": [{"componentType": 5126, "count": 10**9, "type": "VEC3"}] * 2},
+            "accessor without data",
+        ),
+        ({"accessors": [{**PLACES, "sparse": {}}] * 2}, "a sparse one"),
+        ({"accessors": [{**PLACES, "count": 10**9}] * 2}, "not a whole GLB file"),
+        ({"accessors": [{**PLACES, "count": -1}] * 2}, "not a whole GLB file"),
+        ({"accessors": [PLACES] * 2, "bufferViews": [{**VIEW, "byteStride": 0}]}, "not a whole GLB file"),
+        ({"accessors": 7}, "not a whole GLB file"),
+        ({"nodes": [[]]}, "not a whole GLB file"),
+        ({"nodes": [{"children": [0]}]}, "more than 32 levels of nodes"),
+        ({"nodes": [{"children": [k + 1] * 2} for k in range(31)] + [{}]}, "more than 65536 nodes"),
+        ({"nodes": [{"mesh": 0, "scale": [1, math.nan, 1]}]}, "not a whole GLB file"),
+        ({"meshes": [{"primitives": []}]}, "the file has no triangles"),
+        ({"buffers": [{"uri": "body.bin"}]}, "data in other files"),
+        (
+            {"meshes": [{"primitives": [{"extensions": {"KHR_draco_mesh_compression": {}}}]}]},
+            r"compressed \(KHR_draco_mesh_compression\)",
+        ),
+    ],
+)
+def test_glb_that_is_wrong(tmp_path: Path, changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(MeshError, match=message):
+        read_mesh(glb(tmp_path / "wrong.glb", **changes))

@@ -137,12 +137,12 @@ def test_an_edge_of_glass_is_no_line() -> None:
 
 
 @pytest.mark.parametrize("kind", ["orthographic", "perspective"])
-@pytest.mark.parametrize("height", [4, 6, 18])
+@pytest.mark.parametrize("height", [pytest.param(1, marks=pytest.mark.nightly), 2, 6, 18])
 def test_a_glowing_ball_is_as_bright_at_any_size(kind: str, height: int) -> None:
-    """L (r / d)^2 cos, the mean over the lower half of the picture.
+    """L (r / d)^2 cos, the mean over the picture.
 
     Rays within half a pixel of the ball met it, and rays went on 1.5 pixels above the floor: it was three
-    times as bright at 6 rows.
+    times as bright at 6 rows. Rays passed a ball narrower than a pixel: 6 % were lost at one row.
     """
     radius, light = 0.1, 5.0
     floor = material(transform(box(size=(40, 40, 1)), translate=(0, 0, -0.5)), colour=(1, 1, 1), specular=0)
@@ -154,7 +154,7 @@ def test_a_glowing_ball_is_as_bright_at_any_size(kind: str, height: int) -> None
     view = View(camera=camera, lights=(dark,), shading=Shading(bounces=1, paths="yes"))
     of = Renderer(union(floor, ball), view, (2 * height, height), Work(1), "cpu")
     *_, last = of.passes(800_000 // height**2, tolerance=0.0)
-    u, v = np.meshgrid((np.arange(256) + 0.5) / 64 - 2, -(np.arange(128) + 0.5) / 128)
+    u, v = np.meshgrid((np.arange(256) + 0.5) / 64 - 2, 1 - (np.arange(128) + 0.5) / 64)
     film = np.tan(np.radians(10)) * (u[..., None] * camera.right + v[..., None] * camera.above)
     start, ray = np.array(camera.eye) + 0 * film, camera.forward + film
     if kind == "orthographic":
@@ -162,7 +162,7 @@ def test_a_glowing_ball_is_as_bright_at_any_size(kind: str, height: int) -> None
     points = start - start[..., 2:] / ray[..., 2:] * ray
     distance = np.linalg.norm(points - [0, 0, 1], axis=-1)
     expected = (light * (radius / distance) ** 2 / distance).mean()
-    assert last.image[height // 2 :, :, 0].mean() == pytest.approx(expected, rel=0.005)
+    assert last.image[..., 0].mean() == pytest.approx(expected, rel=0.005)
 
 
 def seen(d: np.ndarray) -> np.ndarray:
