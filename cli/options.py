@@ -21,12 +21,12 @@ from fracslice.common.parameters import (
     Count,
     Duration,
     Flag,
-    Grid,
     Heights,
     Listed,
     Number,
     Parameter,
     Percent,
+    Pixels,
     Record,
     Vector,
     picture_size,
@@ -143,7 +143,7 @@ def metavar(kind: Parameter) -> str:
         return "LENGTH[..LENGTH]"
     if isinstance(kind, Number | Vector):
         return kind.unit.upper() or ("N" if isinstance(kind, Number) else "X Y Z")
-    if isinstance(kind, Grid):
+    if isinstance(kind, Pixels):
         return kind.letters
     names = {Percent: "N%[,N%,N%]", Duration: "TIME"}
     return names.get(type(kind), "LENGTH")

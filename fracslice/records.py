@@ -18,13 +18,13 @@ from .common.parameters import (
     Duration,
     Flag,
     Given,
-    Grid,
     Heights,
     Length,
     Listed,
     Number,
     Pair,
     Percent,
+    Pixels,
     Record,
     Shift,
     Triple,
@@ -412,7 +412,7 @@ class RenderJob(Record):
         Count, None, "maximum number of samples per pixel; by default the scene's", least=1, most=1_000_000
     )
     crop: Given[Sequence[int] | str | None, tuple[int, int, int, int] | None] = attribute(
-        Grid,
+        Pixels,
         None,
         "only this part: left, top, width and height in pixels. Its pixels are those of the whole picture, "
         "except in modes depth, distance and position, which show the range of the part",

@@ -669,7 +669,7 @@ class Percent(Parameter):
 
 
 @dataclass(frozen=True)
-class Grid(Parameter):
+class Pixels(Parameter):
     """Parameter kind of whole numbers of pixels with a sign between, such as 1280x720.
 
     Attributes
@@ -722,9 +722,9 @@ class Grid(Parameter):
         return self.sign.join(map(str, value))
 
 
-def picture_size(default: Any, doc: str) -> Grid:
+def picture_size(default: Any, doc: str) -> Pixels:
     """Return the kind of a picture's size, pixels."""
-    return Grid(default, doc, "x", ("pixels across", "down"), "1280x720", "WxH", least=1)
+    return Pixels(default, doc, "x", ("pixels across", "down"), "1280x720", "WxH", least=1)
 
 
 SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}

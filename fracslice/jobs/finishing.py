@@ -25,8 +25,8 @@ from ..records import PIECES
 from ..scene import Print
 from ..store import Arrays
 from ..work import Work, in_background
+from .mesh_steps import Executor, MeshStep, Sampled
 from .report import Clock, Placement
-from .steps import Executor, Sampled, Step
 
 if TYPE_CHECKING:
     from ..mesh import Mesh
@@ -68,7 +68,7 @@ def largest_crumb(volumes: NDArray[np.float64], voxel: float) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Nest(Step[Nesting]):
+class Nest(MeshStep[Nesting]):
     """Searches the surroundings of the shells whose rays are in a piece."""
 
     shells: WholeShells
@@ -76,27 +76,27 @@ class Nest(Step[Nesting]):
     pieces: Pieces
 
     def result(self, number: int, work: Work) -> Nesting:
-        """Winding numbers and parents; see `Step.result`."""
+        """Winding numbers and parents; see `MeshStep.result`."""
         mesh, labels = self.pieces.mesh(number), self.pieces.labels(number)
         return self.shells.rays(number, mesh, labels, self.searched, work.threads)
 
     def about(self) -> Arrays:
-        """See `Step.about`."""
+        """See `MeshStep.about`."""
         return {"searched": self.searched, **vars(self.shells)}
 
     @classmethod
     def read(cls, about: Arrays, pieces: Pieces, sampled: Callable[[], Sampled]) -> Self:
-        """See `Step.read`."""
+        """See `MeshStep.read`."""
         return cls(read_shells(about), about["searched"], pieces)
 
     @staticmethod
     def pack(result: Nesting) -> Arrays:
-        """See `Step.pack`."""
+        """See `MeshStep.pack`."""
         return result._asdict()
 
     @staticmethod
     def unpack(arrays: Arrays) -> Nesting:
-        """See `Step.unpack`."""
+        """See `MeshStep.unpack`."""
         return Nesting(**arrays)
 
 
@@ -106,7 +106,7 @@ def read_shells(arrays: Arrays) -> WholeShells:
 
 
 @dataclass(frozen=True, eq=False)
-class Distances(Step[NDArray[np.float64]]):
+class Distances(MeshStep[NDArray[np.float64]]):
     """Measures the distances of points, scene units, from the triangles of a piece within reach."""
 
     points: NDArray[np.float64]  # float64 [n, 3]
@@ -116,30 +116,30 @@ class Distances(Step[NDArray[np.float64]]):
 
     @property
     def name(self) -> str:
-        """See `Step.name`."""
+        """See `MeshStep.name`."""
         return f"distances-{self.turn}"
 
     def result(self, number: int, work: Work) -> NDArray[np.float64]:
-        """Distances, float64 [n]; see `Step.result`."""
+        """Distances, float64 [n]; see `MeshStep.result`."""
         return nearest([self.pieces.mesh(number)], self.points, self.reach, work)
 
     def about(self) -> Arrays:
-        """See `Step.about`."""
+        """See `MeshStep.about`."""
         return {"points": self.points, "reach": np.array(self.reach), "turn": np.array(self.turn)}
 
     @classmethod
     def read(cls, about: Arrays, pieces: Pieces, sampled: Callable[[], Sampled]) -> Self:
-        """See `Step.read`."""
+        """See `MeshStep.read`."""
         return cls(about["points"], float(about["reach"]), pieces, int(about["turn"]))
 
     @staticmethod
     def pack(result: NDArray[np.float64]) -> Arrays:
-        """See `Step.pack`."""
+        """See `MeshStep.pack`."""
         return {"distances": result}
 
     @staticmethod
     def unpack(arrays: Arrays) -> NDArray[np.float64]:
-        """See `Step.unpack`."""
+        """See `MeshStep.unpack`."""
         return arrays["distances"]
 
 
@@ -232,7 +232,7 @@ class Checks:
 
 
 @dataclass(frozen=True, eq=False)
-class Finish(Step[Checks]):
+class Finish(MeshStep[Checks]):
     """Places, cleans and checks the bodies that stay."""
 
     of: Sampled
@@ -324,7 +324,7 @@ class Finish(Step[Checks]):
                 checks.include(self.checks(made, near, clock.work))
 
     def result(self, number: int, work: Work) -> Checks:
-        """Finish a piece, store its triangles but those at tips, and check it; see `Step.result`."""
+        """Finish a piece, store its triangles but those at tips, and check it; see `MeshStep.result`."""
         made = self.finished(number, work.threads)
         checks = self.checks(made, self.near(number, work.threads), work)
         plain, late = without_tips(made.passed, self.tips, work.threads)
@@ -332,20 +332,20 @@ class Finish(Step[Checks]):
         return replace(checks, rows=[len(plain.triangles)], late=[late])
 
     def about(self) -> Arrays:
-        """See `Step.about`."""
+        """See `MeshStep.about`."""
         place = np.array([self.place.scale, *self.place.offset])
         return {"stays": self.stays, "place": place, "added": self.added, **vars(self.shells)}
 
     @classmethod
     def read(cls, about: Arrays, pieces: Pieces, sampled: Callable[[], Sampled]) -> Self:
-        """See `Step.read`."""
+        """See `MeshStep.read`."""
         scale, x, y, z = about["place"].tolist()
         place = Placement(scale, (x, y, z))
         return cls(sampled(), read_shells(about), about["stays"], place, about["added"], pieces)
 
     @staticmethod
     def pack(result: Checks) -> Arrays:
-        """See `Step.pack`."""
+        """See `MeshStep.pack`."""
         (near,), (errors,), (rows,), (late,) = result.near, result.errors, result.rows, result.late
         own = {"contact": np.array(result.contact), "near": near, "errors": errors, "rows": np.array(rows)}
         tally = {f"tally-{name}": np.array(value) for name, value in vars(result.tally).items()}
@@ -353,7 +353,7 @@ class Finish(Step[Checks]):
 
     @staticmethod
     def unpack(arrays: Arrays) -> Checks:
-        """See `Step.unpack`."""
+        """See `MeshStep.unpack`."""
         tally = Tally(**{name: arrays[f"tally-{name}"].tolist() for name in vars(Tally())})
         late = Late(arrays["tips"], arrays["corners"])
         near, errors, rows = [arrays["near"]], [arrays["errors"]], [int(arrays["rows"])]

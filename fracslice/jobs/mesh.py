@@ -25,8 +25,8 @@ from .report import Clock, Report, Result, SurfaceError, SurfaceToMesh
 if TYPE_CHECKING:
     from ..volume import Plan, SignBricks
     from ..volume.sizing import Sizing
+    from .mesh_steps import Executor
     from .shared import MeshRecipe
-    from .steps import Executor
     from .surfaces import Surface
 
 STL = ".stl"
@@ -201,7 +201,7 @@ class _Job:
         from ..mesh.cleaning import HALO
         from ..mesh.contouring import layers
         from ..mesh.pieces import Pieces
-        from .steps import Local, Sampled
+        from .mesh_steps import Local, Sampled
 
         sized, signs, again = self.sampled()
         planned, work = sized.planned, self.clock.work

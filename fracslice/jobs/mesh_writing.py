@@ -13,8 +13,8 @@ from ..records import MeshJob
 from ..scene import Scene
 from ..work import ahead
 from .finishing import Checks, Finish, surface_distances
+from .mesh_steps import Executor, Local
 from .report import Clock
-from .steps import Executor, Local
 
 if TYPE_CHECKING:
     from ..mesh import Mesh

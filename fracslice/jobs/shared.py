@@ -28,9 +28,9 @@ from ..volume.exploration import Evaluate, brick_signs
 from ..volume.lattice import BRICK
 from ..volume.sizing import sizing
 from ..work import Work, chunks
+from .mesh_steps import Contour, Executor, MeshStep, R, Sampled, Summary, joined_summary
 from .planning import apply_edits, plan_mesh
 from .report import Clock
-from .steps import Contour, Executor, R, Sampled, Step, Summary, joined_summary
 
 SAMPLES = "samples"
 """File of a job with its samples."""
@@ -137,10 +137,10 @@ class StoredPieces(Pieces):
 
 
 @dataclass(frozen=True)
-class StepTask:
+class MeshTask:
     """A step of a mesh job for a piece; its result is a file of the job."""
 
-    kind: type[Step[Any]]  # the step
+    kind: type[MeshStep[Any]]  # the step
     step: str  # its name, and that of the file with what it is made of
     recipe: MeshRecipe  # the mesh
     pieces: ResultFolder  # folder with the files of the job
@@ -161,9 +161,9 @@ class StepTask:
 
 @lru_cache(maxsize=2)
 def _read_step(
-    kind: type[Step[Any]], step: str, recipe: MeshRecipe, folder: ResultFolder, job: str
-) -> Step[Any]:
-    """Step of a job from its file, read once in a process."""
+    kind: type[MeshStep[Any]], step: str, recipe: MeshRecipe, folder: ResultFolder, job: str
+) -> MeshStep[Any]:
+    """MeshStep of a job from its file, read once in a process."""
     about = unpack_arrays(folder.read(job, step))
     pieces = StoredPieces.read(folder, job, about)
     return kind.read(about, pieces, partial(_sampled, recipe, folder, job))
@@ -173,7 +173,7 @@ def _read_step(
 class JoinTask:
     """Joins the summaries of consecutive ranges of pieces."""
 
-    recipe: MeshRecipe  # as for `StepTask`
+    recipe: MeshRecipe  # as for `MeshTask`
     pieces: ResultFolder
     job: str
     number: int  # index at its level
@@ -206,14 +206,14 @@ class Shared(Executor):
     job: str  # key of the mesh and its samples
     work: Work  # progress and cancellation
 
-    def tasks(self, step: Step[Any], numbers: Iterable[int]) -> list[StepTask]:
+    def tasks(self, step: MeshStep[Any], numbers: Iterable[int]) -> list[MeshTask]:
         """Tasks of a step for some pieces."""
         assert isinstance(step.pieces, StoredPieces)
         folder, about = self.pool.pieces, {**step.about(), **step.pieces.about()}
         folder.write(self.job, step.name, pack_arrays(**about))
-        return [StepTask(type(step), step.name, self.recipe, folder, self.job, n) for n in numbers]
+        return [MeshTask(type(step), step.name, self.recipe, folder, self.job, n) for n in numbers]
 
-    def results(self, step: Step[R], numbers: Iterable[int], stage: str) -> Iterator[R]:
+    def results(self, step: MeshStep[R], numbers: Iterable[int], stage: str) -> Iterator[R]:
         """See `Executor.results`."""
         made = self.pool.results(self.tasks(step, numbers), self.work, stage)
         return (step.unpack(unpack_arrays(data)) for data in made)
@@ -222,7 +222,7 @@ class Shared(Executor):
         """Joined by tasks, too, up to the children of the tree's root; see `Executor.summary`."""
         folder, job = self.pool.pieces, self.job
 
-        def make(tasks: Sequence[StepTask | JoinTask], stage: str = "") -> list[str]:
+        def make(tasks: Sequence[MeshTask | JoinTask], stage: str = "") -> list[str]:
             for _ in self.pool.make(tasks, self.work, stage):
                 pass
             return [task.name for task in tasks]
@@ -234,7 +234,7 @@ class Shared(Executor):
         ranges = [read_summary(folder, job, name) for name in names]
         return joined_summary(step.of.planned.voxel, self.work.threads, ranges)
 
-    def leave_to_the_first(self, tasks: Sequence[StepTask]) -> None:
+    def leave_to_the_first(self, tasks: Sequence[MeshTask]) -> None:
         """Make the own tasks of a shard that does not write the output, and end its job."""
         if isinstance(self.pool, Shard) and not self.pool.first:
             made = self.pool.share(tasks, self.work)

@@ -31,8 +31,8 @@ from ..mesh.tips import by_tip
 from ..store import Arrays
 from ..work import Work, chunks
 from .finishing import Checks, Finish
+from .mesh_steps import MeshStep, Sampled
 from .shared import Shared, StoredPieces
-from .steps import Sampled, Step
 
 
 def write_shared(
@@ -117,40 +117,40 @@ BLOCKS = 32
 
 
 @dataclass(frozen=True, eq=False)
-class Writing(Step[Arrays]):
+class FilePart(MeshStep[Arrays]):
     """A step that writes a part of the file of a job."""
 
     pieces: StoredPieces
 
     @classmethod
     def read(cls, about: Arrays, pieces: Pieces, sampled: Callable[[], Sampled]) -> Self:
-        """See `Step.read`."""
+        """See `MeshStep.read`."""
         assert isinstance(pieces, StoredPieces)
         return cls(pieces, **about)
 
     def about(self) -> Arrays:
-        """See `Step.about`."""
+        """See `MeshStep.about`."""
         return {name: value for name, value in vars(self).items() if name != "pieces"}
 
     @staticmethod
     def pack(result: Arrays) -> Arrays:
-        """See `Step.pack`."""
+        """See `MeshStep.pack`."""
         return result
 
     @staticmethod
     def unpack(arrays: Arrays) -> Arrays:
-        """See `Step.unpack`."""
+        """See `MeshStep.unpack`."""
         return arrays
 
 
 @dataclass(frozen=True, eq=False)
-class Number(Writing):
+class NumberVertices(FilePart):
     """Numbers the vertices of a piece that no piece before has, from 0."""
 
     tips: NDArray[np.int64]  # index of the triangles at tips; 0 if there are none
 
     def result(self, number: int, work: Work) -> Arrays:
-        """Counts, and the numbers of vertices at tips, -1 for those of other pieces; see `Step.result`."""
+        """Counts, and numbers of the vertices at tips, -1 for those of other pieces; see `MeshStep.result`."""
         vertices, triangles = self.welded(number)
         before = self.welded(number - 1)[0] if number else vertices[:0]
         fresh = same(vertices, before) < 0
@@ -179,7 +179,7 @@ def same(points: NDArray[np.float32], others: NDArray[np.float32]) -> NDArray[np
 
 
 @dataclass(frozen=True, eq=False)
-class Encode(Writing):
+class Encode(FilePart):
     """Deflates rows of a kind; the numbers count blocks of rows."""
 
     vertices: NDArray[np.int64]  # first vertex and triangle of each piece, and of the end
@@ -187,7 +187,7 @@ class Encode(Writing):
     tips: NDArray[np.int64]  # numbers of the vertices at tips; -1 for those of no other piece
 
     def result(self, number: int, work: Work) -> Arrays:
-        """Checksum and length of the text, which is a file of its own; see `Step.result`."""
+        """Checksum and length of the text, which is a file of its own; see `MeshStep.result`."""
         begin = number * BLOCKS * texts.ROWS
         blocks, whole = list[bytes](), TextSum(0, 0)
         for text in self.rows(begin, begin + BLOCKS * texts.ROWS):
@@ -278,7 +278,7 @@ def number_vertices(pieces: StoredPieces, executor: Shared, tips: int) -> dict[s
     Returns the arrays of `Encode`.
     """
     count, numbers = len(pieces), np.empty(0, np.int64)
-    found = list(executor.results(Number(pieces, np.array(tips)), range(count), "writing"))
+    found = list(executor.results(NumberVertices(pieces, np.array(tips)), range(count), "writing"))
     counts = [files["counts"] for files in found]
     if tips:
         vertices, triangles = weld_pieces(pieces.finished(tips))
@@ -311,14 +311,14 @@ ROWS = 160 * PAGE // 2
 
 
 @dataclass(frozen=True, eq=False)
-class Place(Writing):
+class Place(FilePart):
     """Writes a range of the triangles to its place in the STL file; the numbers count ranges."""
 
     starts: NDArray[np.int64]  # first triangle of each piece, and of the end
     header: NDArray[np.uint8]  # header of the file
 
     def result(self, number: int, work: Work) -> Arrays:
-        """Write a range; the result is empty. See `Step.result`."""
+        """Write a range; the result is empty. See `MeshStep.result`."""
         begin, end = place(number), place(number + 1)
         start = stl.HEADER + stl.TRIANGLE * begin if begin else 0
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..mesh.shells import WholeShells
     from ..volume import Plan, SignBricks
     from ..volume.exploration import Evaluate
-    from .steps import Executor, Sampled
+    from .mesh_steps import Executor, Sampled
 
 BYTES_A_CROSSING = 140
 """Peak memory by grid edges that the surface crosses, bytes: 125 to 150 measured, on meshes of 66 and 375
@@ -112,7 +112,7 @@ def surface_of(
     from ..mesh.ridges import with_ridges
     from ..mesh.shells import survey
     from ..mesh.tips import Pointed, with_tips
-    from .steps import Contour
+    from .mesh_steps import Contour
 
     planned, work = of.planned, clock.work
     with clock("meshing"):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..common.parameters import Grid, validate_value
+from ..common.parameters import Pixels, validate_value
 from ..errors import RenderError
 from .accumulator import CHANNELS, COARSE
 
@@ -15,7 +15,7 @@ BYTES = 4 * (CHANNELS + 4 + 3)
 MARGIN = 16
 """Pixels around a crop that are rendered with it: errors decide on the samples of neighbours, one pixel
 farther in every pass that chooses pixels."""
-CROP = Grid(None, "left, top, width and height, pixels")
+CROP = Pixels(None, "left, top, width and height, pixels")
 
 
 @dataclass(frozen=True)

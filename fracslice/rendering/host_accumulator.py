@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
+from pathlib import Path
+from typing import BinaryIO
+from zipfile import BadZipFile
 
 import numpy as np
+from numpy.lib.npyio import NpzFile
 
+from ..errors import RenderError
+from ..formulas.vocabulary import maximum, where
 from ..kernel.cpu import load_functions
 from ..kernel.host import lane_count
 from ..kernel.linker import Linked
+from ..kernel.loops import WIDTH, load, loop, store
 from ..kernel.machine import Function
 from ..scene.view import View
 from ..work import Work, chunks
@@ -20,14 +28,15 @@ from .accumulator import (
     COUNT,
     COVER,
     GOAL,
+    TRUSTED,
     PassPlan,
     band_order,
     grids,
     least_gain,
     next_choice,
 )
-from .accumulator_loops import LOOPS
 from .film import BAND, develop, levels
+from .units.pixel import UNKNOWN, squared_error
 
 
 @lru_cache
@@ -156,7 +165,7 @@ class HostAccumulator:
         return sums.astype(np.float64)
 
     def _measure(self, first: int, rows: int, result: np.ndarray) -> tuple[np.ndarray, int]:
-        """Planes of `accumulator_loops.measure` of a band, and numbers per row; its sums go to `result`."""
+        """Planes of `measure` of a band, and numbers per row; its sums go to `result`."""
         real = self.sums.dtype
         lanes, none = lane_count(8 * real.itemsize), np.zeros(1, real)
         stride = -(-self.width // lanes) * lanes + max(lanes, 2)
@@ -166,7 +175,7 @@ class HostAccumulator:
         return planes, stride
 
     def _totals(self) -> np.ndarray:
-        """The sums of `accumulator_loops.measure` over the picture."""
+        """The sums of `measure` over the picture."""
 
         def measured(first: int, rows: int, result: np.ndarray) -> None:
             self._measure(first, rows, result)
@@ -252,3 +261,175 @@ def _blocks(values: np.ndarray) -> np.ndarray:
     """Sums over blocks."""
     rows, columns = (np.arange(0, n, COARSE) for n in values.shape[:2])
     return np.asarray(np.add.reduceat(np.add.reduceat(values, columns, 1), rows, 0))
+
+
+MOST_PASSES, MOST_SAMPLES = 1 << 24, 1 << 20
+"""Limits of a saved picture's passes and samples per pixel."""
+HEADER = 1 << 12
+"""Maximum header size of an array in a file, bytes."""
+INVALID = "expected a picture in progress, complete, as it was saved"
+
+
+def save_state(file: BinaryIO, key: str, picture: HostAccumulator) -> None:
+    """Write the sums as an .npz file."""
+    shape = np.array([picture.width, picture.height, picture.passes])
+    np.savez(file, sums=picture.sums, shape=shape, key=np.array(key))
+
+
+def load_state(path: str | Path, key: str, like: HostAccumulator) -> HostAccumulator:
+    """Read a file written by `save_state`. Its contents are validated before native code sees them."""
+    try:
+        with open(path, "rb") as file, NpzFile(file) as stored:
+            if str(_array(stored, "key")) != key:
+                raise RenderError(f"{path}: is of another scene, view, size, seed or version")
+            width, height, passes = map(int, _array(stored, "shape"))
+            sums = _array(stored, "sums", like.sums.nbytes)
+    except OSError as error:
+        raise RenderError(f"{path}: {error.strerror or error}") from None
+    except (ValueError, KeyError, EOFError, BadZipFile, NotImplementedError, zlib.error):
+        raise RenderError(f"{path}: {INVALID}") from None
+    saved = HostAccumulator(width, height, sums, passes, like.work)
+    if not _fits(saved, like):
+        raise RenderError(f"{path}: {INVALID}")
+    return saved
+
+
+def _fits(saved: HostAccumulator, like: HostAccumulator) -> bool:
+    """True if a picture is consistent and has the size and float type of another."""
+    return (
+        (saved.width, saved.height) == (like.width, like.height)
+        and (saved.sums.shape, saved.sums.dtype) == (like.sums.shape, like.sums.dtype)
+        and 0 <= saved.passes < MOST_PASSES
+        and all(_counts(saved.channels[..., channel]) for channel in (COUNT, GOAL, COVER))
+        and bool((saved.counts <= saved.channels[..., GOAL]).all())
+        and bool((saved.channels[..., COVER] <= saved.counts).all())
+    )
+
+
+def _counts(n: np.ndarray) -> bool:
+    """True if all values are numbers of samples."""
+    return bool(((n >= 0) & (n <= MOST_SAMPLES) & (n == np.floor(n))).all())
+
+
+def _array(stored: NpzFile, name: str, most: int = 0) -> np.ndarray:
+    """Load an array of at most `most` bytes from a file.
+
+    A small file can expand to a large array.
+    """
+    assert stored.zip
+    if stored.zip.getinfo(f"{name}.npy").file_size > most + HEADER:
+        raise ValueError(name)
+    return np.asarray(stored[name])
+
+
+@loop("rrrrrrnnnnn")
+def measure(P, A, N, E, R, T, first, rows, width, height, stride):
+    """Compute the squared error of each pixel of a band and around it, and its ratio to the samples.
+
+    `P`: unused; `A`: sums of the picture; `N`, `E`, `R`: zeros; `T`: pixels with a known error.
+    """
+    total = 0.0
+    known = 0.0
+    samples = 0.0
+    left = 0.0
+    for y in range(max(first - 1, 0), min(first + rows + 1, height)):
+        own = 1.0 if y >= first and y < first + rows else 0.0
+        begin = (y + 1 - first) * stride + 1
+        for x in range(width):
+            a = CHANNELS * (y * width + x)
+            E[begin + x] = A[a + 3]
+            R[begin + x] = A[a + 4]
+            N[begin + x] = A[a + COUNT]
+            left += own * (A[a + GOAL] - A[a + COUNT])
+        for e in range(begin, begin + width, WIDTH):
+            store(E, e, squared_error(load(E, e), load(R, e), load(N, e)))
+        for e in range(begin, begin + width):
+            samples += own * N[e]
+            if N[e] >= 2.0:
+                total += own * E[e]
+                known += own
+        for e in range(begin, begin + width, WIDTH):
+            n = load(N, e)
+            square = where(n > 0.0, where(n < TRUSTED, UNKNOWN, load(E, e)), 0.0)
+            store(E, e, square)
+            store(R, e, square / maximum(n, 1.0))
+    T[0] = total
+    T[1] = known
+    T[2] = samples
+    T[3] = left
+
+
+@loop("rrrrrrnnnnn")
+def judge(P, N, E, R, G, T, first, rows, width, stride, most):
+    """Compute the gain of one more sample in each pixel of a band.
+
+    `P`: squared error at which a pixel has converged; `N`, `E`, `R`: samples, squared errors, ratios; `G`:
+    written: -1 for a finished pixel; `T`: written: largest gain; `first`, `rows`, `width`, `stride`, `most`:
+    maximum samples per pixel.
+    """
+    largest = 0.0
+    for y in range(rows):
+        for x in range(0, width, WIDTH):
+            e = y * stride + x
+            worst = load(E, e)
+            gain = load(R, e)
+            for near in range(1, 9):
+                worst = maximum(worst, load(E, e + near // 3 * stride + near % 3))
+                gain = maximum(gain, load(R, e + near // 3 * stride + near % 3))
+            store(R, e, where(worst > P[0], gain, -1.0))  # not needed any more
+        for x in range(width):
+            g = (first + y) * width + x
+            G[g] = -1.0
+            if N[(y + 1) * stride + x + 1] < most and R[y * stride + x] >= 0.0:
+                G[g] = R[y * stride + x]
+                largest = max(largest, G[g])
+    T[0] = largest
+
+
+@loop("rrrnnnn")
+def choose(P, A, G, first, rows, width, most):
+    """Set the goals of the pixels of a band: the next power of two if the gain is at least `P[0]`.
+
+    `P`: smallest gain; `A`, `G`: sums of the picture, whose goals are written, and gains; `first`, `rows`,
+    `width`, `most`: maximum samples per pixel.
+    """
+    for k in range(first * width, (first + rows) * width):
+        n = A[CHANNELS * k + COUNT]
+        goal = n
+        if G[k] >= P[0]:
+            goal = 1.0
+            while goal <= n:
+                goal = goal + goal
+            goal = goal if goal < most else most
+        A[CHANNELS * k + GOAL] = goal
+
+
+@loop("rriirrnnnn")
+def unfinished(P, A, order, pixels, L, T, first, rows, width, size):
+    """List the pixels of a band that have not reached their goals.
+
+    `P`, `A`: unused, and sums of the picture; `L`, `T`: written: samples to take in each pixel and a row of
+    zeros.
+    """
+    total = 0.0
+    most = 0.0
+    for x in range(width):
+        L[rows * width + x] = 0.0
+    for k in range(rows * width):
+        a = CHANNELS * (first * width + k)
+        left = A[a + GOAL] - A[a + COUNT]
+        L[k] = left
+        total += left
+        most = A[a + GOAL] if A[a + GOAL] > most else most
+    kept = 0
+    for k in range(size):
+        y = min(order[k] >> 16, rows)
+        if L[y * width + (order[k] & 65535)] > 0.0:
+            pixels[kept] = order[k] + (first << 16)
+            kept += 1
+    T[0] = total
+    T[1] = most
+    T[2] = kept
+
+
+LOOPS = measure, judge, choose, unfinished

@@ -409,7 +409,7 @@ class Renderer:
         file : BinaryIO
             Writable binary file.
         """
-        from .state import save_state
+        from .host_accumulator import save_state
 
         save_state(file, self.key, self.accumulator.host())
 
@@ -426,7 +426,7 @@ class Renderer:
         RenderError
             If the file belongs to another picture or is damaged.
         """
-        from .state import load_state
+        from .host_accumulator import load_state
 
         self.accumulator = self._placed(load_state(path, self.key, self._empty))
 

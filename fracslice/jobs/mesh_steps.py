@@ -40,7 +40,7 @@ class Sampled:
         return SurfaceContours(self.planned.root, self.signs, self.threads)
 
 
-class Step(ABC, Generic[R]):
+class MeshStep(ABC, Generic[R]):
     """A step of a mesh job: a function of the number of a piece, of what is kept of the steps before."""
 
     pieces: Pieces  # pieces of the surface
@@ -82,7 +82,7 @@ class Executor(ABC):
     """What makes the steps of a job."""
 
     @abstractmethod
-    def results(self, step: Step[R], numbers: Iterable[int], stage: str) -> Iterator[R]:
+    def results(self, step: MeshStep[R], numbers: Iterable[int], stage: str) -> Iterator[R]:
         """Results of a step for some pieces, in order."""
 
     @abstractmethod
@@ -96,7 +96,7 @@ class Local(Executor):
 
     work: Work  # threads, progress and cancellation
 
-    def results(self, step: Step[R], numbers: Iterable[int], stage: str) -> Iterator[R]:
+    def results(self, step: MeshStep[R], numbers: Iterable[int], stage: str) -> Iterator[R]:
         """See `Executor.results`."""
         numbers = list(numbers)
         for done, result in enumerate(step.results(numbers, self.work), 1):
@@ -139,7 +139,7 @@ def joined_summary(voxel: float, threads: int, ranges: list[Summary]) -> Summary
 
 
 @dataclass(frozen=True, eq=False)
-class Contour(Step[Summary]):
+class Contour(MeshStep[Summary]):
     """Contours the surface and labels its connected components."""
 
     of: Sampled
@@ -147,12 +147,12 @@ class Contour(Step[Summary]):
     pieces: Pieces
 
     def result(self, number: int, work: Work) -> Summary:
-        """Contour a piece; see `Step.result`."""
+        """Contour a piece; see `MeshStep.result`."""
         contours = self.of.contours
         return self._keep(number, contours.piece(*self.cuts[number], contours.refiner(work), work), work)
 
     def results(self, numbers: Iterable[int], work: Work) -> Iterator[Summary]:
-        """Contour the pieces with one search for roots; see `Step.results`."""
+        """Contour the pieces with one search for roots; see `MeshStep.results`."""
         from ..mesh.extract import contour_whole
 
         planned, signs = self.of.planned, self.of.signs
@@ -176,17 +176,17 @@ class Contour(Step[Summary]):
         return Summary(ends, triangles, found, pointed, piece.blunt)
 
     def about(self) -> Arrays:
-        """See `Step.about`."""
+        """See `MeshStep.about`."""
         return {"cuts": np.array(self.cuts)}
 
     @classmethod
     def read(cls, about: Arrays, pieces: Pieces, sampled: Callable[[], Sampled]) -> Self:
-        """See `Step.read`."""
+        """See `MeshStep.read`."""
         return cls(sampled(), about["cuts"].tolist(), pieces)
 
     @staticmethod
     def pack(result: Summary) -> Arrays:
-        """See `Step.pack`."""
+        """See `MeshStep.pack`."""
         ends, triangles, found, pointed, blunt = result
         parts: dict[str, Any] = {
             "ends": ends,
@@ -201,7 +201,7 @@ class Contour(Step[Summary]):
 
     @staticmethod
     def unpack(arrays: Arrays) -> Summary:
-        """See `Step.unpack`."""
+        """See `MeshStep.unpack`."""
         head, tail = (Mesh(arrays[f"{side}_vertices"], arrays[f"{side}_triangles"]) for side in SIDES)
         found = PieceComponents(**{name: arrays[name] for name in PieceComponents.__dataclass_fields__})
         pointed = PointedPiece(arrays["pointed"], head, tail)
