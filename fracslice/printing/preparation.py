@@ -14,12 +14,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..common.messages import format_count, place
 from ..errors import VolumeError
 from ..formulas import Box, box, plane, transform
 from ..kernel import Field
 from ..records import DUST, PIECES
 from ..scene import Print
 from ..volume import Bricks, Plan, extent, sample_scene
+from ..volume.lattice import values_at
 from ..volume.sizing import Sizing
 from ..work import Work
 from .edits import edited_field
@@ -27,6 +29,7 @@ from .edits import edited_field
 if TYPE_CHECKING:
     from .components import SolidComponents
     from .samples import Samples
+    from .walls import Walls
 
 # Measuring needs Numba and SciPy, whose import takes as long as a small mesh: import where needed.
 
@@ -57,6 +60,10 @@ class Preparation:
     """mm per scene unit."""
     known: SolidComponents | None = None
     """Components, once computed."""
+    meshed: Bricks | None = None
+    """Samples of the object as the mesh has them, once taken."""
+    thin: Walls | None = None
+    """Walls that thickening left thinner than the minimum thickness, if anything was thickened."""
 
     @property
     def size(self) -> float:
@@ -162,6 +169,15 @@ def standing(made: Plan, how: Print, scale: float, work: Work) -> Plan:
 REPEATS = 4
 """Maximum number of times that fragments are joined."""
 
+ROUNDS = 8
+"""Maximum number of times that what thickening left thin is thickened."""
+
+ACROSS = 1.5
+"""Least number of samples of the mesh across the minimum thickness by which thinner walls are found."""
+
+SLACK = 0.01
+"""Part of the minimum thickness by which a wall may be thinner."""
+
 
 def apply_print_edits(planned: Plan, size: Sizing, how: Print, scale: float, work: Work) -> Plan:
     """Make the changes of a `Print`; see `fracslice.printing.printable`."""
@@ -176,7 +192,8 @@ def apply_print_edits(planned: Plan, size: Sizing, how: Print, scale: float, wor
         job.work.progress(stage, 0.0)
         job.put(change())
         job.work.progress(stage, 1.0)
-    return standing(job.planned, how, job.scale, job.work)
+    made = standing(job.planned, how, job.scale, job.work)
+    return replace(made, notes=(*made.notes, *thickness_note(job.thin, how.thickness, made.box, scale)))
 
 
 class _Edits(Preparation):
@@ -208,6 +225,8 @@ class _Edits(Preparation):
             yield "joining fragments", self.rejoined
             if how.thickness and self.known and self.known.solid.voxel < self.planned.voxel:
                 yield "filling pores", self.unsealed
+            if self.thin is not None and self.meshed:
+                yield "measuring the thickness", self.measured
         if how.hollow:
             yield "hollowing", self.hollowed
 
@@ -261,7 +280,8 @@ class _Edits(Preparation):
 
         known, voxel = self.known, max(self.planned.voxel, max(self.planned.box.size) / FINE)
         for _ in range(REPEATS if known or self.how.bridge else 0):
-            meshed = components_of(sample_scene(replace(self.planned, voxel=voxel), self.work))
+            self.meshed = sample_scene(replace(self.planned, voxel=voxel), self.work)
+            meshed = components_of(self.meshed)
             if meshed.thin_share >= PIECES:  # crumbs of walls; `thickness` is for them
                 break
             tips, others, (start, end) = fragments(meshed, None if self.how.bridge else known)
@@ -280,7 +300,18 @@ class _Edits(Preparation):
         from .components import components_of
 
         fine, self.known = self.known, components_of(sample_scene(self.planned, self.work))
-        return self.without(self.known.sealed(fine)) if fine else self.root
+        filled = self.without(self.known.sealed(fine)) if fine else self.root
+        self.meshed = self.known.solid
+        return filled
+
+    def measured(self) -> Field:
+        """Find the walls that are still too thin on the samples of the mesh, if these resolve them."""
+        bricks = self.meshed
+        if bricks and ACROSS * bricks.voxel < self.how.thickness / self.scale:
+            found = self.thinner(bricks)
+            inside = values_at(self.root.kernel(), found.middle.T, self.work) < 0  # not in tips that are cut
+            self.thin = found.chosen(inside)
+        return self.root
 
     def closed(self) -> Field:
         """Fill gaps from face to face."""
@@ -301,27 +332,52 @@ class _Edits(Preparation):
         they meet.
 
         They restore what opening with such a ball would remove (Serra 1982), along the part of the medial
-        axis between opposite faces. Bodies that touch are joined. Pores that this seals are filled.
+        axis between opposite faces. Bodies that touch are joined. Necks between balls are walls in turn.
+        Pores that this seals are filled.
         """
-        from .bridging import capsules, contacts
+        from .bridging import Capsules, capsules, contacts
         from .components import components_of
         from .samples import together
         from .thin_features import all_walls
 
-        solid, least = self.seen(self.how.thickness), self.how.thickness / self.scale
-        middle = all_walls(self.root, solid, least, self.work).middle
+        solid, least, root = self.seen(self.how.thickness), self.how.thickness / self.scale, self.root
+        middle = all_walls(root, solid, least, self.work).middle
         middle = middle[_space_points(middle, solid.bricks.voxel)]
         before, start, end = components_of(solid.bricks), *np.empty((2, 0, 3))
-        if not self.root.bounds.exterior_only:
-            start, end = contacts(before, large_bodies(before), self.root.kernel(), self.work)
+        if not root.bounds.exterior_only:
+            start, end = contacts(before, large_bodies(before), root.kernel(), self.work)
         if not len(middle) + len(start):
-            return self.root
+            return root
         start, end = np.concatenate([middle, start]), np.concatenate([middle, end])
         radius = math.hypot(least / 2, COVERED * solid.bricks.voxel)
-        balls = capsules(start, end, radius, solid.bricks)
+        balls = added = capsules(start, end, radius, solid.bricks)
         self.put(self.with_capsules(balls, least))
-        self.known = components_of(together(solid.bricks, balls.bricks))
+        made = together(solid.bricks, balls.bricks)
+        self.thin = self.thinner(made, added.bricks)
+        for _ in range(ROUNDS):
+            middle = self.thin.middle
+            if not len(middle):
+                break
+            middle = middle[_space_points(middle, made.voxel)]
+            added = capsules(middle, middle, radius, made)
+            balls = Capsules(together(balls.bricks, added.bricks), radius)
+            self.put(edited_field(root, "add", balls))
+            made = together(made, added.bricks)
+            self.thin = self.thinner(made, added.bricks)
+        self.known = components_of(made)
         return self.without(self.known.sealed(before))
+
+    def thinner(self, made: Bricks, added: Bricks | None = None) -> Walls:
+        """Walls of the current object thinner than the minimum, on samples of it; with `added`, in the bricks
+        of these alone.
+        """
+        from .samples import Samples, rows_of
+        from .walls import project_faces, walls
+
+        least, rows = self.how.thickness / self.scale, None if added is None else rows_of(made, added)
+        found = walls(Samples(made), least, self.work, rows=rows)
+        found = project_faces(self.root, found, made.voxel, self.work)
+        return found.chosen(found.width < (1 - SLACK) * least)
 
     def with_capsules(self, made: Samples, width: float) -> Field:
         """Add capsules of a width in scene units. They may connect components, which are forgotten."""
@@ -351,3 +407,30 @@ def _space_points(points: np.ndarray, voxel: float) -> np.ndarray:
     cells -= cells.min(0)
     _, first = np.unique(np.ravel_multi_index(tuple(cells.T), tuple(cells.max(0) + 1)), return_index=True)
     return np.asarray(first)
+
+
+def thickness_note(thin: Walls | None, least: float, box: Box, scale: float) -> tuple[str, ...]:
+    """A note on walls that are thinner than `least` mm, measured from the middle of the lower face of `box`.
+
+    `box` in scene units; `scale`: mm per scene unit.
+    """
+    if thin is None:
+        return ()
+    middle = np.array((*box.centre[:2], box.lo[2]))
+    left = thin.chosen(thin.middle[:, 2] > box.lo[2])  # not cut off
+    if not len(left.width):
+        return ()
+    count, first = _count_places(left.middle, least / scale), int(left.width.argmin())
+    at = place((scale * (left.middle[first] - middle)).tolist())
+    thinner = f"{format_count(count, 'place')} thinner than the thickness of {least:g} mm"
+    return (f"{thinner}; the thinnest, {left.width[first] * scale:.2g} mm, at {at} mm",)
+
+
+def _count_places(points: np.ndarray, near: float) -> int:
+    """Number of clusters of points, of which each has another within `near`."""
+    from scipy.spatial import KDTree
+
+    from ..common.compiled import connected_components
+
+    pairs = KDTree(points).query_pairs(near, output_type="ndarray")
+    return connected_components(len(points), *pairs.T)[1]

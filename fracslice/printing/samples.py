@@ -269,6 +269,13 @@ def together(solid: Bricks, added: Bricks) -> Bricks:
     return Bricks((x, y, z), solid.voxel, ijk, values, index)
 
 
+def rows_of(bricks: Bricks, others: Bricks) -> np.ndarray:
+    """Rows of the bricks at the places of others, on the same grid; int64 [n]."""
+    shift = np.round((np.array(others.origin) - bricks.origin) / (8 * bricks.voxel)).astype(int)
+    rows = bricks.index[tuple((others.ijk // 8 + shift).T)]
+    return np.asarray(rows[rows >= 0], np.int64)
+
+
 @compiled
 def _least(some, rows, more, others, out):  # type: ignore[no-untyped-def]
     """Minimum of two fields, brick by brick; copies a brick that only one of them has."""

@@ -266,7 +266,7 @@ class _Look:
         offset_field = self.offset_field(sign * reach)
 
         def look(rows: slice) -> Rays:
-            start, normals, area = edge_crossings(offset_field, rows)
+            start, normals, area = edge_crossings(offset_field, np.arange(len(offset_field.bricks))[rows])
             far = np.full(len(start), 2 * (reach + self.voxel))
             rays = self.limited(Rays(start, -sign * normals, area, 0 * area, far), sign)
             enter = self.first(rays, np.full(len(rays.start), BEFORE * self.voxel), rays.leave, sign)

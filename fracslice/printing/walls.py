@@ -29,20 +29,19 @@ ALONG = 0.999
 """Fraction of a normal's largest component above which another component ties with it."""
 
 
-def edge_crossings(solid: Samples, rows: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Crossings of the surface with grid edges that begin in some bricks.
+def edge_crossings(solid: Samples, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Crossings of the surface with grid edges that begin in the bricks of these rows.
 
     A smooth surface has one crossing for each grid line along the axis nearest to its normal.
 
     Returns points, normals float64 [n, 3], scene units; area float64 [n], squared scene units.
     """
-    begin, end, _ = rows.indices(len(solid.bricks))
-    n, size = (end - begin) * 512 // FIRST_SIZE, -1
+    n, size = len(rows) * 512 // FIRST_SIZE, -1
     while n > size:
         size = n
         points, normals = np.empty((2, size, 3))
         area = np.empty(size)
-        n = _cross(begin, end, solid.grid, points, normals, area)
+        n = _cross(rows, solid.grid, points, normals, area)
     return points[:n].copy(), normals[:n].copy(), area[:n].copy()
 
 
@@ -60,11 +59,11 @@ def slopes(kernel: Kernel, points: np.ndarray, step: float, work: Work) -> tuple
 
 
 @compiled
-def _cross(begin, end, grid, points, normals, area):  # type: ignore[no-untyped-def]
+def _cross(rows, grid, points, normals, area):  # type: ignore[no-untyped-def]
     """Write the results of `crossed` as far as the arrays reach; return the number of crossings."""
     n, f = 0, np.empty(SIDE**3, np.float32)
     ijk, voxel = grid.ijk, grid.voxel
-    for row in range(begin, end):
+    for row in rows:
         gather(grid, row, f)
         for s in range(512):
             u, v, w = s >> 6, (s >> 3) & 7, s & 7
@@ -157,15 +156,16 @@ def walls(
     work: Work,
     *,
     gaps: bool = False,
+    rows: np.ndarray | None = None,
 ) -> Walls:
-    """Measure walls, or gaps, on samples.
+    """Measure walls, or gaps, on samples; with `rows`, those that begin in these bricks.
 
     Widths are accurate to one voxel. Features thinner than a voxel appear only where they contain a sample,
     see `thin_features`.
 
     `limit` in scene units.
     """
-    (one,) = walls_of(solid, limit, work, [Measure(gaps)])
+    (one,) = walls_of(solid, limit, work, [Measure(gaps)], rows)
     return one
 
 
@@ -178,14 +178,17 @@ class Measure:
     direction: Direction | None = None
 
 
-def walls_of(solid: Samples, limit: float, work: Work, kinds: Sequence[Measure]) -> list[Walls]:
-    """Measure several kinds of walls from the same crossings of grid edges."""
+def walls_of(
+    solid: Samples, limit: float, work: Work, kinds: Sequence[Measure], rows: np.ndarray | None = None
+) -> list[Walls]:
+    """Measure several kinds of walls from the same crossings of grid edges, of all bricks or of some."""
+    chosen = np.arange(len(solid.bricks)) if rows is None else rows
 
-    def look(rows: slice) -> list[Walls]:
-        crossings = edge_crossings(solid, rows)
+    def look(part: slice) -> list[Walls]:
+        crossings = edge_crossings(solid, chosen[part])
         return [_measure_walls(solid, limit, work, how, *crossings) for how in kinds]
 
-    blocks = work.collect(look, chunks(len(solid.bricks), AT_ONCE) or [slice(0, 0)])
+    blocks = work.collect(look, chunks(len(chosen), AT_ONCE) or [slice(0, 0)])
     return [Walls.joined(list(parts)) for parts in zip(*blocks, strict=True)]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import combinations
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from fracslice.formulas import Node, box, cylinder, difference, julia, shell, sphere, transform, union
-from fracslice.printing import printable
+from fracslice.printing import preparation, printable
 from fracslice.printing.bridging import contacts
 from fracslice.printing.components import SolidComponents, components_of
 from fracslice.printing.samples import Samples, together
@@ -87,6 +88,7 @@ def test_the_thickness_is_the_least_one(
 ) -> None:
     """Along rays through the middle. A plate of 1.2 mm was 1.165 mm thick in places, a rod of 1 mm 0.873."""
     planned, scale = printable(plan(root, 100), Sizing(SIZE), Print(thickness=thickness))
+    assert planned.notes == ()
     axis, angle = root.values.get("rotate", (1, 0, 0, 0))[:3], root.values.get("rotate", (0, 0, 0, 0))[3]
     turn = Rotation.from_rotvec(np.radians(angle) * np.array(axis) / np.linalg.norm(axis))
     middle = turn.apply(np.random.default_rng(0).uniform(-1, 1, (200, 3)) * across)
@@ -96,6 +98,31 @@ def test_the_thickness_is_the_least_one(
         points = middle[:, :, None] + way[:, None] * along
         inside = sample_points(planned, *points.transpose(1, 0, 2).reshape(3, -1)).reshape(200, -1) < 0
         assert inside.all(0).sum() * scale * along[1] > 0.99 * thickness / 2
+
+
+RODS = union(*(at(cylinder(radius=0.015, height=2), x, 0, 0) for x in (-0.049, 0.049)))
+"""Two rods that overlap by less than a tenth once they are 1 mm thick: by a neck of 0.4 mm."""
+
+
+def test_necks_between_thickened_walls_are_thickened() -> None:
+    planned = made(RODS, thickness=1.0)
+    along = np.linspace(-0.1, 0.1, 1001)
+    for z in np.linspace(-0.9, 0.9, 19).tolist():
+        inside = sample_points(planned, 0 * along, along, np.full(1001, z)) < 0
+        assert inside.sum() * SIZE * 1e-4 > 0.99
+    assert planned.notes == ()
+
+
+def test_what_stays_thinner_than_the_thickness_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With its place in the object as it stands, after its base was cut off."""
+    monkeypatch.setattr(preparation, "ROUNDS", 0)
+    (note,) = made(RODS, thickness=1.0, base=15.0).notes
+    count, least, x, y, z = re.findall(r"-?[\d.]+", note.replace("of 1 mm", ""))
+    assert "thinner than the thickness of 1 mm" in note
+    assert int(count) == 1
+    assert 0.3 < float(least) < 0.99
+    assert (float(x), float(y)) == pytest.approx((0, 0), abs=0.5)
+    assert 0 < float(z) < 6
 
 
 def test_every_contact_is_thickened() -> None:
