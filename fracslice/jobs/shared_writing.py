@@ -150,7 +150,7 @@ class NumberVertices(FilePart):
     tips: NDArray[np.int64]  # index of the triangles at tips; 0 if there are none
 
     def result(self, number: int, work: Work) -> Arrays:
-        """Counts, and numbers of the vertices at tips, -1 for those of other pieces; see `MeshStep.result`."""
+        """Counts, and numbers of the vertices at tips, -1 for those of other pieces."""
         vertices, triangles = self.welded(number)
         before = self.welded(number - 1)[0] if number else vertices[:0]
         fresh = same(vertices, before) < 0
