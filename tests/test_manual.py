@@ -138,7 +138,7 @@ def test_commands_are_understood(line: str, folder: Path, monkeypatch, capfd) ->
         "jobs.implicit.make_implicit",
         "slicing.plan_stack",
         "jobs.slices.plan_layers",
-        "rendering.Renderer",
+        "jobs.pictures.make_picture",
         "animation.Timeline",
         "bench.measurements.measure",
         "viewer.fly",
