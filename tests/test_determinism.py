@@ -19,7 +19,7 @@ import pytest
 
 from fracslice.formulas import difference, julia, sphere, transform, union
 from fracslice.kernel import CpuKernel, compile_scene, cpu, link
-from fracslice.mesh.extract import contour
+from fracslice.mesh.contouring import contour
 from fracslice.printing.walls import Walls
 from fracslice.rendering import Renderer
 from fracslice.rendering import cpu as tiles

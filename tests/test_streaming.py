@@ -139,7 +139,7 @@ def test_defects_are_counted_at_seams_too(tmp_path: Path, monkeypatch: pytest.Mo
     """Triangles taken out of every piece: each open edge is counted once, wherever the pieces end."""
     from fracslice.mesh.checks import Tally, check_mesh
     from fracslice.mesh.cleaning import SelectedPiece, finished_piece
-    from fracslice.mesh.extract import contour_pieces
+    from fracslice.mesh.contouring import contour_pieces
     from fracslice.volume import plan, sample_scene_signs
 
     planned = plan(menger(level=2), 40)
@@ -212,7 +212,7 @@ def test_cancelled_leaves_nothing(stage: str, pieces: None, tmp_path: Path) -> N
 @pytest.mark.parametrize("most", [1, 10**6])
 def test_the_volume_of_a_speck_far_from_the_origin(most: int) -> None:
     """A single sample inside: the octahedron around it has 1e-12 of a voxel, and its sign."""
-    from fracslice.mesh.extract import contour_pieces
+    from fracslice.mesh.contouring import contour_pieces
     from fracslice.mesh.pieces import Pieces
     from fracslice.mesh.shells import survey
     from fracslice.volume import SignBricks

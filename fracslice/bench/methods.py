@@ -10,7 +10,7 @@ import numpy as np
 
 from ..formulas import Box, Node, julia, mandelbulb, menger, sphere, torus
 from ..mesh import Mesh
-from ..mesh.extract import contour, extract
+from ..mesh.contouring import contour, extract
 from ..mesh.simplify import simplify
 from ..volume import Bricks, Lattice, sample
 from ..work import Work

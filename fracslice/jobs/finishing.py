@@ -17,10 +17,9 @@ from ..mesh.checks import Tally, nearest, surface_to_mesh
 from ..mesh.cleaning import SelectedPiece, finished_piece
 from ..mesh.pieces import HEAD, TAIL, Pieces, gather_rows
 from ..mesh.quantisation import grid_planes, place_and_round
-from ..mesh.shells import Nesting, WholeShells
+from ..mesh.shells import NearBodies, Nesting, WholeShells
 from ..mesh.tips import Late, without_tips
 from ..mesh.topology import choose
-from ..mesh.touching import NearBodies
 from ..records import PIECES
 from ..scene import Print
 from ..store import Arrays

@@ -230,7 +230,7 @@ class _Job:
     def result(self, sized: Sized, surface: Surface, executor: Executor) -> tuple[Result, int]:
         """Finished mesh and report, and the refinement of the samples that does not lose the object."""
         from ..kernel.depth import shallower
-        from ..mesh.touching import touching_note
+        from ..mesh.shells import touching_note
         from .completeness import lost_size, mesh_amount
         from .finishing import choose_bodies
         from .mesh_writing import Writing

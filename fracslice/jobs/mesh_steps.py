@@ -153,7 +153,7 @@ class Contour(MeshStep[Summary]):
 
     def results(self, numbers: Iterable[int], work: Work) -> Iterator[Summary]:
         """Contour the pieces with one search for roots; see `MeshStep.results`."""
-        from ..mesh.extract import contour_whole
+        from ..mesh.contouring import contour_whole
 
         planned, signs = self.of.planned, self.of.signs
         if len(self.cuts) == 1:

@@ -12,17 +12,19 @@ from typing import Any
 
 import numpy as np
 
+from ..common.memory import available_bytes
 from ..errors import Cancelled, KeptError, RenderError, SharedError
 from ..export.images import BANDED, LINEAR, check_image, write_bands, write_image
+from ..formulas.registry import Node
 from ..kernel.devices import for_picture
 from ..records import RenderJob
 from ..rendering import Pass, Renderer
-from ..rendering.bands import check_bands, render_bands, rows_of_bands
-from ..rendering.crops import BYTES, MARGIN
+from ..rendering.crops import BYTES, MARGIN, Crop
 from ..rendering.progressive import layers
 from ..rendering.sequence import SampleRange
 from ..scene import Scene
-from ..work import Work
+from ..scene.view import View
+from ..work import Work, chunks
 
 Shown = Callable[[Iterator[Pass], Renderer], Iterator[Pass]]
 """Passes them on, and shows or keeps each."""
@@ -328,3 +330,54 @@ def _save_state(renderer: Renderer, path: str) -> None:
 
     with replacing(path) as file:
         renderer.save(file)
+
+
+SHARE = 0.5
+"""Part of the free memory that a band takes."""
+ROWS = 64
+"""Rows of a band, or a multiple; files store as many rows as one."""
+SCALED = ("depth", "distance", "position")
+"""Modes whose display values depend on the range of the whole picture."""
+
+
+def rows_of_bands(film: tuple[int, int]) -> int:
+    """Return the rows of a band: all rows if the picture is no larger than the memory.
+
+    `film` in pixels.
+    """
+    width, height = film
+    free = available_bytes()
+    if Crop.of(film, None).bytes <= free:
+        return height
+    rows = int(SHARE * free) // (BYTES * width) - 2 * MARGIN
+    return max(rows // ROWS, 1) * ROWS
+
+
+def check_bands(view: View, display: bool) -> None:
+    """Raise an error for a view whose pixels depend on the whole picture."""
+    if display and view.film.bloom and view.shading.mode == "light":
+        raise RenderError('film.bloom: spreads light over the whole picture; expected bloom="0" in bands')
+    if display and view.shading.mode in SCALED:
+        raise RenderError(
+            f"shading.mode={view.shading.mode}: is scaled by its range; expected .exr or .tif in bands"
+        )
+
+
+def render_bands(
+    root: Node,
+    view: View,
+    film: tuple[int, int],
+    rows: int,
+    work: Work | None = None,
+    device: str = "auto",
+    sequence: SampleRange | None = None,
+    samples: int | None = None,
+) -> Iterator[Pass]:
+    """Render a picture band by band; each has the pixels of the whole picture.
+
+    `film` in pixels.
+    """
+    for part in chunks(film[1], rows):
+        crop = 0, part.start, film[0], part.stop - part.start
+        *_, last = Renderer(root, view, film, work, device, sequence, crop).passes(samples)
+        yield last

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -9,12 +11,17 @@ import numpy as np
 from ..formulas.field import Precision
 from ..kernel.cuda_driver import require
 from ..kernel.cuda_launching import launch, load_loops, parameters
+from ..kernel.linker import Linked
+from ..scene.view import View
 from ..work import Work
-from .accumulator import PassPlan
+from .accumulator import TRUSTED, PassPlan, grids, least_gain, next_choice, tile_order
 from .cpu import BLOCK, STEPS
-from .cuda_loops import loops
+from .cuda_loops import LOOPS, loops
+from .film import shows_background
+from .host_accumulator import HostAccumulator
 from .linking import Frame
 from .sequence import SampleRange
+from .units.pixel import linear
 
 
 class CudaTracer:
@@ -56,3 +63,92 @@ class CudaTracer:
         for _ in range((plan.last + 1) // 2):  # a goal is at most twice a count
             work.check()
             launch(self._loops.tile, plan.pixels.size, self._parameters, self._points, self._starts, *film)
+
+
+PARTS = 8192
+"""Threads that sum over a picture, each over every 8192nd pixel, so that sums are deterministic."""
+GONE = -1
+"""Pass count of an accumulator whose memory has been handed over."""
+TONES = {"none": 0, "filmic": 1, "reinhard": 2}
+
+
+class CudaAccumulator:
+    """Picture in progress in GPU memory, with the interface of `HostAccumulator`."""
+
+    def __init__(self, start: HostAccumulator) -> None:
+        cuda = self._cuda = require()
+        self.width, self.height = start.width, start.height
+        self.passes = start.passes
+        self.dtype, pixels = start.sums.dtype, start.width * start.height
+        precision: Precision = "float32" if self.dtype == np.float32 else "float64"
+        self._loops = load_loops(Linked("", np.zeros(1)), precision, LOOPS)
+        self.sums = cuda.to_device(start.sums)
+        self._order = cuda.to_device(tile_order(self.width, self.height))
+        self._squares, self._gains = (cuda.device_array(pixels, self.dtype) for _ in range(2))
+        self._parts = cuda.device_array((min(PARTS, pixels), 3), self.dtype)
+        self._shown = cuda.device_array((pixels, 3), np.uint8)
+
+    def anew(self) -> CudaAccumulator:
+        """Return an empty accumulator in the same memory; this one becomes invalid."""
+        fresh = copy(self)
+        fresh.passes, self.passes = 0, GONE
+        launch(self._loops.clear, self.sums.size, self.sums)
+        return fresh
+
+    def host(self) -> HostAccumulator:
+        """Return a copy in host memory; see `Accumulator.host`."""
+        return HostAccumulator(self.width, self.height, self.sums.copy_to_host(), self.passes)
+
+    def _summed(self, loop: Any, *arguments: Any) -> np.ndarray:
+        """Run a kernel over the partial sums and return them, float64 [threads, 3]."""
+        launch(loop, len(self._parts), *arguments)
+        return np.asarray(self._parts.copy_to_host(), np.float64)
+
+    def statistics(self) -> tuple[float, float]:
+        """Return the statistics of the picture; see `Accumulator.statistics`."""
+        parts = self._summed(self._loops.measure, self.sums, self._squares, self._parts)
+        total, known, samples = parts.sum(0)
+        return samples / (self.width * self.height), math.sqrt(total / known) if known else math.inf
+
+    def plan(self, most: int, tolerance: float) -> PassPlan:
+        """Set the goals of the next pass; see `Accumulator.plan`."""
+        spacings = grids(self.width, self.height)
+        if self.passes < len(spacings):
+            plan = self._plan(self._loops.grid, self.sums, self._parts, self.width, spacings[self.passes])
+            if plan.samples:
+                return plan
+        self.statistics()
+        real = self.dtype.type
+        judged = (self.sums, self._squares, self._gains, self._parts, self.width)
+        limits = (real(TRUSTED), real(most), real(tolerance * tolerance))
+        largest = self._summed(self._loops.judge, *judged, *limits)[:, 0].max()
+        if largest > 0:
+            self.passes = len(spacings) + next_choice(self.passes - len(spacings), largest)
+        least = real(least_gain(self.passes - len(spacings)))
+        return self._plan(self._loops.choose, self.sums, self._gains, self._parts, real(most), least)
+
+    def _plan(self, loop: Any, *arguments: Any) -> PassPlan:
+        """Run a kernel that sets goals. All pixels are passed on: a thread skips those at their goals."""
+        left, last, _ = self._summed(loop, *arguments).T
+        return PassPlan(self._order, int(left.sum()), int(last.max()))
+
+    def shown(self, view: View) -> np.ndarray:
+        """Develop the picture, on the host if it has bloom or no light; see `Accumulator.shown`."""
+        film = view.film
+        if film.bloom or film.transparent or view.shading.mode != "light":
+            return self.host().shown(view)
+        spacings = grids(self.width, self.height)
+        coarse = spacings[self.passes - 1] if 0 < self.passes < len(spacings) else 1
+        behind = linear(film.background) if shows_background(view) else (0, 0, 0)
+        given = (2.0**film.exposure, *behind)
+        launch(
+            self._loops.show,
+            len(self._shown),
+            self.sums,
+            self._shown,
+            self.width,
+            coarse,
+            *map(self.dtype.type, given),
+            TONES[film.tone],
+        )
+        return np.asarray(self._shown.copy_to_host().reshape(self.height, self.width, 3))

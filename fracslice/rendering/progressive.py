@@ -288,8 +288,7 @@ def _backend(device: str) -> tuple[Callable[..., Any], Callable[[HostAccumulator
     """The tracer and the accumulator factory of a device."""
     if device == "cpu":
         return CpuTracer, HostAccumulator.host
-    from .cuda import CudaTracer
-    from .cuda_accumulator import CudaAccumulator
+    from .cuda import CudaAccumulator, CudaTracer
 
     return CudaTracer, CudaAccumulator
 

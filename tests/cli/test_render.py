@@ -15,7 +15,7 @@ from fracslice.cli.main import run
 from PIL import Image
 
 from fracslice.jobs import pictures
-from fracslice.rendering import Pass, Renderer, bands, cpu, denoising
+from fracslice.rendering import Pass, Renderer, cpu, denoising
 from fracslice.rendering.accumulator import CHANNELS, COARSE, COUNT, PassPlan
 from fracslice.rendering.crops import BYTES
 
@@ -91,7 +91,7 @@ def test_a_picture_larger_than_the_memory_is_rendered_in_bands(
     common = ["render", str(scene), "-q", "--device", "cpu", "--samples", "16", "--size", "40x150"]
     whole, banded = tmp_path / f"a.{ending}", tmp_path / f"b.{ending}"
     assert run([*common, "-o", str(whole)]) == 0
-    monkeypatch.setattr(bands, "available_bytes", lambda: BYTES * 40 * 149)
+    monkeypatch.setattr(pictures, "available_bytes", lambda: BYTES * 40 * 149)
     assert run([*common, "-o", str(banded)]) == 0
     assert "40 x 150 pixels need 0.0 GB of memory, more than is free: rendered in 3 bands of 64 rows" in (
         capsys.readouterr().err

@@ -14,8 +14,7 @@ from fracslice._native import Cells
 from fracslice.errors import Cancelled
 from fracslice.formulas import torus
 from fracslice.mesh import contouring
-from fracslice.mesh.contouring import Crossings, Refiner
-from fracslice.mesh.extract import contour_pieces
+from fracslice.mesh.contouring import Crossings, Refiner, contour_pieces
 from fracslice.volume import plan, sample_scene_signs
 from fracslice.work import Work
 

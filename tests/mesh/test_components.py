@@ -12,8 +12,7 @@ from fracslice.formulas import sphere as ball
 from fracslice.mesh import Mesh
 from fracslice.mesh import shells as surveys
 from fracslice.mesh.checks import check_mesh
-from fracslice.mesh.contouring import Piece
-from fracslice.mesh.extract import contour_pieces
+from fracslice.mesh.contouring import Piece, contour_pieces
 from fracslice.mesh.model import concatenate
 from fracslice.mesh.pieces import Pieces
 from fracslice.mesh.shells import WholeShells, survey

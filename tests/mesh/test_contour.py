@@ -38,8 +38,7 @@ from fracslice.kernel import Kernel, reference
 from fracslice.kernel.tree import ArrayField
 from fracslice.mesh import Mesh
 from fracslice.mesh.checks import check_mesh
-from fracslice.mesh.contouring import Piece
-from fracslice.mesh.extract import contour, contour_pieces, extract
+from fracslice.mesh.contouring import Piece, contour, contour_pieces, extract
 from fracslice.volume import Bricks, plan, sample_scene
 from fracslice.volume.accuracy import surface_error
 from fracslice.work import Work

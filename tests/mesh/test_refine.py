@@ -24,7 +24,7 @@ from fracslice.formulas import (
 from fracslice.kernel import reference
 from fracslice.mesh import Mesh
 from fracslice.mesh.checks import check_mesh
-from fracslice.mesh.extract import contour
+from fracslice.mesh.contouring import contour
 from fracslice.mesh.refine import refine
 from fracslice.scene import scene
 from fracslice.volume import Plan, plan, sample_scene

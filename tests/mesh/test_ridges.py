@@ -11,7 +11,7 @@ from scipy.spatial import HalfspaceIntersection
 from fracslice.formulas import Node, difference, intersection, mandelbulb, menger, plane, sphere, transform
 from fracslice.mesh import Mesh
 from fracslice.mesh.checks import check_mesh
-from fracslice.mesh.extract import contour_whole
+from fracslice.mesh.contouring import contour_whole
 from fracslice.mesh.fit import Fit
 from fracslice.mesh.pieces import Pieces
 from fracslice.mesh.quantisation import quantise_mesh

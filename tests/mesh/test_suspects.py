@@ -12,7 +12,7 @@ from fracslice.formulas import Node, box, difference, mandelbulb, menger, shell,
 from fracslice.mesh import Mesh
 from fracslice.mesh.checks import MeshReport, Tally, check_mesh
 from fracslice.mesh.cleaning import Finished, clean
-from fracslice.mesh.extract import contour
+from fracslice.mesh.contouring import contour
 from fracslice.mesh.quantisation import grid_planes
 from fracslice.volume import plan, sample_scene
 

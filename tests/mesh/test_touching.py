@@ -11,8 +11,7 @@ import pytest
 from fracslice import make_mesh
 from fracslice._native import near_bodies
 from fracslice.formulas import box, capsule, cells, flake, shell, sphere, transform, union
-from fracslice.mesh.shells import WholeShells
-from fracslice.mesh.touching import NearBodies
+from fracslice.mesh.shells import NearBodies, WholeShells
 
 
 def test_a_flake_whose_corners_touch_is_joined_by_the_thickness_that_its_report_names() -> None:

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from fracslice.formulas import Node, sphere, torus, transform
-from fracslice.mesh.extract import contour, extract
+from fracslice.mesh.contouring import contour, extract
 from fracslice.volume import plan, sample_scene
 
 BALL = 4 / 3 * math.pi

@@ -7,8 +7,8 @@ import pytest
 
 from fracslice import MeshJob, make_mesh
 from fracslice.formulas import Node, box, julia, mandelbulb, shell, sphere, transform, union
-from fracslice.mesh import extract
-from fracslice.mesh.extract import contour_pieces
+from fracslice.mesh import contouring
+from fracslice.mesh.contouring import contour_pieces
 from fracslice.printing import printable
 from fracslice.printing import thin_features as connectivity
 from fracslice.printing.components import SolidComponents, components_of, thin_share
@@ -160,7 +160,7 @@ def contoured(monkeypatch: pytest.MonkeyPatch) -> list[object]:
     calls: list[object] = []
     monkeypatch.setattr("fracslice.jobs.mesh.RAISED", 0)
     monkeypatch.setattr(
-        extract, "contour_pieces", lambda *those: calls.append(those) or contour_pieces(*those)
+        contouring, "contour_pieces", lambda *those: calls.append(those) or contour_pieces(*those)
     )
     return calls
 

@@ -10,8 +10,7 @@ import numpy as np
 from fracslice.kernel.cuda import require
 from fracslice.rendering.accumulator import CHANNELS, PassPlan, tile_order
 from fracslice.rendering.cpu import CpuTracer
-from fracslice.rendering.cuda import CudaTracer
-from fracslice.rendering.cuda_accumulator import CudaAccumulator
+from fracslice.rendering.cuda import CudaAccumulator, CudaTracer
 from fracslice.rendering.host_accumulator import HostAccumulator
 from fracslice.scene.view import Film, Light, Shading, View
 from fracslice.work import Work

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from fracslice.kernel import Linked
-from fracslice.rendering import cuda_accumulator
+from fracslice.rendering import cuda
 from fracslice.rendering.cuda_loops import loops
 from tests.examples import stamped
 from tests.kernel.cuda_ptx import compiled
@@ -41,7 +41,7 @@ def test_float32_kernels_hold_no_float64(name: str, tmp_path: Path) -> None:
     [("measure", "RRM"), ("judge", "RRRMnrrr"), ("choose", "RRMrr"), ("show", "RUnnrrrrn")],
 )
 def test_what_keeps_the_picture_holds_no_float64(name: str, arguments: str, tmp_path: Path) -> None:
-    ptx = compiled(Linked("", np.zeros(1)), 32, cuda_accumulator.LOOPS, name, arguments, tmp_path)
+    ptx = compiled(Linked("", np.zeros(1)), 32, cuda.LOOPS, name, arguments, tmp_path)
     assert ".f64" not in ptx
     assert ".f32" in ptx
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fracslice.formulas import Node
-from fracslice.mesh.extract import contour
+from fracslice.mesh.contouring import contour
 from fracslice.scene import library, read
 from fracslice.volume import plan, sample_scene
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from fracslice.errors import VolumeError
-from fracslice.mesh.extract import extract
+from fracslice.mesh.contouring import extract
 from fracslice.volume.bricks import INSIDE, Bricks
 from fracslice.volume.grid import NAME, from_grid, read_vdb, to_grid, write_vdb
 from tests.fields import blobs, bricks_of, grid_points

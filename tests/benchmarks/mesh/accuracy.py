@@ -13,7 +13,7 @@ import numpy as np
 
 from fracslice.formulas import Node, box, julia, menger, sphere, torus, transform
 from fracslice.kernel import reference
-from fracslice.mesh.extract import contour, extract
+from fracslice.mesh.contouring import contour, extract
 from fracslice.mesh.refine import refine
 from fracslice.volume import plan, sample_scene
 

@@ -14,7 +14,7 @@ import numpy as np
 from fracslice.formulas import julia, mandelbulb, menger, sphere
 from fracslice.mesh import Mesh
 from fracslice.mesh.checks import check_mesh
-from fracslice.mesh.extract import contour
+from fracslice.mesh.contouring import contour
 from fracslice.mesh.quantisation import quantise_mesh
 from fracslice.mesh.simplify import simplify
 from fracslice.mesh.solid import to_manifold
