@@ -30,6 +30,8 @@ from fracslice.volume import Lattice, sample
 from fracslice.work import Work
 from tests.threads import hurried, together
 
+pytestmark = pytest.mark.once
+
 ROOT = difference(julia(iterations=3), sphere(radius=0.5))
 
 

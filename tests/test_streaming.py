@@ -28,6 +28,8 @@ from fracslice.mesh.reading import read_mesh
 from fracslice.scene import Print, scene
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 
 def moved(node, *by):
     return transform(node, translate=by)

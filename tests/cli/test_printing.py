@@ -10,6 +10,8 @@ import pytest
 from fracslice.cli.main import run
 from PIL import Image
 
+pytestmark = pytest.mark.once
+
 TEXT = """<scene version="1">
   <solid size="20mm"><box/><transform translate="1.2 0 0"><box/></transform></solid>
   <print bridge="2mm"/>

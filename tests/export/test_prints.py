@@ -31,6 +31,8 @@ from fracslice.slicing.raster import Screen
 from fracslice.work import Work
 from tests.export import decoders, readers
 
+pytestmark = pytest.mark.once
+
 MACHINE = Printer("test", "Test", (96, 80), (24.0, 20.0), 30, portrait=True)
 ROOT = difference(menger(level=1), sphere(radius=0.9))
 JOB = SliceJob(size=12, layer=0.5, pixel=MACHINE.pixel)

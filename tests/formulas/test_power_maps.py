@@ -25,6 +25,8 @@ from fracslice.kernel.orbits import function_of_text
 from fracslice.scene.layout import formulas
 from tests.stability.bounds import verdict
 
+pytestmark = pytest.mark.once
+
 RNG = np.random.default_rng(6)
 POWER_MAPS = [f for f in formulas() if "growth" in f.hooks]
 

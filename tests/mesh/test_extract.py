@@ -19,6 +19,8 @@ from fracslice.mesh.spatial import self_intersecting_triangles
 from fracslice.volume.bricks import INSIDE, OUTSIDE, Bricks
 from tests.fields import blobs, bricks_of, grid_points, noise
 
+pytestmark = pytest.mark.once
+
 NATIVE = Path(__file__).parents[2] / "fracslice" / "native" / "mesh"
 
 

@@ -16,6 +16,8 @@ from fracslice.mesh.extract import contour
 from fracslice.mesh.quantisation import grid_planes
 from fracslice.volume import plan, sample_scene
 
+pytestmark = pytest.mark.once
+
 SOLIDS: dict[str, Node] = {
     "fractal": mandelbulb(iterations=6),
     "edges": menger(level=2),

@@ -23,6 +23,8 @@ from fracslice.scene import reads
 from fracslice.scene.view import Camera, Light, Shading, View
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 SIZE = 64, 32
 CAMERA = Camera(eye=(0, -3, 3), fov=15)
 WHITE = (1.0, 1.0, 1.0)

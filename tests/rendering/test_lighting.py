@@ -20,6 +20,8 @@ from fracslice.scene.view import Camera, Film, Fog, Light, Shading, View
 from fracslice.work import Work
 from tests.rendering.rays import directions
 
+pytestmark = pytest.mark.once
+
 SIZE = (24, 18)
 CAMERA = Camera(eye=(0, -4, 0), fov=40)
 SKY = Light(kind="sky", colour=(0.1, 0.2, 0.9), horizon=(0.9, 0.5, 0.2), ground=(0.1, 0.1, 0.1))

@@ -13,6 +13,8 @@ from fracslice.rendering.linking import Frame, link_frame
 from fracslice.rendering.setup import optics
 from fracslice.scene.view import Camera, Fog, Light, Shading, View
 
+pytestmark = pytest.mark.once
+
 CAMERA = Camera(eye=(2, -2, 1))
 PLAIN = (Light(shadows="no"),)
 BULB = mandelbulb(iterations=4)

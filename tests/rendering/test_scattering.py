@@ -27,6 +27,8 @@ from fracslice.rendering.units.shade import varied
 from fracslice.scene.view import Camera, Light, Shading, View
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 WHITE = (1.0, 1.0, 1.0)
 FURNACE = (Light(kind="sky", colour=WHITE, horizon=WHITE, ground=WHITE),)
 CAMERA = Camera(eye=(0, -4, 0), fov=20)

@@ -10,6 +10,8 @@ from fracslice.rendering import Renderer
 from fracslice.scene import library, read
 from fracslice.scene.view import Camera, Film, Shading, View
 
+pytestmark = pytest.mark.once
+
 BACK = (0.0, 0.0, 1.0)
 SHAPES: dict[str, Node] = {
     "box": box(size=(2, 2, 1)),

@@ -32,6 +32,8 @@ from fracslice.slicing.thickness import widths
 from fracslice.volume import extent
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 
 def checked(root: Node, **options: object) -> PrintReport:
     return check_layers(plan_stack(root, SliceJob(size=10, layer=0.1)), **options)  # type: ignore[arg-type]

@@ -18,6 +18,8 @@ from fracslice.slicing.compensation import compensate
 from fracslice.slicing.printers import Printer, printer
 from fracslice.slicing.raster import Screen, blur
 
+pytestmark = pytest.mark.once
+
 SMALL = Printer("small", "Small", (120, 100), (12.0, 10.0), 30)
 
 
