@@ -126,7 +126,7 @@ def test_only_a_step_is_repeated() -> None:
         orbit(sphere())
 
 
-@pytest.mark.parametrize("seed", stamped(range(20), (1, 2)))
+@pytest.mark.parametrize("seed", stamped(range(20), [1]))
 def test_a_random_hybrid_loses_no_inside_sample(seed: int) -> None:
     """`make nightly` tries hundreds."""
     assert lost(random_hybrid(seed), 64) == 0

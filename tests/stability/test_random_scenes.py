@@ -17,7 +17,7 @@ pytestmark = pytest.mark.once
 TREES, EACH = (2, 10, 16, 19, 25, 29, 50, 57, 69), 4
 """Trees with every kind of element that need little to be compiled, and four times other numbers."""
 
-RESOLUTION = 48
+RESOLUTION = 32
 
 
 @pytest.mark.parametrize("tree", stamped(TREES, TREES[1:2]))
