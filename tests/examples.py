@@ -238,6 +238,13 @@ REPRESENTATIVES = {
 }  # fmt: skip
 """Examples of which none is built like another; tests that are stamped on all have the others in a night."""
 
+STRUCTURES = {
+    "a step", "bend", "deep", "difference", "gyroid wall", "hybrid transformed", "julia 4d", "koch",
+    "mandelbox -1.5", "mandelbulb 7.5", "menger", "octahedron flake", "perlin noise", "repeat overlapping",
+    "smooth union", "sphere", "transform",
+}  # fmt: skip
+"""The few of them for tests that compile or mesh each: a loop, a tree, a fold, a lattice, a seam, a sum."""
+
 
 def stamped(cases: Iterable[Any], often: Collection[Any] = REPRESENTATIVES) -> list[Any]:
     """Cases of a test: those of `often` in every run, the others in `make nightly`."""

@@ -103,7 +103,7 @@ def test_the_main_job_needs_no_extra(ball_xml: Path) -> None:
         BLOCKED,
         "mesh ball.xml -o ball.3mf --resolution 16",
         "mesh ball.xml -o ball.ply --resolution 16",
-        "check ball.ply",
+        "check ball.ply --layer 1mm --pixel 0.5mm",
         "slice ball.xml -o ball.sl1 --printer sl1 --layer 5mm",
         "render ball.xml -o ball.exr --size 16x9 --samples 1 --device cpu",
         cwd=ball_xml.parent,

@@ -30,6 +30,8 @@ from fracslice.volume import Lattice, sample
 from fracslice.work import Work
 from tests.threads import hurried, together
 
+pytestmark = pytest.mark.once
+
 ROOT = difference(julia(iterations=3), sphere(radius=0.5))
 
 
@@ -78,7 +80,7 @@ def made(name: str, threads: int) -> str:
     return hashlib.sha256(MAKE[name](Work(threads=threads))).hexdigest()
 
 
-TIMES = {"samples": 150, "mesh": 40, "slices": 8, "picture": 8}
+TIMES = {"samples": 60, "mesh": 20, "slices": 6, "picture": 6}
 
 
 @pytest.mark.parametrize(("name", "times"), TIMES.items())

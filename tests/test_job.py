@@ -33,6 +33,8 @@ from fracslice.jobs import surfaces
 from fracslice.jobs.mesh import import_ahead
 from fracslice.scene import Print, read, scene
 
+pytestmark = pytest.mark.once
+
 BALL = scene(sphere(radius=3), size="40mm", name="ball")
 
 

@@ -58,9 +58,9 @@ def test_the_example_that_builds_and_meshes(tmp_path):
 
 
 def test_the_example_of_a_family(tmp_path):
-    arguments = [EXAMPLES / "a_family.py", tmp_path, "24"]
+    arguments = [EXAMPLES / "a_family.py", tmp_path, "24", "3"]
     subprocess.run([sys.executable, *map(str, arguments)], capture_output=True, check=True)
-    assert sorted(path.name for path in tmp_path.iterdir()) == [f"mandelbulb-{n}.stl" for n in range(2, 10)]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [f"mandelbulb-{n}.stl" for n in (2, 3)]
 
 
 def test_the_example_that_flies_around(tmp_path):

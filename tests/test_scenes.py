@@ -23,7 +23,6 @@ OFTEN = (
     "hybrid",
     "mandelbox",
     "menger-tower",
-    "own-formula",
     "pendant",
     "quaternion-julia",
     "three-worlds",

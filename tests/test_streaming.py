@@ -28,6 +28,8 @@ from fracslice.mesh.reading import read_mesh
 from fracslice.scene import Print, scene
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 
 def moved(node, *by):
     return transform(node, translate=by)
@@ -51,10 +53,10 @@ SCENES = {
         size="40mm",
     ),
     "touching": scene(flake(solid="tetrahedron", level=2), size="40mm"),
-    "thin": scene(shell(sphere(), thickness=0.01), size="40mm"),
+    "thin": scene(shell(sphere(), thickness=0.02), size="40mm"),
 }
 JOBS = {
-    "plain": MeshJob(resolution=64),
+    "plain": MeshJob(resolution=40),
     "largest": MeshJob(resolution=48, printing=Print(keep="largest")),
     "filled": MeshJob(resolution=48, printing=Print(cavities="fill")),
     "dust": MeshJob(resolution=48, dust=900),
@@ -71,7 +73,7 @@ CASES = [
 def pieces(monkeypatch: pytest.MonkeyPatch) -> None:
     """No mesh fits in memory, and pieces are small."""
     monkeypatch.setattr(surfaces, "available_bytes", lambda: 1)
-    monkeypatch.setattr(surfaces, "BRICKS", 40)
+    monkeypatch.setattr(surfaces, "BRICKS", 20)
 
 
 @pytest.mark.parametrize(("name", "job"), CASES)

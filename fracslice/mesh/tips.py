@@ -69,14 +69,22 @@ class Rings:
 
         `vertices`: integers (n,); `points`: float64 (n, 3). Returns int64 (n,).
         """
-        out = np.empty(len(points), np.int64)
-        for k, (best, point) in enumerate(zip(vertices, points, strict=True)):
-            last = -1
-            while best != last:
-                last, ring = best, self.ring(best)
-                best = ring[np.linalg.norm(self.mesh.vertices[ring] - point, axis=1).argmin()]
-            out[k] = best
+        out, moving = np.array(vertices, np.int64), np.arange(len(points))
+        while len(moving):
+            ring, of = self._rings(out[moving])
+            far = np.linalg.norm(self.mesh.vertices[ring] - points[moving[of]], axis=1)
+            order = np.lexsort([ring, far, of])
+            best = ring[order[np.searchsorted(of[order], np.arange(len(moving)))]]
+            moved = best != out[moving]
+            out[moving], moving = best, moving[moved]
         return out
+
+    def _rings(self, vertices: NDArray[np.int64]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+        """Corners of the triangles at each vertex, and the index of that vertex: int32 (k,), int64 (k,)."""
+        start, end = self._start[vertices], self._start[vertices + 1]
+        of = np.repeat(np.arange(len(vertices)), end - start)
+        corners = np.arange(len(of)) + (start - np.r_[0, np.cumsum(end - start)[:-1]])[of]
+        return self.mesh.triangles[self._corner[corners] // 3].ravel(), np.repeat(of, 3)
 
     def middles(self, vertices: NDArray[np.integer]) -> NDArray[np.float64]:
         """Centroid of each vertex and its neighbours.

@@ -13,6 +13,8 @@ from fracslice.scene.reader import reads
 from fracslice.scene.view import Camera
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 SIZE, COUNT = (48, 32), 8
 SCENE = """<scene version="1"><solid size="80mm"><mandelbulb iterations="{}"/></solid>
 <camera eye="1.6 0 0" target="0.9 0.1 0.2"/><animation duration="1s" fps="4" noise="fixed"/></scene>"""

@@ -102,7 +102,7 @@ def test_frames_are_made_at_once(path: Path, tmp_path: Path, monkeypatch: pytest
 
 def test_shards_make_the_frames_of_one_film(path: Path, tmp_path: Path) -> None:
     alone, shared = tmp_path / "alone", tmp_path / "shared"
-    exr = ["--frames", "0..2", "--exr", "--layers"]
+    exr = ["--frames", "0..1", "--exr", "--layers"]
     assert animate(path, "-o", alone, *exr) == 0
     with OpenEXR.File(str(alone / "frame00001.exr"), separate_channels=True) as file:
         channels = file.channels()

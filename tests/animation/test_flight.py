@@ -17,6 +17,8 @@ from fracslice.formulas import mandelbulb, sphere
 from fracslice.scene import scene
 from fracslice.scene.view import Camera, View
 
+pytestmark = pytest.mark.once
+
 LEAST = 0.05
 
 

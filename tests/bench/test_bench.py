@@ -133,9 +133,9 @@ def test_a_peer_needs_all_its_places():
 
 
 def test_shards_share_the_measurements(tmp_path: Path, peer: str) -> None:
-    task = BenchmarkTask(("sphere", "torus"), (16,), (Peer.read(peer),), repeats=1)
+    task = BenchmarkTask(("sphere",), (16,), (Peer.read(peer),), repeats=1)
     pieces = ResultFolder(str(tmp_path / "pieces"))
-    with pytest.raises(SharedError, match=r"this shard made [56] measurements; shard 1 writes the report"):
+    with pytest.raises(SharedError, match=r"this shard made [23] measurements; shard 1 writes the report"):
         measure(task, Work(1, cluster=Shard(pieces, 2, 2)))
     result = measure(task, Work(1, cluster=Shard(pieces, 1, 2)))
     alone = measure(task, Work(1))

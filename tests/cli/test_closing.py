@@ -9,6 +9,8 @@ import pytest
 from fracslice.cli.main import run
 from fracslice.cli.summary import Closing, duration
 
+pytestmark = pytest.mark.once
+
 SHELL = """<scene version="1"><solid unit="1mm"><difference>
 <box size="20 20 20"/><sphere radius="6"/></difference></solid></scene>"""
 

@@ -79,7 +79,8 @@ def test_size_set_and_base_change_what_is_made(ball, tmp_path, capfd):
     model = tmp_path / "b.stl"
     options = ("--size", "3cm", "--voxel", "1mm", "--set", "sphere.radius=2", "--base", "3mm")
     assert fracslice("mesh", ball, "-o", model, *options) == 0
-    assert fracslice("check", model, "--json", "--layer", "1mm") == 0
+    coarse = ("--layer", "1mm", "--pixel", "0.5mm", "--wall", "1mm", "--floor", "1mm")
+    assert fracslice("check", model, "--json", *coarse) == 0
     reported = json.loads(capfd.readouterr().out.partition("\n{")[2].join(["{", ""]))
     low, high = reported["bbox_mm"]
     assert high[0] - low[0] == pytest.approx(30, rel=2e-3)
@@ -128,7 +129,7 @@ def test_a_file_of_that_name_goes_before_a_shipped_scene(ball, tmp_path, monkeyp
 
 
 def test_check_says_whether_a_scene_would_print(ball, capfd):
-    assert fracslice("check", ball, "--resolution", 16, "--json") == 1, "it needs supports"
+    assert fracslice("check", ball, "--resolution", 16, "--size", "9mm", "--json") == 1, "it needs supports"
     reported = json.loads(capfd.readouterr().out)
     assert (reported["printable"], reported["components"], reported["genus"]) == (True, 1, 0)
 

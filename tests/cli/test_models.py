@@ -24,7 +24,8 @@ from fracslice.printing.problems import Problem, mends
 
 pytestmark = pytest.mark.once
 
-COARSE = ["--layer", "0.5mm", "--pixel", "0.5mm", "-q"]
+COARSE = ["--layer", "0.5mm", "--pixel", "0.5mm", "--wall", "0.4mm", "--floor", "0.4mm", "-q"]
+"""The solid is sampled as finely as its limits ask."""
 PLATE = (20, 20, 2)
 
 
@@ -58,7 +59,7 @@ def inverted(part: trimesh.Trimesh) -> trimesh.Trimesh:
     [
         ("floating.ply", [box(PLATE), ball(4, 8)], "1 island in the air"),
         ("bar.obj", [box((400, 10, 10))], "does not fit any known printer"),
-        ("sheet.stl", [box(PLATE), box((15, 0.05, 12), 1)], "of walls are thinner than 0.1 mm"),
+        ("sheet.stl", [box(PLATE), box((15, 0.05, 12), 1)], "of walls are thinner than 0.4 mm"),
         ("cavity.glb", [box((24, 20, 20)), inverted(box((18, 14, 14), 3))], "1 sealed cavity"),
     ],
 )
@@ -141,7 +142,7 @@ def test_an_object_has_one_verdict(tmp_path: Path, capfd: pytest.CaptureFixture[
     scene.write_text(STEP)
     assert run(["mesh", str(scene), "-o", str(model), "--resolution", "16", "-q"]) == 0
     for source in ([scene, "--resolution", "16"], [scene, "--layer", "0.1mm"], [model]):
-        assert run(["check", *map(str, source), "-q"]) == 1
+        assert run(["check", *map(str, source), *COARSE[4:]]) == 1
         out = capfd.readouterr().out
         assert out.count("would") == 1 and "would not print" in out and "  1 loose body: " in out
 
@@ -160,7 +161,7 @@ def test_a_model_with_faults_and_good_layers_has_one_verdict(
 def test_fix_writes_what_it_made(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     scene, made = tmp_path / "step.xml", tmp_path / "made.stl"
     scene.write_text(STEP)
-    run(["check", str(scene), "--layer", "0.1mm", "--fix", "-q", "--json", "-o", str(made)])
+    run(["check", str(scene), "--layer", "0.1mm", "--fix", *COARSE[4:], "--json", "-o", str(made)])
     report = json.loads(capfd.readouterr().out)
     assert "--bridge 1mm" in report["flags"]
     assert trimesh.load_mesh(made).body_count == 1
@@ -207,7 +208,7 @@ def test_a_page_holds_figures_problems_pictures_and_the_cross_section(
     balls: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     page, out = balls.with_name("balls.html"), balls.with_name("layers")
-    assert run(["slice", str(balls), "-o", str(out), *COARSE, "--html", str(page)]) == 0
+    assert run(["slice", str(balls), "-o", str(out), *COARSE[:4], "-q", "--html", str(page)]) == 0
     text = page.read_text()
     assert "ml" in text and "<h2>Would not print</h2>" in text and "<li>1 loose body: layer" in text
     picture = base64.b64decode(text.partition("base64,")[2].partition('"')[0])

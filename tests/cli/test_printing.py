@@ -10,10 +10,15 @@ import pytest
 from fracslice.cli.main import run
 from PIL import Image
 
+pytestmark = pytest.mark.once
+
 TEXT = """<scene version="1">
   <solid size="20mm"><box/><transform translate="1.2 0 0"><box/></transform></solid>
   <print bridge="2mm"/>
 </scene>"""
+
+LAYERS = "--layer", "0.5mm", "--pixel", "0.2mm", "--wall", "0.4mm", "--floor", "0.4mm"
+"""The solid is sampled as finely as its limits ask."""
 
 
 @pytest.fixture
@@ -48,7 +53,7 @@ def test_the_scene_is_obeyed_and_flags_override_it(pair: str, tmp_path: Path) ->
 def test_check_says_whether_it_would_print(
     pair: str, flags: list[str], status: int, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    layers = ["--layer", "0.5mm", "--pixel", "0.2mm", "--json", "-q"]
+    layers = [*LAYERS, "--json", "-q"]
     assert run(["check", pair, *layers, *flags]) == status
     report = json.loads(capfd.readouterr().out)
     assert bool(report["problems"]) == bool(status)
@@ -69,12 +74,11 @@ def test_check_ends_with_a_verdict(pair: str, tmp_path: Path, capfd: pytest.Capt
         run(["check", *arguments, "-q"])
         return capfd.readouterr().out.splitlines()
 
-    layers = "--layer", "0.5mm", "--pixel", "0.2mm"
-    assert lines(pair, *layers)[-1].endswith(", would print")
-    reported = lines(pair, *layers, "--wall", "3mm")
+    assert lines(pair, *LAYERS)[-1].endswith(", would print")
+    reported = lines(pair, *LAYERS, "--wall", "3mm")
     assert reported[0].endswith(", would not print:")
     assert " of walls are thinner than 3 mm: at " in reported[-1]
-    reported = lines(pair, *layers, "--bridge", "0", "--set", "transform.rotate=0 1 0 45")
+    reported = lines(pair, *LAYERS, "--bridge", "0", "--set", "transform.rotate=0 1 0 45")
     assert reported[0].endswith(", would print with supports:")
     assert any(line.startswith("  1 island in the air, the first from layer ") for line in reported)
 
@@ -103,7 +107,7 @@ def test_a_filament_has_a_weight_of_its_own_and_no_problems_of_resin(
 def test_the_worst_layers_are_named(pair: str, flags: list[str], tmp_path: Path) -> None:
     """Of a solid that nothing is wrong with it is the lowest."""
     sheet = tmp_path / "worst.png"
-    run(["check", pair, "--layer", "1mm", "--pixel", "0.5mm", "--picture", str(sheet), "-q", *flags])
+    run(["check", pair, *LAYERS, "--picture", str(sheet), "-q", *flags])
     with Image.open(sheet) as image:
         assert min(image.size) > 20
         assert (np.asarray(image.convert("L"))[-20:] < 64).any(), "a line says which layer it is"

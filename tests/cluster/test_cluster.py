@@ -378,28 +378,6 @@ def test_an_object_store_keeps_the_first_of_two_results(tmp_path: Path) -> None:
     assert pieces.read("job", "piece", 1, 3) == b"ir"
 
 
-def test_local_workers_are_processes(tmp_path: Path) -> None:
-    with connect("local:2", str(tmp_path / "pieces"), 2) as pool:
-        result = pool.client.scheduler_info(n_workers=-1)["workers"].values()
-        arenas = pool.client.run(os.getenv, "MALLOC_ARENA_MAX").values()
-        blocked = pool.client.run(signal.pthread_sigmask, signal.SIG_BLOCK, [])
-    assert [worker["nthreads"] for worker in result] == [1, 1] and set(arenas) == {"1"}
-    assert all(signal.SIGINT in of for of in blocked.values()), "Ctrl-C is for the client"
-    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
-
-
-def test_local_workers_that_do_not_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from dask import config
-
-    failing = pytest.raises(ClusterError, match="local:1: no worker started: No module named 'nobodys'")
-    with config.set({"distributed.worker.preload": ["nobodys"]}), failing, connect("local:1", "x"):
-        pass
-    monkeypatch.setattr(connection, "START", 0.1)
-    late = pytest.raises(ClusterError, match=r"local:1: no worker started within 0\.1 s")
-    with late, connect("local:1", "x"):
-        pass
-
-
 def test_a_client_of_dask_is_a_cluster(
     expected: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

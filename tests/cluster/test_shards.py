@@ -28,8 +28,6 @@ from fracslice.work import Work
 
 from .test_cluster import RECIPE, rendered, sliced
 
-pytestmark = pytest.mark.once
-
 pytest.importorskip("fsspec")
 
 

@@ -23,6 +23,8 @@ from fracslice.records import MeshJob
 from fracslice.scene import Print, library, read, scene
 from tests.scene.trees import OTHERS, SHAPES
 
+pytestmark = pytest.mark.once
+
 CORE = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
 IMPLICIT = "{http://schemas.3mf.io/3dmanufacturing/implicit/2023/12}"
 LEVEL_SET = "{http://schemas.3mf.io/3dmanufacturing/volumetric/2022/01}levelset"

@@ -29,7 +29,10 @@ from fracslice.slicing import SliceJob, Slicer, adapted, plan_stack
 from fracslice.slicing.printers import PRINTERS, Printer
 from fracslice.slicing.raster import Screen
 from fracslice.work import Work
+from tests.examples import stamped
 from tests.export import decoders, readers
+
+pytestmark = pytest.mark.once
 
 MACHINE = Printer("test", "Test", (96, 80), (24.0, 20.0), 30, portrait=True)
 ROOT = difference(menger(level=1), sphere(radius=0.9))
@@ -143,7 +146,11 @@ def printed(machine: Printer, layer: float, path: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("name", PRINTERS)
+ONE_EACH = {machine.file: name for name, machine in PRINTERS.items()}.values()
+"""A printer for each format."""
+
+
+@pytest.mark.parametrize("name", stamped(PRINTERS, ONE_EACH))
 def test_one_object_through_every_printer(name: str, tmp_path: Path) -> None:
     """An eighth of the pixels of the screen along each side, as the screen is turned and mirrored."""
     machine = PRINTERS[name]

@@ -11,6 +11,8 @@ from fracslice.formulas.field import Precision
 from fracslice.kernel import compile_scene, link, reference
 from tests.examples import EXAMPLES
 
+pytestmark = pytest.mark.once
+
 TORN = mandelbulb(iterations=4, power=7.5)
 SEAM = union(mandelbulb(iterations=4), sphere(radius=1.02), smooth=0.1)
 DIFFERENT: dict[str, Node] = {

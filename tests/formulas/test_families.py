@@ -31,7 +31,7 @@ from fracslice.formulas import (
 from fracslice.formulas.inversions import MIDDLE, mirrors
 from fracslice.kernel import compile_scene
 from tests.benchmarks.formulas import pictures
-from tests.examples import EXAMPLES, stamped
+from tests.examples import EXAMPLES, STRUCTURES, stamped
 
 pytestmark = pytest.mark.once
 
@@ -115,9 +115,9 @@ def test_every_example_has_a_picture() -> None:
     assert min(contrast.values()) > 60, min(contrast, key=lambda name: contrast[name])
 
 
-@each_family
+@pytest.mark.parametrize("name", stamped(FAMILIES, STRUCTURES))
 def test_its_mesh_is_closed(name: str) -> None:
-    mesh = make_mesh(FAMILIES[name], resolution=48)
+    mesh = make_mesh(FAMILIES[name], resolution=32)
     assert mesh.is_watertight and mesh.volume > 0
     assert mesh.report.mesh.printable
 

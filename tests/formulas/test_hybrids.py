@@ -126,7 +126,7 @@ def test_only_a_step_is_repeated() -> None:
         orbit(sphere())
 
 
-@pytest.mark.parametrize("seed", stamped(range(20), range(4)))
+@pytest.mark.parametrize("seed", stamped(range(20), [1]))
 def test_a_random_hybrid_loses_no_inside_sample(seed: int) -> None:
     """`make nightly` tries hundreds."""
     assert lost(random_hybrid(seed), 64) == 0
@@ -139,7 +139,7 @@ def test_the_bound_of_a_hybrid_holds() -> None:
     assert result.points > 5000 and result.violations == 0
 
 
-@pytest.mark.parametrize("seed", [5, 12])
+@pytest.mark.parametrize("seed", stamped([5, 12], [12]))
 def test_proofs_lose_no_inside_sample(seed: int) -> None:
     assert lost(random_hybrid(seed), 48, proved=True) == 0
 

@@ -18,6 +18,8 @@ from fracslice.kernel.steps import trace
 from tests.benchmarks.formulas.steps import SCENES
 from tests.budgets.instructions import assembly, sizes
 
+pytestmark = pytest.mark.once
+
 SHIFT = (0.3, -0.2, 0.1)
 RNG = np.random.default_rng(0)
 

@@ -25,6 +25,8 @@ from fracslice.kernel.orbits import function_of_text
 from fracslice.scene.layout import formulas
 from tests.stability.bounds import verdict
 
+pytestmark = pytest.mark.once
+
 RNG = np.random.default_rng(6)
 POWER_MAPS = [f for f in formulas() if "growth" in f.hooks]
 
@@ -58,8 +60,8 @@ def test_what_follows_from_a_power_is_true(formula, power: float) -> None:  # ty
     "root",
     [
         lambda_bulb(power=4.5, iterations=4),
-        lambda_bulb(power=7.5, iterations=4),
-        orbit(lambda_bulb(power=4.5), abox(), iterations=2),
+        pytest.param(lambda_bulb(power=7.5, iterations=4), marks=pytest.mark.nightly),
+        pytest.param(orbit(lambda_bulb(power=4.5), abox(), iterations=2), marks=pytest.mark.nightly),
     ],
 )
 def test_the_bound_holds_beside_tears(root: Node) -> None:

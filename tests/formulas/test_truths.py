@@ -9,6 +9,8 @@ from fracslice.formulas import names
 
 from .truths import TRUTHS
 
+pytestmark = pytest.mark.once
+
 
 def test_something_is_known_of_every_formula() -> None:
     assert {name for name, truths in TRUTHS.items() if truths} == set(names())

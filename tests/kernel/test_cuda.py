@@ -17,7 +17,7 @@ import pytest
 from fracslice.errors import KernelError
 from fracslice.formulas import Node, sphere
 from fracslice.kernel import cuda, cuda_loops, cuda_source, link
-from tests.examples import DEFINED, EXAMPLES, stamped
+from tests.examples import DEFINED, EXAMPLES, STRUCTURES, stamped
 from tests.kernel.cuda_ptx import compiled
 
 pytestmark = pytest.mark.once
@@ -27,7 +27,7 @@ installed = pytest.mark.skipif(
 )
 
 
-SIMULATED = "foam of walls", "hybrid transformed", "mandelbulb 7.5", "menger", "smooth union", "twist x"
+SIMULATED = "hybrid transformed", "menger", "smooth union"
 """Examples that are run on the simulator in every run; the others in a night."""
 
 
@@ -35,7 +35,7 @@ SIMULATED = "foam of walls", "hybrid transformed", "mandelbulb 7.5", "menger", "
 class TestMachineCode:
     """PTX for an H100 or H200, which needs no GPU to be compiled."""
 
-    @pytest.mark.parametrize("name", stamped(EXAMPLES | DEFINED))
+    @pytest.mark.parametrize("name", stamped(EXAMPLES | DEFINED, STRUCTURES))
     def test_float32_kernels_hold_no_float64(self, name: str, tmp_path: Path) -> None:
         ptx = points_of((EXAMPLES | DEFINED)[name], 32, tmp_path)
         assert ".f32" in ptx

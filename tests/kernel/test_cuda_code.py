@@ -22,6 +22,8 @@ from fracslice.kernel import cuda_driver, cuda_launching, cuda_memory
 from fracslice.kernel import cuda_memory as cuda_api
 from tests.kernel.cuda_host import HostDriver, driven, words
 
+pytestmark = pytest.mark.once
+
 installed = pytest.mark.skipif(
     importlib.util.find_spec("numba_cuda") is None, reason="numba-cuda is not installed"
 )

@@ -21,6 +21,8 @@ from fracslice.kernel.boxes import proved_half
 from fracslice.kernel.intervals import Interval
 from fracslice.kernel.reference import enclosure, reference
 
+pytestmark = pytest.mark.once
+
 ROOTS = {
     "mandelbox": mandelbox(iterations=6),
     "bristorbrot": bristorbrot(iterations=8),

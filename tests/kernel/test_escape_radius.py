@@ -86,7 +86,9 @@ def test_no_orbit_comes_back_between_the_samples(root: Node, radius: float) -> N
     "root",
     [
         orbit(burning_ship(power=15), iterations=2),
-        orbit(benesi(repeat=2), iterations=2, julia=(-0.18, -0.29, 0.25)),
+        pytest.param(
+            orbit(benesi(repeat=2), iterations=2, julia=(-0.18, -0.29, 0.25)), marks=pytest.mark.nightly
+        ),
         orbit(transform(mandelbulb(power=26), rotate=(1, 2, 3, 7), scale=0.9, translate=(-0.1, 0.04, 0.1))),
     ],
 )
@@ -114,8 +116,11 @@ def test_denser_samples_find_no_orbit_that_comes_back(seed: int) -> None:
         orbit(mandelbox(scale=-1.5)),
         orbit(cosine_bulb(power=5)),
         orbit(lambda_bulb(power=4.5)),
-        orbit(benesi(), TURNED),
-        orbit(quaternion_mandelbrot(julia=(0.1, 0.2, 0.3)), TURNED, kifs_octahedron()),
+        pytest.param(orbit(benesi(), TURNED), marks=pytest.mark.nightly),
+        pytest.param(
+            orbit(quaternion_mandelbrot(julia=(0.1, 0.2, 0.3)), TURNED, kifs_octahedron()),
+            marks=pytest.mark.nightly,
+        ),
     ],
 )
 def test_the_least_size_is_a_lower_bound(root: Node) -> None:

@@ -20,6 +20,8 @@ from fracslice.kernel import compile_scene
 from fracslice.kernel.intervals import ARRAYS, Interval
 from fracslice.kernel.reference import enclosure, reference
 
+pytestmark = pytest.mark.once
+
 RNG = np.random.default_rng(8)
 KALEIDOSCOPE = orbit(
     kifs_icosahedron(),

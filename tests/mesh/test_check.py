@@ -21,6 +21,7 @@ from fracslice.mesh.model import concatenate
 from fracslice.mesh.shells import nesting
 from fracslice.mesh.spatial import build, self_intersecting_triangles
 from fracslice.mesh.topology import component_sizes, edge_topology
+from tests.examples import stamped
 
 from .shapes import BAD, GOOD, cube, inverted, sphere, torus, with_moved
 
@@ -149,7 +150,7 @@ def meet(points: np.ndarray, shared: int) -> bool:
     return not np.cross(m, n).any() and m @ n > 0
 
 
-@pytest.mark.parametrize("shared", [0, 1, 2])
+@pytest.mark.parametrize("shared", stamped([0, 1, 2], [1, 2]))
 def test_pairs_of_triangles_meet_as_integers_say(shared: int) -> None:
     """On a small grid, where most pairs touch, lie in one plane or miss each other narrowly."""
     random, result = np.random.default_rng(shared), []

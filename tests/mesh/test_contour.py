@@ -43,6 +43,8 @@ from fracslice.volume import Bricks, plan, sample_scene
 from fracslice.volume.accuracy import surface_error
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 
 def made(root: Node, resolution: float) -> Mesh:
     planned = plan(root, resolution)

@@ -16,6 +16,8 @@ from fracslice.kernel import reference
 from fracslice.mesh.contouring import Refiner
 from fracslice.volume import Bricks, plan, sample_scene
 
+pytestmark = pytest.mark.once
+
 
 def cells_of(bricks: Bricks) -> Cells:
     signs = bricks.signs

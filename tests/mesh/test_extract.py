@@ -18,6 +18,8 @@ from fracslice.mesh.spatial import self_intersecting_triangles
 from fracslice.volume.bricks import INSIDE, OUTSIDE, Bricks
 from tests.fields import blobs, bricks_of, grid_points, noise
 
+pytestmark = pytest.mark.once
+
 NATIVE = Path(__file__).parents[2] / "fracslice" / "native" / "mesh"
 
 
@@ -60,7 +62,7 @@ def accepted(mesh: Mesh) -> bool:
 
 @pytest.mark.parametrize("side", [8, 16, 24])
 def test_noise_gives_a_closed_manifold(side: int) -> None:
-    for seed in range(2000 if side == 8 else 200 if side == 16 else 40):
+    for seed in range(600 if side == 8 else 70 if side == 16 else 20):
         mesh = extract(bricks_of(noise(seed, side, spread=seed % 7)))
         assert_closed_manifold(mesh)
         assert accepted(mesh)

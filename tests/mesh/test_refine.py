@@ -41,7 +41,7 @@ def made(root: Node, resolution: float) -> tuple[Plan, Mesh]:
     ("root", "volume"), [(sphere(), 4 / 3 * np.pi), (torus(radius=1, tube=0.4), 2 * np.pi**2 * 0.16)]
 )
 def test_a_smooth_surface_is_as_near_as_asked(root: Node, volume: float) -> None:
-    planned, coarse = made(root, 48)
+    planned, coarse = made(root, 24)
     fine, done = refine(planned.root, coarse, 1e-3 * planned.voxel, planned.voxel)
     assert check_mesh(fine).printable and done.left == 0 and done.from_triangles == len(coarse.triangles)
     assert abs(fine.volume - volume) < abs(coarse.volume - volume) / 8
@@ -147,7 +147,7 @@ def test_what_is_left_is_farther_off_than_the_chord() -> None:
 
 
 def test_a_rough_surface_stays_a_solid() -> None:
-    planned, mesh = made(mandelbulb(iterations=6), 64)
+    planned, mesh = made(mandelbulb(iterations=6), 40)
     fine, _ = refine(planned.root, mesh, 0.02 * planned.voxel, planned.voxel)
     assert len(fine.triangles) > len(mesh.triangles)
     assert check_mesh(fine).printable

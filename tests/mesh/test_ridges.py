@@ -22,6 +22,8 @@ from fracslice.mesh.tips import pointed_in, with_tips
 from fracslice.volume import plan, sample_scene
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 THIRD = 3**-0.5
 TETRAHEDRON = -THIRD * np.array([(1, 1, 1, -0.5), (1, -1, -1, -0.5), (-1, 1, -1, -0.5), (-1, -1, 1, -0.5)])
 """Half spaces: normals, and distances from the origin."""

@@ -16,6 +16,8 @@ from fracslice.mesh.contouring import contour
 from fracslice.mesh.quantisation import grid_planes
 from fracslice.volume import plan, sample_scene
 
+pytestmark = pytest.mark.once
+
 SOLIDS: dict[str, Node] = {
     "fractal": mandelbulb(iterations=6),
     "edges": menger(level=2),
@@ -27,7 +29,7 @@ SOLIDS: dict[str, Node] = {
 @cache
 def made(name: str) -> tuple[Mesh, np.ndarray]:
     """A mesh as it was contoured, and the planes of its grid."""
-    planned = plan(SOLIDS[name], 40)
+    planned = plan(SOLIDS[name], 24)
     bricks = sample_scene(planned)
     return contour(planned.root, bricks), grid_planes(bricks.signs)
 

@@ -18,6 +18,8 @@ from fracslice.scene import scene
 from fracslice.volume import plan, sample_scene
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 
 def made(root: Node, resolution: float, threads: int = 2) -> tuple[Mesh, Mesh, float]:
     """Without and with tips; the voxel."""

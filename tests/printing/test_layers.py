@@ -8,6 +8,7 @@ import pytest
 
 from fracslice.errors import VolumeError
 from fracslice.formulas import Node, box, cone, sphere, transform, union
+from fracslice.printing.problems import Limits
 from fracslice.scene import Print
 from fracslice.slicing import SliceJob, plan_stack
 from fracslice.slicing.layer_checks import PrintReport, check_layers
@@ -17,7 +18,9 @@ pytestmark = pytest.mark.once
 
 def checked(root: Node, **printing: float | str) -> PrintReport:
     how = Print(**printing)  # type: ignore[arg-type]
-    return check_layers(plan_stack(root, SliceJob(size=20, layer=0.2, pixel=(0.1, 0.1), printing=how)))
+    coarse = Limits(wall=1, floor=1)  # the solid is sampled as finely as its limits ask
+    job = SliceJob(size=20, layer=0.2, pixel=(0.1, 0.1), printing=how)
+    return check_layers(plan_stack(root, job), coarse)
 
 
 @pytest.mark.parametrize(

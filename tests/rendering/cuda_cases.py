@@ -26,7 +26,7 @@ from fracslice.rendering.linking import Frame, link_frame
 from fracslice.rendering.setup import optics
 from fracslice.scene.view import Camera, Film, Fog, Light, Shading, View
 
-WIDTH, HEIGHT = 11, 9
+WIDTH, HEIGHT = 8, 6
 SUN = Light(kind="sun", position=(1.0, -2.0, 3.0))
 SKY = Light(kind="sky", strength=0.5)
 SOFT = (

@@ -15,6 +15,8 @@ from fracslice.scene.view import Camera, View
 
 from .rays import distances
 
+pytestmark = pytest.mark.once
+
 CAMERA = Camera(eye=(2.1, -1.3, 0.9), target=(0.2, 0.1, -0.1), up=(0.1, 0.0, 1.0), fov=70.0)
 RIGHT, UP, FORWARD = (np.array(axis) for axis in (CAMERA.right, CAMERA.above, CAMERA.forward))
 EYE, REACH = np.array(CAMERA.eye), float(np.linalg.norm(np.subtract(CAMERA.eye, CAMERA.target)))

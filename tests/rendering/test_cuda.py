@@ -24,7 +24,7 @@ pytestmark = [
 ]
 
 
-SIMULATED = "bodies that glow", "depth of field", "glass and mirrors", "surroundings, a sun that rays meet"
+SIMULATED = "glass and mirrors", "surroundings, a sun that rays meet"
 """Cases of every run; the others are of a night."""
 
 

@@ -14,6 +14,8 @@ from fracslice.rendering import Renderer, denoising
 from fracslice.scene.view import Camera, Light, View
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 SIZE = 64, 48
 VIEW = View(
     camera=Camera(eye=(0, -5, 1.5), fov=36),

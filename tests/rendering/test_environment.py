@@ -22,6 +22,9 @@ from fracslice.rendering.units.weights import facet_density
 from fracslice.scene import reads
 from fracslice.scene.view import Camera, Light, Shading, View
 from fracslice.work import Work
+from tests.examples import stamped
+
+pytestmark = pytest.mark.once
 
 SIZE = 64, 32
 CAMERA = Camera(eye=(0, -3, 3), fov=15)
@@ -206,7 +209,7 @@ def irradiance(light: np.ndarray, rough: float | None) -> float:
 
 
 @pytest.mark.parametrize("paths", ["no", "yes"])
-@pytest.mark.parametrize("rough", [None, 0.3])
+@pytest.mark.parametrize("rough", stamped([None, 0.3], [0.3]))
 def test_a_plane_has_the_light_of_its_surroundings(tmp_path: Path, paths: str, rough: float | None) -> None:
     """One pixel of the picture is a quarter of its light: a path of the surface alone hardly meets it."""
     light = sky(200, 8, 32)

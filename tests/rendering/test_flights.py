@@ -11,6 +11,8 @@ from fracslice.rendering.live import CameraInput
 from fracslice.rendering.setup import RenderSetup, clearance, prepare
 from fracslice.scene.view import Camera, View
 
+pytestmark = pytest.mark.once
+
 AHEAD = CameraInput(forward=1, pace=2)
 
 

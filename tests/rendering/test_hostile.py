@@ -24,6 +24,8 @@ from fracslice.rendering import Renderer, develop
 from fracslice.scene.view import Camera, Film, Fog, Light, Shading, View
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 BULB = mandelbulb(iterations=4)
 FAR = Camera(eye=(1e4, 3, 2), fov=0.02)
 HOSTILE: dict[str, tuple[Node, View]] = {

@@ -18,7 +18,10 @@ from fracslice.rendering.units.pixel import linear
 from fracslice.rendering.units.shade import dielectric, goes_on, lacquer
 from fracslice.scene.view import Camera, Film, Fog, Light, Shading, View
 from fracslice.work import Work
+from tests.examples import stamped
 from tests.rendering.rays import directions
+
+pytestmark = pytest.mark.once
 
 SIZE = (24, 18)
 CAMERA = Camera(eye=(0, -4, 0), fov=40)
@@ -137,7 +140,7 @@ def test_an_edge_of_glass_is_no_line() -> None:
 
 
 @pytest.mark.parametrize("kind", ["orthographic", "perspective"])
-@pytest.mark.parametrize("height", [pytest.param(1, marks=pytest.mark.nightly), 2, 6, 18])
+@pytest.mark.parametrize("height", stamped([1, 2, 6, 18], [2, 6]))
 def test_a_glowing_ball_is_as_bright_at_any_size(kind: str, height: int) -> None:
     """L (r / d)^2 cos, the mean over the picture.
 
@@ -269,7 +272,7 @@ def test_height_fog_is_the_integral_of_its_density(slope: float) -> None:
     assert height_fog(t, np.float64(end), np.float64(slope), **fog) == pytest.approx(np.exp(-depth), rel=1e-6)
 
 
-@pytest.mark.parametrize("height", [None, 1e6])
+@pytest.mark.parametrize("height", stamped([None, 1e6], [None]))
 def test_fog_scatters_the_light_that_no_surface_shadows(height: float | None) -> None:
     """Of a sun of strength 1, albedo / 4 (1 - exp(-density distance)); nothing of it under a roof."""
     wall = material(box(size=(9, 0.2, 9)), colour=(0, 0, 0), specular=0)

@@ -12,6 +12,9 @@ from fracslice.kernel.linker import link
 from fracslice.rendering.linking import Frame, link_frame
 from fracslice.rendering.setup import optics
 from fracslice.scene.view import Camera, Fog, Light, Shading, View
+from tests.examples import stamped
+
+pytestmark = pytest.mark.once
 
 CAMERA = Camera(eye=(2, -2, 1))
 PLAIN = (Light(shadows="no"),)
@@ -82,7 +85,7 @@ def test_materials_change_no_field() -> None:
     assert link(material(BULB, colour=(1, 0, 0, 0, 1, 0), clear=0.5)).source == link(BULB).source
 
 
-@pytest.mark.parametrize("trap", TRAPS)
+@pytest.mark.parametrize("trap", stamped(TRAPS, ["point", "planes"]))
 def test_traps_colour_pictures_differently_and_leave_the_shape(trap: str) -> None:
     """One trap per material: a deeper one takes precedence. The field's code does not know of it."""
     plain, seen = material(BULB, palette="viridis"), material(BULB, palette="viridis", trap=trap)

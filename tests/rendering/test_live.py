@@ -151,7 +151,6 @@ def test_a_new_kernel_shows_that_it_compiles(
 ) -> None:
     monkeypatch.setenv("FRACSLICE_CACHE", str(tmp_path / "kernels"))
     for solid in (
-        '<mandelbulb power="5"/>',
         '<mandelbulb power="6"/>',
         '<material colour="1 0 0 0 1 0 0 0 1"><union><mandelbulb power="6"/><box/></union></material>',
     ):

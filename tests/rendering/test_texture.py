@@ -16,6 +16,8 @@ from fracslice.scene import reads
 from fracslice.scene.view import Camera, Shading, View
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 COLOURS = ((255, 0, 0), (0, 255, 0), (0, 0, 255), (255, 255, 0))
 
 

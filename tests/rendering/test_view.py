@@ -10,6 +10,8 @@ from fracslice.rendering import Renderer
 from fracslice.scene import library, read
 from fracslice.scene.view import Camera, Film, Shading, View
 
+pytestmark = pytest.mark.once
+
 BACK = (0.0, 0.0, 1.0)
 SHAPES: dict[str, Node] = {
     "box": box(size=(2, 2, 1)),
@@ -25,8 +27,8 @@ LIBRARY = ("lattice-cube", "menger-ball", "menger-sponge", "twisted-vase", "meng
 
 @pytest.mark.parametrize(
     ("name", "size"),
-    [(name, size) for name in SHAPES for size in ((64, 36), (36, 64))]
-    + [(name, (36, 64)) for name in LIBRARY],
+    [(name, size) for name in SHAPES for size in ((48, 27), (27, 48))]
+    + [(name, (27, 48)) for name in LIBRARY],
 )
 def test_the_whole_object_is_in_view_and_fills_it(name: str, size: tuple[int, int]) -> None:
     view = View(film=Film(background=BACK), shading=Shading(mode="depth"))

@@ -12,6 +12,8 @@ from fracslice.formulas import Node, cylinder, menger, sphere
 from fracslice.slicing import SliceJob, Slicer, Stack, adapted, plan_stack
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 LEAST, MOST = 0.05, 0.2
 
 

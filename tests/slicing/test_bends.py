@@ -8,6 +8,8 @@ import pytest
 from fracslice.formulas import Node, box, cylinder, difference, menger, repeat, sphere, transform
 from fracslice.slicing import Contours, SliceJob, Slicer, Stack, plan_stack
 
+pytestmark = pytest.mark.once
+
 PIXEL = 0.2
 
 

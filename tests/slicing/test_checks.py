@@ -32,9 +32,15 @@ from fracslice.slicing.thickness import widths
 from fracslice.volume import extent
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
 
-def checked(root: Node, **options: object) -> PrintReport:
-    return check_layers(plan_stack(root, SliceJob(size=10, layer=0.1)), **options)  # type: ignore[arg-type]
+
+COARSE = Limits(wall=0.4, floor=0.4)
+"""The solid is sampled as finely as its limits ask."""
+
+
+def checked(root: Node, limits: Limits = COARSE) -> PrintReport:
+    return check_layers(plan_stack(root, SliceJob(size=10, layer=0.1)), limits)
 
 
 def runs_of(image: np.ndarray) -> Runs:
@@ -118,7 +124,7 @@ def test_cup_that_is_open_above_and_trap_that_is_open_below() -> None:
 def test_cups_on_the_plate_count_when_they_are_deep(depth: float, count: int) -> None:
     """A hole through all, with a way out to the sides `depth` mm above the plate."""
     hole, way = box(size=(0.5, 0.5, 3)), box(size=(2, 0.1, 0.1))
-    limits = Limits(deep=0.5)
+    limits = Limits(wall=0.4, floor=0.4, deep=0.5)
     report = checked(difference(CUBE, hole, at(way, 0, 0, -0.45 + depth / 10)), limits=limits)
     assert len(report.cups) == len(report.problems) == count
 
@@ -207,7 +213,7 @@ def test_a_ball_on_the_plate_would_print_with_supports() -> None:
 @pytest.mark.parametrize("width", [0.008, 0.016, 0.05])
 def test_thin_walls(width: float) -> None:
     wall = 10 * width
-    report = checked(union(box(size=(1, 1, 0.2)), at(box(size=(1, width, 0.7)), 0, 0, 0.35)))
+    report = checked(union(box(size=(1, 1, 0.2)), at(box(size=(1, width, 0.7)), 0, 0, 0.35)), Limits())
     assert report.walls is not None
     assert report.walls.smallest == pytest.approx(wall, abs=0.055)
     assert ("walls" in [p.kind for p in report.problems]) == (wall < 0.1)

@@ -35,6 +35,8 @@ from fracslice.slicing.layers import Sampler
 from fracslice.work import Work
 from tests.examples import EXAMPLES, stamped
 
+pytestmark = pytest.mark.once
+
 FINITE = [name for name, root in EXAMPLES.items() if root.bounds.box.finite]
 
 

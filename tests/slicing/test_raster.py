@@ -17,6 +17,8 @@ from fracslice.slicing import Layer, SliceJob, Slicer, Stack, plan_stack
 from fracslice.slicing.printers import Printer, printer
 from fracslice.slicing.raster import Screen, blur, compensate
 
+pytestmark = pytest.mark.once
+
 SMALL = Printer("small", "Small", (120, 100), (12.0, 10.0), 30)
 
 

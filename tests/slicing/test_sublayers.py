@@ -16,6 +16,8 @@ from fracslice.slicing.layers import MeanSlicer
 from fracslice.slicing.raster import Screen
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 SLOPE = 0.12
 
 

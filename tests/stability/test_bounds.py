@@ -20,7 +20,7 @@ from fracslice.formulas import (
     union,
 )
 from fracslice.kernel import compile_scene
-from tests.examples import EXAMPLES
+from tests.examples import EXAMPLES, STRUCTURES, stamped
 
 from .bounds import verdict
 from .draws import drawn
@@ -58,26 +58,31 @@ HARD: dict[str, Node] = {
 """Where bounds were once exceeded."""
 WHOLE = [name for name in EXAMPLES if not name.startswith("hybrid")]
 """Examples whose elements are solids of their own, as steps of hybrids (`test_hybrids`) are not."""
+OFTEN = {
+    "Julia set in pieces", "hollow offset", "seam of two", "dust of power 12", "torn seam",
+    "cut off by a deep one", "torn and grown", "seam, power 24", "seam of folds", "wall, power 7.5",
+}  # fmt: skip
+"""Those below of every run; the others in a night."""
 
 
-@pytest.mark.parametrize("name", WHOLE)
+@pytest.mark.parametrize("name", stamped(WHOLE))
 def test_the_bound_holds(name: str) -> None:
     assert verdict(EXAMPLES[name], 50_000).violations == 0
 
 
-@pytest.mark.parametrize("name", WHOLE)
+@pytest.mark.parametrize("name", stamped(WHOLE, STRUCTURES))
 def test_the_bound_holds_with_other_numbers(name: str) -> None:
     root = drawn(EXAMPLES[name], np.random.default_rng(2), 0.5)
     assert verdict(root, 50_000).violations == 0
 
 
-@pytest.mark.parametrize("name", SEAMS)
+@pytest.mark.parametrize("name", stamped(SEAMS, OFTEN))
 def test_seams_cuts_walls_and_folds_of_fractals(name: str) -> None:
     result = verdict(SEAMS[name], 100_000)
     assert result.violations == 0 and result.points > 50_000
 
 
-@pytest.mark.parametrize("name", HARD)
+@pytest.mark.parametrize("name", stamped(HARD, OFTEN))
 def test_the_bound_holds_where_it_did_not(name: str) -> None:
     result = verdict(HARD[name], 200_000, seed=1)
     assert result.violations == 0 and result.points > 100_000

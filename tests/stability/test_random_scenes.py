@@ -17,10 +17,10 @@ pytestmark = pytest.mark.once
 TREES, EACH = (2, 10, 16, 19, 25, 29, 50, 57, 69), 4
 """Trees with every kind of element that need little to be compiled, and four times other numbers."""
 
-RESOLUTION = 48
+RESOLUTION = 32
 
 
-@pytest.mark.parametrize("tree", stamped(TREES, TREES[1:3]))
+@pytest.mark.parametrize("tree", stamped(TREES, TREES[1:2]))
 def test_a_random_scene_is_a_solid_of_its_own_volume(tree: int) -> None:
     result = {numbers: volumes(random_scene(tree, numbers), RESOLUTION) for numbers in range(EACH)}
     assert {numbers: one.faults for numbers, one in result.items() if one.faults} == {}
@@ -31,7 +31,9 @@ def test_the_same_seeds_make_the_same_scene() -> None:
     assert len({random_scene(3, k) for k in range(EACH)}) == EACH
 
 
-@pytest.mark.parametrize("formula", LEAVES, ids=lambda formula: formula.name)
+@pytest.mark.parametrize(
+    "formula", stamped(LEAVES, [f for f in LEAVES if f.name != "orbit"]), ids=lambda formula: formula.name
+)
 def test_every_shape_can_be_drawn(formula: Formula) -> None:
     """The trees draw from all shapes with equal chances; here one of each that is a solid."""
     drawn = (leaf(formula, np.random.default_rng(seed)) for seed in range(20))

@@ -9,16 +9,19 @@ from fracslice.formulas import Node
 from fracslice.mesh.contouring import contour
 from fracslice.scene import library, read
 from fracslice.volume import plan, sample_scene
+from tests.examples import stamped
 
 from .scaling import SCALINGS
 
 pytestmark = pytest.mark.once
 
 VOXELS = 40.0
+OFTEN = "hybrid", "lattice-cube", "mandelbulb", "menger-tower", "spinning-top"
+"""Scenes of every run; the others in a night."""
 
 
 @pytest.mark.parametrize(("way", "factor"), [("parameters", 2.0**-20), ("transform", 2.0**20)])
-@pytest.mark.parametrize("name", library.names())
+@pytest.mark.parametrize("name", stamped(library.names(), OFTEN))
 def test_same_bricks(name: str, way: str, factor: float) -> None:
     root = read(library.path(name)).root
     own, other = (plan(r, VOXELS) for r in (root, SCALINGS[way](root, factor)))

@@ -13,8 +13,6 @@ from fracslice.mesh import Mesh
 from fracslice.viewer import picture, screen, show, window
 from tests.mesh.shapes import cube, sphere
 
-pytestmark = pytest.mark.once
-
 pytest.importorskip("pyvista")
 
 

@@ -38,6 +38,8 @@ from fracslice.volume import extent, plan
 from fracslice.volume.extent import LITTLE, PROVEN, _kept
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 PLATE = box(size=(60, 40, 2))
 VOXELS = 256
 VOXEL = 60 / VOXELS

@@ -33,6 +33,8 @@ from fracslice.volume.pruning import Proofs
 from fracslice.work import Work
 from tests.examples import EXAMPLES, stamped
 
+pytestmark = pytest.mark.once
+
 FINITE = [name for name, root in EXAMPLES.items() if root.bounds.box.finite]
 
 
