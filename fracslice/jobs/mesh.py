@@ -83,7 +83,7 @@ def noted(result: Result, coarse: Result) -> Result:
     return Result(report, result.place, result.planned, result.whole, result.work)
 
 
-LATER = "cleaning", "checks", "spatial", "tips", "topology", "touching"
+LATER = "cleaning", "checks", "spatial", "tips", "topology"
 """Modules of meshes that follow contouring."""
 
 

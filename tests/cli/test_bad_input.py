@@ -127,7 +127,7 @@ def test_scenes(text, message, folder, capfd):
         ("mesh ball.xml -o out/x.stl --cluster foo", "'foo': expected local, local:N or the address of"),
         ("mesh ball.xml -o out/x.stl --set sphere.radius=1..2:1e-9", "expected at most 10000 values"),
         (f"mesh ball.xml -o out/{'x' * 300}.stl", "File name too long"),
-        ("render ball.xml -o out/x.jpg --bits 16", "expected a .png file as --output"),
+        ("render ball.xml -o out/x.jpg --bits 16", "bits 16: expected a .png file"),
         ("mesh ball.xml -o out/x.stl --resolution many", "'many': expected a number >= 8"),
         ("mesh ball.xml -o out/x.stl --threads 0", "0 is not in the range"),
         ("mesh ball.xml -o out/x.stl --device gpu", "'gpu' is not one of 'cpu', 'cuda', 'auto'"),
