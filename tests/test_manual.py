@@ -139,6 +139,7 @@ def test_commands_are_understood(line: str, folder: Path, monkeypatch, capfd) ->
         "slicing.plan_stack",
         "jobs.slices.plan_layers",
         "jobs.pictures.make_picture",
+        "rendering.Renderer",
         "animation.Timeline",
         "bench.measurements.measure",
         "viewer.fly",
