@@ -143,7 +143,7 @@ LARGE = 1 << 26
 """Bytes of a replaced file that another thread releases."""
 
 
-TEMPORARY = ".fracslice-"
+TEMPORARY = ".fracslice~"
 """Begin of the names of files and folders that are there while something is written, and locked."""
 
 FULL = errno.ENOSPC, errno.EDQUOT

@@ -52,11 +52,11 @@ def animate(*arguments: object) -> int:
 def test_a_film_that_stopped_goes_on_and_is_the_same(path: Path, tmp_path: Path) -> None:
     whole, parts = tmp_path / "whole", tmp_path / "parts"
     whole.mkdir()
-    (whole / ".fracslice-k1ll3d.film.json.part").write_bytes(b"killed before the film began")
+    (whole / ".fracslice~k1ll3d.film.json.part").write_bytes(b"killed before the film began")
     assert animate(path, "-o", whole) == 0
     assert animate(path, "-o", parts, "--frames", "2..5") == 0
     kept = (parts / "frame00003.png").stat().st_mtime_ns
-    (parts / ".fracslice-k1ll3d.frame00006.png.part").write_bytes(b"killed here")
+    (parts / ".fracslice~k1ll3d.frame00006.png.part").write_bytes(b"killed here")
     (parts / "frame00004.png").write_bytes((parts / "frame00002.png").read_bytes())
     assert animate(path, "-o", parts, "--resume", "--threads", 1) == 0
     assert (parts / "frame00003.png").stat().st_mtime_ns == kept

@@ -16,6 +16,7 @@ from fracslice.common import files
 from fracslice.errors import ClusterError, SharedError
 from fracslice.export import packages
 from fracslice.export.layer_files import write_slices
+from fracslice.export.layer_tasks import RangeTask
 from fracslice.formulas import box, cone, flake, sphere
 from fracslice.jobs import shared, shared_writing
 from fracslice.jobs.mesh import Result, make_mesh
@@ -47,13 +48,17 @@ def line(tmp_path: Path) -> list[str]:
 
 
 def test_shards_of_layers_make_one_file(
-    line: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    line: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Each range is made once: what writes beside the pieces does not take them for leftovers."""
+    made, make = list[str](), RangeTask.make
+    monkeypatch.setattr(RangeTask, "make", lambda of, work: (made.append(of.name), make(of, work))[1])
     for number in (2, 3):
         assert command([*line, "--shard", f"{number}/3", "--quiet"]) == 0
         assert "shard 1 writes the file" in capsys.readouterr().err
         assert not (tmp_path / "b.cli").exists()
     assert command([*line, "--shard", "1/3", "--quiet"]) == 0
+    assert len(made) == len(set(made)) > 8
     assert (tmp_path / "b.cli").read_bytes() == sliced(Work(2), tmp_path)
 
 

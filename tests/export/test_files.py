@@ -206,15 +206,15 @@ def test_kill_in_mid_write_leaves_no_broken_file(tmp_path: Path) -> None:
 
 
 def test_folders_of_killed_processes_are_removed(tmp_path: Path) -> None:
-    (tmp_path / ".fracslice-killed").mkdir()
-    (tmp_path / ".fracslice-killed" / "piece").write_text("half")
-    (tmp_path / ".fracslice-link").symlink_to(tmp_path)
+    (tmp_path / ".fracslice~killed").mkdir()
+    (tmp_path / ".fracslice~killed" / "piece").write_text("half")
+    (tmp_path / ".fracslice~link").symlink_to(tmp_path)
     with temporary_folder(tmp_path) as folder:
         (folder / "piece").write_text("mine")
         with replacing(tmp_path / "model.stl") as file:
             file.write(b"whole")
-        assert {*os.listdir(tmp_path)} == {folder.name, "model.stl", ".fracslice-link"}
-    assert {*os.listdir(tmp_path)} == {"model.stl", ".fracslice-link"}
+        assert {*os.listdir(tmp_path)} == {folder.name, "model.stl", ".fracslice~link"}
+    assert {*os.listdir(tmp_path)} == {"model.stl", ".fracslice~link"}
 
 
 def test_a_file_that_was_taken_for_a_leftover_is_made_again(
