@@ -451,8 +451,8 @@ def draw(stack: Stack, report: PrintReport, path: str, work: Work) -> None:
 
 
 def describe_report(report: PrintReport) -> str:
-    """Summary of a print report: figures, a line for each problem, and thin features that layers may miss."""
-    lines = f"{figures_of(report)}, {verdict(report.problems)}", report.solid.unseen
+    """Summary of a print report: figures, its problems, thin features that layers may miss, narrow holes."""
+    lines = f"{figures_of(report)}, {verdict(report.problems)}", report.solid.unseen, report.solid.holes
     return os.linesep.join(filter(None, lines))
 
 

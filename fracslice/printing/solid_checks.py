@@ -17,7 +17,7 @@ from ..work import Work
 from .components import components_of
 from .problems import Limits, Problem
 from .samples import Samples
-from .thin_features import resolve_connectivity, sampled_object, thin_features
+from .thin_features import narrow_holes, resolve_connectivity, sampled_object, thin_features
 from .walls import Measure, Walls, project_faces, walls_of
 from .widths import BINS, Widths, widths_of
 
@@ -57,6 +57,7 @@ class SolidReport:
     thin_walls: float  # surface below the limits, mm^2
     thin_floors: float
     unseen: str  # walls that a mesh or layers may lose; empty if there are none
+    holes: str  # holes of the shape that may close; empty if there are none
     problems: list[Problem]  # the problems
 
     @property
@@ -139,6 +140,10 @@ def check_solid(
         *_too_thin("floors", bare, limits.floor, limits.thin, thickening, scale, middle),
     ]
     unseen = _unseen(thick, finest or bricks.voxel * scale, limits.thin, scale, middle)
+    tunnels = between.chosen(between.width * scale < 0.99 * limits.hole)
+    for drain in drains:  # these are named by themselves
+        tunnels = tunnels.chosen(_from_side(tunnels, drain) > 0)
+    holes = narrow_holes(root, solid, tunnels, limits.hole / scale, work)
     return SolidReport(
         voxel=bricks.voxel * scale,
         bodies=bodies,
@@ -149,6 +154,7 @@ def check_solid(
         thin_walls=float(narrow.area.sum()) * scale**2,
         thin_floors=float(bare.area.sum()) * scale**2,
         unseen=unseen,
+        holes=_closing(holes, limits.hole, scale, middle),
         problems=problems,
     )
 
@@ -200,6 +206,20 @@ def _unseen(walls: Walls, finest: float, least: float, scale: float, middle: np.
     )
 
 
+def _closing(holes: Walls, limit: float, scale: float, middle: np.ndarray) -> str:
+    """Describe holes narrower than `limit` mm: number, least width and its place from `middle`."""
+    if not len(holes.width):
+        return ""
+    first = int(holes.width.argmin())
+    at = place((scale * (holes.middle[first] - middle)).tolist())
+    return f"{may_close(len(holes.width), 'hole', holes.width[first] * scale, limit)}: at {at} mm"
+
+
+def may_close(count: int, noun: str, width: float, limit: float) -> str:
+    """Say that some holes of a width are narrower than a limit, mm."""
+    return f"{format_count(count, noun)} of {width:.2g} mm, narrower than {limit:g} mm, may close"
+
+
 def _volumes(bricks: Bricks, speck: float) -> tuple[list[float], list[float]]:
     """Volumes of bodies and of cavities of at least `speck`, the largest first, cubed scene units."""
     components = components_of(bricks)
@@ -218,11 +238,15 @@ def _under(walls: Walls, limit: float, scale: float) -> Walls:
 def _off_rims(thin: Walls, drains: Sequence[Drain], near: float) -> Walls:
     """Walls except for the sharp rims of drain holes: those nearer than `near` to the side of a hole."""
     for drain in drains:
-        start, along = np.array(drain.start), np.array(drain.end) - drain.start
-        share = np.clip((thin.middle - start) @ along / (along @ along), 0, 1)
-        away = np.linalg.norm(thin.middle - start - share[:, None] * along, axis=1)
-        thin = thin.chosen(np.abs(away - drain.radius) > near)
+        thin = thin.chosen(np.abs(_from_side(thin, drain)) > near)
     return thin
+
+
+def _from_side(walls: Walls, drain: Drain) -> np.ndarray:
+    """Distance of the middles of walls from the side of a drain hole, negative within it."""
+    start, along = np.array(drain.start), np.array(drain.end) - drain.start
+    share = np.clip((walls.middle - start) @ along / (along @ along), 0, 1)
+    return np.asarray(np.linalg.norm(walls.middle - start - share[:, None] * along, axis=1) - drain.radius)
 
 
 def loose(count: int, **where: Any) -> Problem:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..common.messages import format_count, significant
 from ..printing.problems import SUPPORTS, Limits, Problem, flat_base
-from ..printing.solid_checks import FILL, SolidReport, check_object, loose
+from ..printing.solid_checks import FILL, SolidReport, check_object, loose, may_close
 from ..printing.widths import Widths, widths_of
 from ..scene import Print
 from ..work import Work
@@ -96,8 +96,7 @@ def _narrow_drains(stack: Stack, limits: Limits) -> Iterator[Problem]:
     narrow = [drain for drain in stack.drains if 2 * drain.radius * stack.scale < limits.hole]
     if narrow:
         x, y, z = (stack.scale * (np.array(narrow[0].start) - stack.origin)).tolist()
-        text = f"{format_count(len(narrow), 'drain hole')} of {2 * narrow[0].radius * stack.scale:.2g} mm"
-        text += f", narrower than {limits.hole:g} mm, may close"
+        text = may_close(len(narrow), "drain hole", 2 * narrow[0].radius * stack.scale, limits.hole)
         layer, mend = int(np.searchsorted(stack.tops, z)), (("drain", f"{Print().drain:g}mm"),)
         yield Problem("holes", text, layer, (x, y, z), mend, count=len(narrow))
 

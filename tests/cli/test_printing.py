@@ -149,3 +149,37 @@ def test_check_says_what_a_voxel_or_a_pixel_may_lose(
     assert 0 < x < 10 and abs(z - 5) < 0.5, "mm from the middle, above the lowest point"
     assert reported("--resolution", "48") == [], "a mesh job samples what it would lose finer"
     assert reported("--layer", "1mm", "--pixel", "0.1mm") == []
+
+
+BORED = """<scene version="1"><solid unit="1mm"><difference><box size="4 4 4"/>
+<transform translate="1 0 0"><cylinder radius="0.2" height="6"/></transform></difference></solid></scene>"""
+
+
+def write_bored(path: Path, sides: int = 64) -> None:
+    """Write a cube of 4 mm with an upright bore of 0.4 mm at x = 1 mm, as binary STL."""
+    turn = 2 * np.pi * np.arange(sides) / sides
+    way = np.stack([np.cos(turn), np.sin(turn)], 1)
+    rim, side = 0.2 * way + (1, 0), 2 * way / np.abs(way).max(1)[:, None]
+    rings = [
+        np.column_stack([of, np.full(sides, z)]) for of, z in ((rim, 2), (rim, -2), (side, -2), (side, 2))
+    ]
+    triangles = []
+    for one, other in zip(rings, [*rings[1:], rings[0]], strict=True):
+        a, b, c, d = one, np.roll(one, -1, 0), np.roll(other, -1, 0), other
+        triangles += [np.stack([a, b, c], 1), np.stack([a, c, d], 1)]
+    facets = np.zeros(8 * sides, [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("colour", "<u2")])
+    facets["corners"] = np.concatenate(triangles)
+    path.write_bytes(bytes(80) + np.uint32(8 * sides).tobytes() + facets.tobytes())
+
+
+def test_a_bore_that_may_close_is_a_note(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """It is named for a scene and a model of it, and leaves the verdict as it is."""
+    scene, model = tmp_path / "bore.xml", tmp_path / "bore.stl"
+    scene.write_text(BORED)
+    write_bored(model)
+    coarse = "--layer", "0.1mm", "--pixel", "0.1mm", "--wall", "0.2mm", "--floor", "0.2mm"
+    for source in (scene, model):
+        assert run(["check", str(source), *coarse, "-q"]) == 0
+        verdict, note = capfd.readouterr().out.splitlines()[-2:]
+        assert verdict.endswith(", would print")
+        assert note.startswith("1 hole of 0.4 mm, narrower than 0.5 mm, may close: at 1.00 ")

@@ -7,7 +7,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -429,3 +429,56 @@ def test_the_sharp_rim_of_a_drain_hole_is_no_thin_wall(monkeypatch: pytest.Monke
     drain = Drain((0, 0, -6), (0, 0, 12), 1.0)
     rims, none = (check_object(thing.root, thing.outer, 1, drains=drains) for drains in ((), (drain,)))
     assert [p.kind for p in rims.problems] == ["walls"] and none.problems == []
+
+
+def bored(*cuts: Node) -> Node:
+    """A cube of 10 mm less some shapes."""
+    return difference(box(size=(10, 10, 10)), *cuts)
+
+
+BORE = cylinder(radius=0.2, height=12)
+SLOT = transform(box(size=(0.4, 12, 8)), translate=(0, 0, 2))
+
+
+def holes_of(root: Node, size: float = 10, drains: Sequence[Drain] = ()) -> str:
+    planned, coarse = plan(root, 100), Limits(wall=0.5, floor=0.5)
+    scale = size / max(planned.box.size)
+    return check_object(planned.root, planned.outer, scale, coarse, drains=drains, origin=(0, 0, -5)).holes
+
+
+@pytest.mark.parametrize(
+    ("turn", "along", "at"),
+    [((1, 0, 0, 0), 2, (1, 2)), ((0, 1, 0, 90), 0, (2, 8)), ((1, 0, 0, 90), 1, (1, 8))],
+)
+def test_a_narrow_bore_is_named_with_its_place(
+    turn: tuple[float, ...], along: int, at: tuple[float, ...]
+) -> None:
+    text = holes_of(bored(transform(BORE, rotate=turn, translate=(1, 2, 3))))
+    assert text.startswith("1 hole of 0.4 mm, narrower than 0.5 mm, may close: at ")
+    place = [float(number) for number in text.split()[-4:-1]]
+    away = np.delete(place, along) - at
+    assert np.abs(away).max() < 0.05 and -5 < place[along] < 10
+
+
+def test_several_narrow_bores_are_counted_and_the_narrowest_is_named() -> None:
+    narrower = transform(cylinder(radius=0.15, height=12), translate=(3, 0, 0))
+    into_a_cavity = bored(sphere(radius=2), transform(BORE, translate=(0, 0, 6)), narrower)
+    assert holes_of(into_a_cavity).startswith(
+        "2 holes of 0.3 mm, narrower than 0.5 mm, may close: at 3.00 0.0"
+    )
+
+
+def test_what_is_wider_or_narrow_in_one_direction_is_no_narrow_hole() -> None:
+    dent = transform(sphere(radius=0.2), translate=(0, 0, 5))
+    assert [holes_of(bored(cut)) for cut in (cylinder(radius=0.4, height=12), SLOT, dent)] == [""] * 3
+
+
+def test_a_drain_hole_is_not_named_twice() -> None:
+    assert holes_of(bored(BORE), drains=[Drain((0, 0, -6), (0, 0, 6), 0.2)]) == ""
+
+
+def test_a_menger_sponge_has_one_line_on_its_narrow_holes() -> None:
+    sponge = menger(level=2)
+    line = holes_of(sponge, 4)
+    assert " of 0.44 mm, narrower than 0.5 mm, may close" in line and "\n" not in line
+    assert holes_of(sponge, 5) == ""
