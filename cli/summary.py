@@ -171,7 +171,7 @@ def starts(drains: Sequence[Drain]) -> np.ndarray:
 
 def trapped_volume(run: SliceRun) -> tuple[int, float]:
     """Number and volume, mm3, of the cavities of a stack."""
-    from fracslice.printing.sealed import count_sealed
+    from fracslice.volume.amount import count_sealed
 
     stack = run.stack
     narrowest = min((2 * drain.radius for drain in stack.drains), default=math.inf)
