@@ -201,9 +201,12 @@ def test_the_client_dies_and_the_same_command_goes_on(
         given = [name, str(folder / "bulb.xml"), "-o", str(output), *options, "--quiet"]
         shared = [*given, "--cluster", cluster.address]
         client = subprocess.Popen([sys.executable, "-c", STARTED, *shared])
-        wait_until(
-            lambda pieces=pieces, piece=piece: len(list(pieces.glob(f"*/{piece}"))) > (piece[0] != ".") * 2
-        )
+
+        def begun(client=client, pieces=pieces, piece=piece) -> bool:
+            return client.poll() is not None or len(list(pieces.glob(f"*/{piece}"))) > (piece[0] != ".") * 2
+
+        wait_until(begun)
+        assert client.poll() is None, "it ended before its pieces were seen"
         client.kill()
         client.wait()
         assert name == "animate" or not output.exists()
