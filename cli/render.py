@@ -64,7 +64,7 @@ def render(given: RenderOptions) -> None:
     pictures.refuse(scene, job, given.output)
     film = job.film(scene.view)
     if (rows := pictures.rows_in_memory(scene, job)) < film[1]:
-        refuse_options(("pass_images", "watch"), pictures.WHOLE)
+        refuse_options(("pass_images", "watch", "cluster", "shard"), pictures.WHOLE)
         click.echo(pictures.announcement(film, rows), err=True)
 
     with given.working() as work:
@@ -80,7 +80,8 @@ def render(given: RenderOptions) -> None:
                 work.progress(rate, pictures.share(done, renderer, job))
                 if given.pass_images:
                     Path(given.pass_images).mkdir(exist_ok=True)
-                    pictures.save(Path(given.pass_images) / f"pass{done.number:04}.png", done, scene)
+                    path = Path(given.pass_images) / f"pass{done.number:04}.png"
+                    pictures.save(path, done, scene, given.threads)
                 yield done
 
         done = pictures.make_picture(

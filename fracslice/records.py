@@ -442,3 +442,18 @@ class RenderJob(Record):
             Those of the job, or else of the view's film.
         """
         return self.size or (view.film.width, view.film.height)
+
+    def most(self, view: View) -> int:
+        """Maximum number of samples per pixel of a picture of a view.
+
+        Parameters
+        ----------
+        view : View
+            View of the scene.
+
+        Returns
+        -------
+        int
+            That of the job, or else of the view's film.
+        """
+        return self.samples or view.film.samples

@@ -709,13 +709,12 @@ class Pixels(Parameter):
         """Validate text or numbers; see `Parameter.check`."""
         if isinstance(value, str):
             return self.read(value)
-        numbers = [finite(v) for v in items(value)]
-        whole = tuple(int(n) for n in numbers if n is not None and n == int(n))
-        if len(numbers) != len(self.names) or whole != tuple(numbers):
-            raise ValueError(self.expects)
-        if not all(self.least <= n <= self.most for n in whole):
-            raise ValueError(self.expects)
-        return whole
+        sizes = (len(self.names),)
+        numbers = Vector(None, "", least=self.least, most=self.most, sizes=sizes, whole=True)
+        try:
+            return tuple(numbers.check(value))
+        except ValueError:
+            raise ValueError(self.expects) from None
 
     def text(self, value: Any) -> str:
         """Format the numbers; see `Parameter.text`."""

@@ -185,8 +185,8 @@ def save(
     path: str | Path,
     done: Pass,
     scene: Scene,
+    threads: int,
     bits: int = 8,
-    threads: int = 0,
     more: Mapping[str, np.ndarray] | None = None,
 ) -> None:
     """Write the picture of a pass, with the scene and the samples in its metadata.
@@ -195,7 +195,7 @@ def save(
     """
     text = {**metadata(scene), "samples": f"{done.samples:.2f}"}
     picture = light_of(done) if check_image(path) in LINEAR else done.developed
-    write_image(path, picture, picture, bits, text, Work(threads) if threads else Work(), more)
+    write_image(path, picture, picture, bits, text, Work(threads), more)
 
 
 @dataclass(frozen=True)
@@ -212,8 +212,7 @@ class _Picture:
         """Render and write the picture."""
         scene, job, pool = self.scene, self.job, self.work.cluster
         film, view, crop = job.film(scene.view), scene.view, job.crop
-        samples = job.samples or view.film.samples
-        device = for_picture(device, crop[2:] if crop else film, samples)
+        device = for_picture(device, crop[2:] if crop else film, job.most(view))
         renderer = Renderer(scene.root, view, film, self.work, device, SampleRange(seed=job.seed), crop)
         aside = None if pool is None or self.state else pool.pieces.path(f"{renderer.key}.npz")
         try:
@@ -222,7 +221,11 @@ class _Picture:
             if pool and not pool.first:
                 raise SharedError("the samples are made; shard 1 writes the file")
             more = layers(renderer) if job.layers else None
-            done = _without_noise(renderer, guides) if job.denoise else renderer.seen()
+            done = renderer.seen()
+            if job.denoise:
+                from ..rendering.denoising import denoise
+
+                done = denoise(renderer, guides)
         except Cancelled:
             kept = renderer.seen()
             if self.path is None or not kept.samples or (pool and not pool.first):
@@ -236,18 +239,18 @@ class _Picture:
 
     def _save(self, done: Pass, more: Mapping[str, np.ndarray] | None = None) -> None:
         if self.path is not None:
-            save(self.path, done, self.scene, self.job.bits, self.work.threads, more)
+            save(self.path, done, self.scene, self.work.threads, self.job.bits, more)
 
     def _passes(
         self, renderer: Renderer, state: str | None, limit: float | None, shown: Shown | None
     ) -> None:
         """Render pass after pass, from a state and into it."""
-        work, samples = self.work, self.job.samples or renderer.setup.view.film.samples
+        work = self.work
         keep = state if work.cluster is None or work.cluster.first else None
         if state and Path(state).exists():
             renderer.resume(state)
         try:
-            passes = _limit_time(renderer, samples, limit)
+            passes = _limit_time(renderer, self.job.samples, limit)
             for done in shown(passes, renderer) if shown else passes:
                 if not shown:
                     work.progress("rendering", share(done, renderer, self.job))
@@ -263,7 +266,7 @@ class _Picture:
 
 def share(done: Pass, renderer: Renderer, job: RenderJob) -> float:
     """Completed fraction of the samples, from 0 to 1."""
-    return min(done.samples / (job.samples or renderer.setup.view.film.samples), 1.0)
+    return min(done.samples / job.most(renderer.setup.view), 1.0)
 
 
 def _rendered(renderer: Renderer, done: Pass) -> Rendered:
@@ -287,14 +290,7 @@ def _plan_denoising(renderer: Renderer, job: RenderJob) -> tuple[list[np.ndarray
     return made, max(job.time - taken, job.time / 10)
 
 
-def _without_noise(renderer: Renderer, guides: list[np.ndarray] | None) -> Pass:
-    """Picture of a renderer without noise."""
-    from ..rendering.denoising import denoise
-
-    return denoise(renderer, guides)
-
-
-def _limit_time(renderer: Renderer, samples: int, limit: float | None) -> Iterator[Pass]:
+def _limit_time(renderer: Renderer, samples: int | None, limit: float | None) -> Iterator[Pass]:
     """Iterate over passes until a time limit, in seconds, which interrupts a pass.
 
     A limit that ends before the first sample is doubled.

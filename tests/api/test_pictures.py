@@ -23,6 +23,7 @@ from fracslice import (
     slice_layers,
     sphere,
 )
+from fracslice.api.options import RenderKeywords, WorkKeywords
 from fracslice.errors import Cancelled, RenderError, SceneError
 from fracslice.scene import scene
 from fracslice.scene.view import Film, View
@@ -138,3 +139,7 @@ def test_a_part_without_noise_in_a_file(picture: Picture, tmp_path: Path) -> Non
 def test_settings_that_cannot_be_are_named(options: dict, message: str) -> None:
     with pytest.raises(RenderError, match=message):
         render(SHAPE, **SMALL, **options)
+
+
+def test_keywords_are_the_fields_of_the_record() -> None:
+    assert {*RenderJob.kinds(), *WorkKeywords.__annotations__} == {*RenderKeywords.__annotations__}
