@@ -120,7 +120,7 @@ class Distances(MeshStep[NDArray[np.float64]]):
 
     def result(self, number: int, work: Work) -> NDArray[np.float64]:
         """Distances, float64 [n]; see `MeshStep.result`."""
-        return nearest([self.pieces.mesh(number)], self.points, self.reach, work)
+        return nearest(self.pieces.mesh(number), self.points, self.reach, work)
 
     def about(self) -> Arrays:
         """See `MeshStep.about`."""
@@ -251,7 +251,11 @@ class Finish(MeshStep[Checks]):
         return place_and_round(self.added, self._placing[1])
 
     @cached_property
-    def _near(self) -> NearBodies:
+    def _labels_that_stay(self) -> NDArray[np.bool_]:
+        return self.stays[self.shells.of_label]
+
+    @cached_property
+    def _near_bodies(self) -> NearBodies:
         return NearBodies(self.shells, self.stays, self.of.planned.voxel)
 
     def report(self, tally: Tally, misplaced: int) -> MeshReport:
@@ -260,15 +264,16 @@ class Finish(MeshStep[Checks]):
         bodies, cavities = int((self.stays & ~hollow).sum()), int((self.stays & hollow).sum())
         return tally.report(bodies, cavities, misplaced)
 
-    def finished(self, number: int, threads: int) -> Finished:
-        """Place and clean a piece, mm."""
+    def finished(self, number: int, threads: int) -> tuple[Finished, NDArray[np.int64]]:
+        """Place and clean a piece, mm. Returns the shells of its bodies that nearly touch others, too."""
         voxel, pieces, last = self.of.planned.voxel, self.pieces, len(self.pieces) - 1
+        mesh, labels = pieces.mesh(number), pieces.labels(number)
+        near = self._near(number, mesh, labels, threads)
         before = self._strip(number - 1, TAIL, threads) if number else None
         after = self._strip(number + 1, HEAD, threads) if number < last else None
-        mesh, keep = pieces.mesh(number), self._stays(pieces.labels(number), threads)
-        own = SelectedPiece(mesh, keep, pieces.fresh_rows(number))
+        own = SelectedPiece(mesh, self._stays(labels, threads), pieces.fresh_rows(number))
         ends = pieces.start(number), pieces.ends[number]
-        return finished_piece(own, before, after, ends, voxel, *self._placing, threads)
+        return finished_piece(own, before, after, ends, voxel, *self._placing, threads), near
 
     def _strip(self, number: int, side: str, threads: int) -> SelectedPiece:
         """Strip of a neighbour with the choice of its bodies."""
@@ -278,14 +283,13 @@ class Finish(MeshStep[Checks]):
 
     def _stays(self, labels: NDArray[np.int32], threads: int) -> NDArray[np.bool_]:
         """True for vertices whose body stays."""
-        return gather_rows(self.stays[self.shells.of_label], labels, threads)
+        return gather_rows(self._labels_that_stay, labels, threads)
 
-    def near(self, number: int, threads: int) -> NDArray[np.int64]:
+    def _near(self, number: int, mesh: Mesh, labels: NDArray[np.int32], threads: int) -> NDArray[np.int64]:
         """Shells of the bodies that nearly touch others, in a piece and at its seam with the next one."""
-        near, pieces = self._near, self.pieces
+        near, pieces, own = self._near_bodies, self.pieces, (mesh.vertices, labels)
         if not near.several:
             return np.empty(0, np.int64)
-        own = pieces.mesh(number).vertices, pieces.labels(number)
         found = near.within(*own, threads)
         if number + 1 == len(pieces):
             return found
@@ -308,10 +312,10 @@ class Finish(MeshStep[Checks]):
         for number in range(pieces):
             with clock("finishing"):
                 work.progress("finishing", number / pieces)
-                near, made = self.near(number, work.threads), self.finished(number, work.threads)
+                made = self.finished(number, work.threads)
                 self.pieces.drop(number if number + 1 < pieces else pieces)
             work.progress("finishing", (number + 1) / pieces)
-            yield made, near
+            yield made
 
     def passing(
         self, each: Iterable[tuple[Finished, NDArray[np.int64]]], checks: Checks, clock: Clock
@@ -324,8 +328,8 @@ class Finish(MeshStep[Checks]):
 
     def result(self, number: int, work: Work) -> Checks:
         """Finish a piece, store its triangles but those at tips, and check it; see `MeshStep.result`."""
-        made = self.finished(number, work.threads)
-        checks = self.checks(made, self.near(number, work.threads), work)
+        made, near = self.finished(number, work.threads)
+        checks = self.checks(made, near, work)
         plain, late = without_tips(made.passed, self.tips, work.threads)
         self.pieces.finish(number, plain)
         return replace(checks, rows=[len(plain.triangles)], late=[late])

@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from .shared import MeshRecipe
     from .surfaces import Surface
 
-STL = ".stl"
-
 COLOURED = (".ply", ".glb", ".3mf")
 """Formats that hold colours of vertices."""
 
@@ -145,7 +143,7 @@ class _Job:
         """Yield a function that makes a folder for pieces beside the file; None if the format does not
         support pieces.
         """
-        if self.path is None or self.path.suffix.lower() != STL:
+        if self.path is None or self.path.suffix.lower() != ".stl":
             yield None
             return
         from ..common.files import check_target, temporary_folder

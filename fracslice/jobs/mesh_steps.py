@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Self, TypeVar
@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..mesh.contouring import BLUNT, Piece, SurfaceContours
+from ..mesh.contouring import BLUNT, Piece, SurfaceContours, contour_whole
 from ..mesh.model import Mesh
-from ..mesh.pieces import Pieces
+from ..mesh.pieces import HEAD, TAIL, Pieces
 from ..mesh.shells import PieceComponents, components, groups, joined_components, levels
 from ..mesh.tips import Pointed, PointedPiece, pointed_in
 from ..store import Arrays
@@ -54,7 +54,7 @@ class MeshStep(ABC, Generic[R]):
     def result(self, number: int, work: Work) -> R:
         """Make the result of a piece."""
 
-    def results(self, numbers: Iterable[int], work: Work) -> Iterator[R]:
+    def results(self, numbers: Sequence[int], work: Work) -> Iterator[R]:
         """Make the results of pieces in this process, in order."""
         return (self.result(number, work) for number in numbers)
 
@@ -151,18 +151,14 @@ class Contour(MeshStep[Summary]):
         contours = self.of.contours
         return self._keep(number, contours.piece(*self.cuts[number], contours.refiner(work), work), work)
 
-    def results(self, numbers: Iterable[int], work: Work) -> Iterator[Summary]:
+    def results(self, numbers: Sequence[int], work: Work) -> Iterator[Summary]:
         """Contour the pieces with one search for roots; see `MeshStep.results`."""
-        from ..mesh.contouring import contour_whole
-
-        planned, signs = self.of.planned, self.of.signs
         if len(self.cuts) == 1:
-            pieces = iter([contour_whole(planned.root, signs, work)])
+            pieces = iter([contour_whole(self.of.planned.root, self.of.signs, work)])
         else:
-            contours, refiner = self.of.contours, self.of.contours.refiner(work)
-            made = (contours.piece(*self.cuts[number], refiner, work) for number in numbers)
+            made = self.of.contours.pieces((self.cuts[number] for number in numbers), work)
             pieces = ahead(made)  # while the one before is stored
-        return (self._keep(number, piece, work) for number, piece in enumerate(pieces))
+        return (self._keep(number, piece, work) for number, piece in zip(numbers, pieces, strict=True))
 
     def _keep(self, number: int, piece: Piece, work: Work) -> Summary:
         """Store a piece and its labels."""
@@ -194,7 +190,7 @@ class Contour(MeshStep[Summary]):
             "pointed": pointed.points,
             "blunt": blunt,
         }
-        for side in SIDES:
+        for side in (HEAD, TAIL):
             mesh: Mesh = getattr(pointed, side)
             parts |= {f"{side}_vertices": mesh.vertices, f"{side}_triangles": mesh.triangles}
         return parts | vars(found)
@@ -202,11 +198,7 @@ class Contour(MeshStep[Summary]):
     @staticmethod
     def unpack(arrays: Arrays) -> Summary:
         """See `MeshStep.unpack`."""
-        head, tail = (Mesh(arrays[f"{side}_vertices"], arrays[f"{side}_triangles"]) for side in SIDES)
+        head, tail = (Mesh(arrays[f"{side}_vertices"], arrays[f"{side}_triangles"]) for side in (HEAD, TAIL))
         found = PieceComponents(**{name: arrays[name] for name in PieceComponents.__dataclass_fields__})
         pointed = PointedPiece(arrays["pointed"], head, tail)
         return Summary(arrays["ends"], arrays["counted"], found, pointed, arrays["blunt"])
-
-
-SIDES = "head", "tail"
-"""Fields of a `PointedPiece` with the triangles at its begin and at its end."""

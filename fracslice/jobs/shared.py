@@ -68,14 +68,9 @@ def plan_of(recipe: MeshRecipe) -> Plan:
         return _planned(recipe)
 
 
-def sampled(recipe: MeshRecipe, pieces: ResultFolder, job: str) -> Sampled:
-    """Field and samples of a job, planned and read once in a process."""
-    with _READING:
-        return _sampled(recipe, pieces, job)
-
-
 @lru_cache(maxsize=1)
 def _sampled(recipe: MeshRecipe, pieces: ResultFolder, job: str) -> Sampled:
+    """Field and samples of a job, planned and read once in a process."""
     made, files = _planned(recipe), unpack_arrays(pieces.read(job, SAMPLES))
     lattice = made.lattice
     signs = SignBricks(lattice.origin, lattice.voxel, files["ijk"], files["signs"], files["index"])
@@ -120,19 +115,20 @@ class StoredPieces(Pieces):
 
     def about(self) -> Files:
         """What another process finds the pieces by; see `read`."""
-        table = {"ends": self.ends, "starts": self.starts, "fresh": self.fresh, "labels": self.first_labels}
-        columns = {f"pieces-{name}": np.array(column) for name, column in table.items()}
-        about = np.array(self.prefix), np.array([self.triangles]), np.array(self.halo)
-        return columns | dict(zip(("pieces", "pieces-count", "pieces-halo"), about, strict=True))
+        about = {"prefix": self.prefix, "halo": self.halo, "count": self.triangles, "ends": self.ends}
+        about |= {"starts": self.starts, "fresh": self.fresh, "labels": self.first_labels}
+        return {f"pieces-{name}": np.array(value) for name, value in about.items()}
 
     @classmethod
     def read(cls, store: ResultFolder, job: str, about: Files) -> StoredPieces:
         """Find the pieces by what `about` returned, which is taken out of the arrays."""
-        pieces = cls(store, job, float(about.pop("pieces-halo")), str(about.pop("pieces")))
-        pieces.ends, pieces.starts, pieces.fresh, pieces.first_labels = (
-            about.pop(f"pieces-{name}").tolist() for name in ("ends", "starts", "fresh", "labels")
-        )
-        (pieces._count,) = about.pop("pieces-count").tolist()
+
+        def taken(name: str) -> Any:
+            return about.pop(f"pieces-{name}").tolist()
+
+        pieces = cls(store, job, taken("halo"), taken("prefix"))
+        pieces.ends, pieces.starts, pieces._count = taken("ends"), taken("starts"), taken("count")
+        pieces.fresh, pieces.first_labels = taken("fresh"), taken("labels")
         return pieces
 
 
@@ -163,7 +159,7 @@ class MeshTask:
 def _read_step(
     kind: type[MeshStep[Any]], step: str, recipe: MeshRecipe, folder: ResultFolder, job: str
 ) -> MeshStep[Any]:
-    """MeshStep of a job from its file, read once in a process."""
+    """A step of a job from its file, read once in a process."""
     about = unpack_arrays(folder.read(job, step))
     pieces = StoredPieces.read(folder, job, about)
     return kind.read(about, pieces, partial(_sampled, recipe, folder, job))

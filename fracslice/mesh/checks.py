@@ -4,7 +4,7 @@ a verdict.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
@@ -276,27 +276,13 @@ def surface_samples(planned: Plan, work: Work) -> NDArray[np.float64]:
     return np.concatenate([tips, samples])
 
 
-def nearest(
-    pieces: Iterable[Mesh], points: NDArray[np.float64], reach: float, work: Work
-) -> NDArray[np.float64]:
-    """Distances from points to the triangles of a mesh within reach.
+def nearest(mesh: Mesh, points: NDArray[np.float64], reach: float, work: Work) -> NDArray[np.float64]:
+    """Distances from points to the triangles of a mesh with a corner within reach; infinite without any.
 
     `points`: float64 (n, 3). Returns float64 (n,).
     """
-    return _least((_near(mesh, points, reach, work) for mesh in pieces), points, work)
-
-
-def _near(mesh: Mesh, points: NDArray[np.float64], reach: float, work: Work) -> Mesh:
-    """Triangles with a corner near points."""
     chosen = near(mesh.vertices, mesh.triangles, points, reach, work.threads)
-    return Mesh(mesh.vertices, mesh.triangles[chosen])
-
-
-def _least(meshes: Iterable[Mesh], points: NDArray[np.float64], work: Work) -> NDArray[np.float64]:
-    """Distance from each point to the nearest of several meshes; infinite without triangles."""
-    numbers = np.arange(len(points), dtype=np.int32)
-    spots, least = Mesh(points, np.stack([numbers] * 3, 1)), np.full(len(points), np.inf)
-    for mesh in meshes:
-        if len(mesh.triangles):
-            least = np.minimum(least, Nearest(mesh).samples(spots, 1.0, work))
-    return least
+    if not len(chosen):
+        return np.full(len(points), np.inf)
+    spots = Mesh(points, np.stack([np.arange(len(points), dtype=np.int32)] * 3, 1))
+    return Nearest(Mesh(mesh.vertices, mesh.triangles[chosen])).samples(spots, 1.0, work)

@@ -219,6 +219,11 @@ class SurfaceContours:
         origin, voxel, _ = self._placement
         return Refiner(self.root, self._cells, origin, voxel, work)
 
+    def pieces(self, cuts: Iterable[tuple[int, int]], work: Work) -> Iterator[Piece]:
+        """Contour layers of bricks by ascending x, with one search for roots."""
+        refiner = self.refiner(work)
+        return (self.piece(first, last, refiner, work) for first, last in cuts)
+
     def piece(self, first: int, last: int, refiner: Refiner, work: Work) -> Piece:
         """Contour some layers of bricks."""
         from .._native import Contouring, trust_regions
@@ -353,6 +358,4 @@ def contour_pieces(
     """
     work = work or Work()
     made = SurfaceContours(root, bricks.signs if isinstance(bricks, Bricks) else bricks, work.threads)
-    refiner = made.refiner(work)
-    for first, last in layers(made.signs, most):
-        yield made.piece(first, last, refiner, work)
+    return made.pieces(layers(made.signs, most), work)

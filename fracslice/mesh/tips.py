@@ -253,9 +253,8 @@ def without_tips(mesh: Mesh, tips: NDArray[np.float64], threads: int = 0) -> tup
     """
     of = at_tips(mesh, tips)
     at = np.flatnonzero(of >= 0)
-    return mesh.selected(of < 0, threads) if len(at) else mesh, Late(
-        of[at], mesh.vertices[mesh.triangles[at]]
-    )
+    late = Late(of[at], mesh.vertices[mesh.triangles[at]])
+    return mesh.selected(of < 0, threads) if len(at) else mesh, late
 
 
 def at_tips(mesh: Mesh, tips: NDArray[np.float64]) -> NDArray[np.int64]:
