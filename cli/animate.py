@@ -94,7 +94,7 @@ def animate(given: FilmOptions) -> None:
         write_frames,
     )
     from fracslice.export import replacing
-    from fracslice.scene.writer import to_xml
+    from fracslice.scene.model import to_xml
 
     target, ending = Path(given.output), Path(given.output).suffix.lower()
     if given.exr and ending:

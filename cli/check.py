@@ -435,7 +435,7 @@ def shared_check(scene: Scene, job: SliceJob, given: CheckOptions, work: Work) -
     """Check the layers of a scene by the pool of the work."""
     from fracslice.jobs.slice_checks import check_run
     from fracslice.jobs.slices import SliceRecipe
-    from fracslice.scene.writer import to_xml
+    from fracslice.scene.model import to_xml
 
     run = SliceRecipe(to_xml(scene), scene.name, job).run(work, scene)
     return run.stack, check_run(run, given.limits)

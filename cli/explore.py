@@ -93,7 +93,7 @@ def write(target: Path, scenes: Sequence[Scene], pictures: Sequence[np.ndarray])
     from PIL import Image, ImageDraw
 
     from fracslice.export import replacing
-    from fracslice.scene.writer import to_xml
+    from fracslice.scene.model import to_xml
 
     height, width = pictures[0].shape[:2]
     across = math.ceil(math.sqrt(len(pictures)))

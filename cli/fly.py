@@ -28,7 +28,7 @@ def fly(given: FlyOptions) -> None:
     fracslice fly my.xml
     """
     from fracslice import viewer
-    from fracslice.scene.writer import part_to_xml
+    from fracslice.scene.model import part_to_xml
 
     with given.working() as work:
         camera = viewer.fly(scene_path(given.source), given.settings, given.size, work, given.device)

@@ -48,7 +48,7 @@ def formulas(given: FormulaOptions) -> None:
             raise click.UsageError("--picture: expected --check FILE")
         click.echo(manual.overview() if given.name is None else manual.page(given.name))
         return
-    from fracslice.formulas.plugins import run_file
+    from fracslice.formulas.registry import run_file
     from fracslice.kernel.validation import trial
 
     check_targets(given.file, given.picture)

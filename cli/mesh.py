@@ -226,7 +226,7 @@ def write_grid(result: Result, path: str, about: dict[str, str]) -> None:
     import shutil
 
     from fracslice.common.files import replacing, temporary_folder
-    from fracslice.volume.grid import write_vdb
+    from fracslice.volume.bricks import write_vdb
 
     with temporary_folder() as folder, replacing(path) as file:
         whole = folder / f"grid{GRID}"

@@ -162,7 +162,7 @@ def slice_(given: SliceOptions) -> int:
 def recipe(given: SliceOptions, scene: Scene, kind: str, resin: Resin | None) -> SliceRecipe:
     """Scene and settings of the layers."""
     from fracslice.jobs.slices import SliceRecipe
-    from fracslice.scene.writer import to_xml
+    from fracslice.scene.model import to_xml
 
     job = replace(given.slice_job(given.printing(scene.printing)), mirror=given.mirror)
     return SliceRecipe(to_xml(scene), scene.name, job, kind, resin, creation_date())

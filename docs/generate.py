@@ -3,8 +3,7 @@
 from pathlib import Path
 
 from fracslice import _WHERE
-from fracslice.scene.manual import markdown, package_stub, stub
-from fracslice.scene.schema import OPEN, PATH, open_relaxng, relaxng
+from fracslice.scene.manual import OPEN, PATH, markdown, open_relaxng, package_stub, relaxng, stub
 
 ROOT = Path(__file__).parents[1]
 

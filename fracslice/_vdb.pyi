@@ -1,4 +1,4 @@
-"""OpenVDB grids of samples. Call `fracslice.volume.grid` instead.
+"""OpenVDB grids of samples. Call `fracslice.volume.bricks` instead.
 
 Arrays are C-contiguous and laid out as in `fracslice.volume.bricks.Bricks`. Long calls release the GIL.
 """

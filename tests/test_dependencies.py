@@ -142,7 +142,7 @@ def test_a_missing_extra_is_one_line_that_says_what_to_install(
 
 def test_without_manifold3d_a_line_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     from fracslice.errors import MeshError
-    from fracslice.mesh.solid import to_manifold
+    from fracslice.mesh.model import to_manifold
     from tests.mesh.shapes import cube
 
     monkeypatch.setitem(sys.modules, "manifold3d", None)

@@ -40,7 +40,7 @@ def test_no_two_public_classes_have_one_name(trees: dict[Path, ast.Module]) -> N
 
 
 TWINS = {
-    "cpu", "cuda", "cuda_loops", "definitions", "field", "film", "implicit", "machine", "model", "orbits",
+    "cpu", "cuda", "cuda_loops", "field", "film", "implicit", "machine", "model", "orbits",
     "pictures", "slices",
 }  # fmt: skip
 """Modules of one name in two packages: mostly two sides of one thing, such as a formula and its kernel."""
@@ -66,7 +66,12 @@ def test_the_library_imports_itself_relatively(trees: dict[Path, ast.Module]) ->
 
 def test_every_name_in_backticks_exists(trees: dict[Path, ast.Module]) -> None:
     known = {part for path in trees for part in (path.stem, *path.parent.parts)}
-    known |= set(re.findall(r"\w+", NATIVE)) | set(dir(builtins)) | {"docs", "md"}
+    known |= (
+        set(re.findall(r"\w+", NATIVE))
+        | set(dir(builtins))
+        | {"docs", "md"}
+        | {p.stem for p in ROOT.glob("docs/**/*.md")}
+    )
     imported = set()
     for node in (n for tree in trees.values() for n in ast.walk(tree)):
         match node:

@@ -118,7 +118,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         write(shapes.cube(), tmp_path / name)
     (tmp_path / "my.ini").write_text("")
     (tmp_path / "own.py").write_text(OWN)
-    for name in ("registry.FORMULAS", "plugins._FILES"):
+    for name in ("registry.FORMULAS", "registry._FILES"):
         monkeypatch.setattr(
             f"fracslice.formulas.{name}", dict(pkgutil.resolve_name(f"fracslice.formulas.{name}"))
         )

@@ -7,10 +7,10 @@ from lxml import etree
 
 from fracslice import MeshJob, make_mesh
 from fracslice.formulas.definitions import definitions
-from fracslice.mesh.solid import to_manifold
+from fracslice.mesh.model import to_manifold
 from fracslice.scene import library, read, reads, to_xml
 from fracslice.scene.layout import formulas
-from fracslice.scene.schema import OPEN, PATH
+from fracslice.scene.manual import OPEN, PATH
 from tests.examples import stamped
 
 pytestmark = pytest.mark.once

@@ -17,8 +17,7 @@ from ..errors import RenderError, SharedError
 from ..export.resuming import FinishedFiles, sort_finished
 from ..kernel.devices import choose_device
 from ..kernel.host import toolchain
-from ..scene.reader import reads
-from ..scene.writer import to_xml
+from ..scene import reads, to_xml
 from ..work import Work
 from .film import FilmJob
 from .timeline import Timeline

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..common.memory import peak_rss_mb
 from ..mesh import Mesh
-from ..volume.accuracy import surface_error
+from ..mesh.fit import surface_error
 from ..work import Work
 from .methods import WORKLOADS, Workload
 

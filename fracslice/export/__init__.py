@@ -87,7 +87,7 @@ def write(
 ) -> Path:
     """Write a mesh to a file atomically, in the format of its extension. Equal meshes give equal bytes.
 
-    Coordinates are written as float32: quantise the mesh with `fracslice.mesh.quantisation.quantised` first,
+    Coordinates are written as float32: quantise the mesh with `fracslice.mesh.cleaning.quantised` first,
     and check the quantised mesh.
 
     Parameters

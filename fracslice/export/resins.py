@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.files import read_table, read_text
 from ..common.parameters import REQUIRED, Count, Label, Number, attribute, from_table, validate
-from ..common.settings import read_table, read_text
 from ..errors import ExportError
 from ..slicing.printers import PRINTERS, Printer
 

@@ -22,9 +22,8 @@ from io import BufferedReader
 from pathlib import Path
 from urllib.parse import quote, urlsplit
 
-from ..common.files import reporting_errors
+from ..common.files import read_text, reporting_errors
 from ..common.parameters import printable
-from ..common.settings import read_text
 from ..errors import ExportError
 from ..work import Work
 

@@ -18,8 +18,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..common.files import check_target, temporary_folder
-from ..common.settings import read_text
+from ..common.files import check_target, read_text, temporary_folder
 from ..errors import ExportError
 from ..work import Work
 

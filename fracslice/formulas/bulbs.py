@@ -1,14 +1,174 @@
-"""Relatives of the Mandelbrot set in three dimensions."""
+"""The Mandelbulb, w -> w^n + p in White and Nylander's triplex numbers or w^n + c (its Julia sets), and other
+relatives of the Mandelbrot set in three dimensions.
+
+What follows from the power of a map w -> m(w) + c with |m(w)| = |w|^n: |w_n+1| >= |w_n|^n - |c| bounds the
+solid from outside. For |w| >= |c| and |w|^(n-1) > 2, |w| grows with each step, so no orbit comes back from
+beyond 2. The one critical point of these maps is 0.
+"""
 
 from __future__ import annotations
 
-from ..common.parameters import Count, Number
-from . import power_maps
-from .orbits import LENGTHS, MAJORANTS, Stepped, orbit, orbit_step, positive, turn
-from .powers import calm_power, power_length, square, square_length
+import math
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any
+
+from ..common.parameters import Count, Number, Vector
+from ..providers import provider
+from .escape import enclosing_radius, farthest, stop
+from .orbits import (
+    ITERATIONS,
+    LENGTHS,
+    MAJORANTS,
+    REPEAT,
+    Stepped,
+    orbit,
+    orbit_step,
+    positive,
+    rounds,
+    steps,
+    turn,
+)
+from .powers import calm_power, power_length, products, square, square_length
 from .powers import power as raised
 from .registry import Fixed, Node
 from .vocabulary import absolute, atan2, cos, exp, floor, log, maximum, rsqrt, sin, sqrt, where
+
+ESCAPED = 1e4
+"""|w| one step past the radius where an orbit stops."""
+
+BAILOUT = 2.0
+"""Radius of the surface where a formula has no parameter for it."""
+
+CALM = 3.0
+"""Value of |w|^2, relative to that of the farthest point of the solid, from which only the radial stretch
+counts. A smaller value costs fewer evaluations, but makes the level sets steeper that seams lie on.
+"""
+
+
+def products_step(node: Node) -> Stepped:
+    """Return the step of an orbit with a `power`: a whole one is a constant of its code."""
+    function, values, julia = orbit_step(node)
+    power = node["power"]
+    return function, {**values, "power": Fixed(power) if products(power)[0] else power}, julia
+
+
+def power_step(node: Node) -> Stepped:
+    """Return the step of a power map, with the stretch for hybrids."""
+    function, values, julia = products_step(node)
+    values.pop("bailout", None)
+    return function, {**values, "calm": Fixed(())}, julia
+
+
+def power_alone(node: Node) -> dict[str, Any]:
+    """Return the argument of `powers.calm_power` of an orbit that is no hybrid."""
+    if not _is_connected(node):
+        return {}
+    reach, escape = _reach(node), stop(node["power"], _bailout(node), ESCAPED)
+    fading = 1 / (min(CALM * reach**2, escape**2) - reach**2)
+    return {"calm": (1 + reach**2 * fading, fading)}
+
+
+def power_growth(node: Node) -> dict[str, Any]:
+    """Return the attributes of `kernel.growth.Growth`."""
+    return {
+        "powers": (float(node["power"]),),
+        "factors": (0.0,),
+        "escapes": (_bailout(node),),
+        "half": (_radius(node),) * 3,
+        "proved": _bailout(node) ** (node["power"] - 1) >= 2,
+        "least": 1.0,
+        "stopped": ESCAPED,
+        "connected": _is_connected(node),
+        "reach": _reach(node),
+    }
+
+
+HOOKS: dict[str, Callable[..., Any]] = {"step": power_step, "alone": power_alone, "growth": power_growth}
+
+
+def _bailout(node: Node) -> float:
+    return float(node.values.get("bailout", BAILOUT))
+
+
+def _radius(node: Node) -> float:
+    """Radius of the solid."""
+    power, bailout, count = node["power"], _bailout(node), min(rounds(node), 60)
+    if node["julia"]:
+        return enclosing_radius(power, bailout, count, math.hypot(*node["julia"]))
+    return _own_radius(power, bailout, count)
+
+
+@lru_cache(maxsize=256)
+def _own_radius(power: float, bailout: float, count: int) -> float:
+    """Radius of the solid whose constant is the start point: its own bound is iterated from above."""
+    radius = bailout + ESCAPED
+    for _ in range(100):
+        radius = enclosing_radius(power, bailout, count, radius)
+    return radius
+
+
+def _reach(node: Node) -> float:
+    """Radius of the solids of all numbers of steps."""
+    constant = math.hypot(*node["julia"]) if node["julia"] else _radius(node)
+    return farthest(node["power"], _bailout(node), constant)
+
+
+def _is_connected(node: Node) -> bool:
+    """True if the critical point 0 is inside; if not, the set of one constant is disconnected."""
+    if not node["julia"]:
+        return True
+    bailout, (code, values) = _bailout(node), steps(node, alone=False)
+    outer = stop(node["power"], bailout, ESCAPED)
+    stays: bool = provider("orbit_samples").stays(code, values, rounds(node), bailout, outer)
+    return stays
+
+
+@orbit(
+    power=Number(
+        8.0, "the exponent; whole numbers need no trigonometry and are several times faster", least=2, most=32
+    ),
+    iterations=ITERATIONS,
+    bailout=Number(2.0, "the solid is where the last step is not larger than this", above=1, most=1e6),
+    julia=Vector(
+        None,
+        "adds this point in each step instead of the start point: a Julia set of the Mandelbulb",
+        most=4,
+        least=-4,
+    ),
+    repeat=REPEAT,
+)
+def mandelbulb(w, c, power, calm):  # type: ignore[no-untyped-def]
+    """The Mandelbulb: whole powers by complex multiplication, others in polar coordinates.
+
+    White and Nylander 2009; distance: Quilez 2009, "Mandelbulb", after Hart, Sandin and Kauffman 1989. With
+    w = (rho e^(i phi), z), w^n = (Im (z + i rho)^n e^(i n phi), Re (z + i rho)^n).
+
+    The map stretches by n r^(n-1) along meridians and by n |sin n theta / sin theta| r^(n-1) along circles of
+    latitude. The usual dr ignores the second stretch, and overestimates distances up to 13 times near the
+    poles. Here it counts as far out as a point of the solid can come (`escape.farthest`). Farther out, each
+    step increases the radius in any direction, so only the radial stretch matters, and the second is faded
+    out.
+
+    There is no theorem for three dimensions; L = 2 is measured (`docs/how/accuracy.md`). It fails for a
+    disconnected set (a constant far out): there the field also stays below twice `escape.sure_distance`. A
+    fractional power tears space where the azimuth jumps from pi to -pi. No bound holds across the tear, so
+    the conservative field stays below the sure distance to it.
+    """
+    return calm_power(w, power, calm) + c
+
+
+mandelbulb.hooks.update(HOOKS)
+
+
+@mandelbulb.check  # type: ignore[untyped-decorator]
+def mandelbulb_check(node: Node) -> None:
+    if node["bailout"] ** node["power"] > 1e15:
+        raise node.fail(
+            f"bailout={node['bailout']:g}: expected at most {1e15 ** (1 / node['power']):.4g} "
+            f"for power {node['power']:g}"
+        )
+
 
 POWER = Number(8.0, "the exponent", least=2, most=16)
 
@@ -42,13 +202,13 @@ def burning_ship(w, c, power, calm):  # type: ignore[no-untyped-def]
     return calm_power(positive(w), power, calm) + c
 
 
-burning_ship.hooks.update(power_maps.HOOKS)
+burning_ship.hooks.update(HOOKS)
 
 
 @burning_ship.growth  # type: ignore[untyped-decorator]
 def burning_ship_growth(node: Node) -> dict[str, object]:
     """Of positive coordinates, no azimuth is at the tear."""
-    return {**power_maps.power_growth(node), "torn": False}
+    return {**power_growth(node), "torn": False}
 
 
 @orbit(power=Count(3, "the exponent", least=2, most=9))
@@ -142,7 +302,7 @@ def lambda_bulb(w, c, power, factor, angle):  # type: ignore[no-untyped-def]
     return factor * turn(w - raised(w, power), (0.0, 0.0, 1.0), angle)
 
 
-lambda_bulb.hooks["step"] = power_maps.products_step
+lambda_bulb.hooks["step"] = products_step
 
 
 @lambda_bulb.slope  # type: ignore[untyped-decorator]

@@ -9,15 +9,20 @@ makes a `Node` of a scene tree.
 
 from __future__ import annotations
 
+import sys
+import traceback
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
+from importlib.util import module_from_spec, spec_from_file_location
 from inspect import Signature
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, TypeVar
 
 from ..common.parameters import REQUIRED, Parameter, python_name, validate_value
-from ..errors import SceneError
+from ..errors import FracsliceError, FracsliceWarning, SceneError
 from .box import Box
 from .node import FORMULAS, bind_arguments, docstring, ordered_parameters, signature
 from .node import Node as Node
@@ -396,3 +401,49 @@ def get(name: str) -> Formula:
 def names() -> list[str]:
     """Names of all formulas, sorted; see `get`."""
     return sorted(FORMULAS)
+
+
+GROUP = "fracslice.formulas"
+"""Group of entry points: each names a module that registers formulas."""
+
+_FILES: dict[str, Path] = {}
+
+
+def run_file(path: str) -> list[Formula]:
+    """Run a Python file that registers formulas, once."""
+    file = Path(path).resolve()
+    module = f"formulas of {file}"
+    if module not in _FILES:
+        spec = spec_from_file_location(module, file)
+        if spec is None or spec.loader is None or not file.is_file():
+            raise SceneError(f"{path}: expected a Python file of formulas")
+        loaded = sys.modules[module] = module_from_spec(spec)
+        try:
+            spec.loader.exec_module(loaded)
+        except FracsliceError:
+            raise
+        except Exception as error:
+            lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__, None)]
+            line = getattr(error, "lineno", None) or lines[-1]
+            raise SceneError(f"{path}:{line}: {type(error).__name__}: {error}") from error
+        _FILES[module] = file
+    return [formula for formula in map(get, names()) if formula.function.__module__ == module]
+
+
+@cache
+def load_installed() -> None:
+    """Load the formulas of installed packages; warn of a module that cannot be loaded."""
+    from importlib.metadata import entry_points  # imports an e-mail parser
+
+    for entry in entry_points(group=GROUP):
+        try:
+            entry.load()
+        except Exception as error:
+            message = f"formulas of {entry.value} are left out: {type(error).__name__}: {error}"
+            warnings.warn(message, FracsliceWarning, stacklevel=2)
+
+
+def origin(formula: Formula) -> str:
+    """Place that a formula is from: a package, or a file of the user."""
+    module = formula.function.__module__
+    return str(_FILES.get(module, module.partition(".")[0]))

@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..mesh.checks import Tally, nearest, surface_to_mesh
-from ..mesh.cleaning import SelectedPiece, finished_piece
+from ..mesh.cleaning import SelectedPiece, finished_piece, grid_planes, place_and_round
 from ..mesh.pieces import HEAD, TAIL, Pieces, gather_rows
-from ..mesh.quantisation import grid_planes, place_and_round
 from ..mesh.shells import NearBodies, Nesting, WholeShells
 from ..mesh.tips import Late, without_tips
 from ..mesh.topology import choose
@@ -30,8 +29,7 @@ from .report import Clock, Placement
 if TYPE_CHECKING:
     from ..mesh import Mesh
     from ..mesh.checks import MeshReport
-    from ..mesh.cleaning import Finished
-    from ..mesh.quantisation import Frame
+    from ..mesh.cleaning import Finished, Frame
     from ..mesh.topology import Removed
     from ..volume import Plan, SignBricks
     from .surfaces import Surface
@@ -381,7 +379,7 @@ def off_surface(
 
     `vertices`: float64 (n, 3), mm. Returns float64 (n,), scene units.
     """
-    from ..volume.accuracy import surface_error
+    from ..mesh.fit import surface_error
 
     return surface_error(planned.root, vertices, planned.voxel, work, place.scale, place.offset)
 

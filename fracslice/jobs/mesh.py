@@ -175,7 +175,7 @@ class _Job:
 
     def recipe(self, again: bool) -> MeshRecipe:
         """Recipe of the field, for other processes; `again` if the field chose the bodies."""
-        from ..scene.writer import to_xml
+        from ..scene.model import to_xml
         from .shared import MeshRecipe
 
         return MeshRecipe(to_xml(self.scene), self.scene.name, self.what, again)

@@ -24,8 +24,8 @@ from ..records import MeshJob
 from ..scene.reader import reads
 from ..store import Arrays
 from ..volume import Plan, SignBricks
-from ..volume.exploration import Evaluate, brick_signs
 from ..volume.lattice import BRICK
+from ..volume.sampler import Evaluate, brick_signs
 from ..volume.sizing import sizing
 from ..work import Work, chunks
 from .mesh_steps import Contour, Executor, MeshStep, R, Sampled, Summary, joined_summary

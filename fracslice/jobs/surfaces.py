@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..common.memory import available_bytes
 from ..errors import TooLargeError
 from ..volume.lattice import BRICK
-from ..volume.states import distinct
+from ..volume.pruning import distinct
 from .report import Clock
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ..mesh.refine import Refined
     from ..mesh.shells import WholeShells
     from ..volume import Plan, SignBricks
-    from ..volume.exploration import Evaluate
+    from ..volume.sampler import Evaluate
     from .mesh_steps import Executor, Sampled
 
 BYTES_A_CROSSING = 140

@@ -15,12 +15,11 @@ from .._native import bounds, near
 from ..common.messages import format_count
 from ..errors import MeshError
 from ..formulas.algebra import dot
+from ..mesh.fit import NEAR, surface_error, surface_points
 from ..volume import Plan
-from ..volume.accuracy import NEAR, surface_error, surface_points
 from ..work import Work
-from .cleaning import Finished
+from .cleaning import Finished, quantise_mesh
 from .model import Mesh
-from .quantisation import quantise_mesh
 from .spatial import Nearest
 
 

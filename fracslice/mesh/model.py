@@ -18,6 +18,7 @@ from .topology import Sizes, component_sizes, edge_topology
 
 if TYPE_CHECKING:
     import trimesh
+    from manifold3d import Manifold
 
 CLAY = "#efe3d0"
 
@@ -351,3 +352,27 @@ def concatenate(meshes: list[Mesh]) -> Mesh:
     offsets = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
     triangles = [mesh.triangles + np.int32(offset) for mesh, offset in zip(meshes, offsets, strict=True)]
     return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(triangles))
+
+
+_REASONS = {
+    "NonFiniteVertex": "a coordinate is not a finite number",
+    "NotManifold": "it is not closed, or an edge does not join exactly two triangles of the same sense",
+    "VertexOutOfBounds": "a triangle names a vertex that does not exist",
+    "ResultTooLarge": "it has too many triangles",
+}
+
+
+def to_manifold(mesh: Mesh) -> Manifold:
+    """Convert a mesh to a manifold3d solid, in double precision, without repair."""
+    if reason := lacking("manifold3d", "solids need"):
+        raise MeshError(reason)
+    import manifold3d
+
+    if not len(mesh.triangles):
+        raise MeshError("the mesh has no triangles")
+    corners = np.array(mesh.vertices, np.float64)  # copy: manifold3d needs a writeable array
+    solid = manifold3d.Manifold(manifold3d.Mesh64(corners, mesh.triangles.astype(np.uint64)))
+    status = solid.status().name
+    if status != "NoError":
+        raise MeshError(f"the mesh is not a solid: {_REASONS.get(status, status)}")
+    return solid

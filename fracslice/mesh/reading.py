@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from ..common.files import open_regular
 from ..common.messages import format_count
 from ..errors import MeshError
+from .cleaning import quantise_mesh
 from .model import Mesh, concatenate
 from .pieces import NOTHING
-from .quantisation import quantise_mesh
 
 MILLIMETRES = {
     "micron": 1e-3,

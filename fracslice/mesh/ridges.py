@@ -20,11 +20,11 @@ from .._native import connected_components
 from ..volume import Plan
 from ..volume.lattice import values_at
 from ..work import Work
+from .cleaning import quantise, used_vertices
 from .contouring import BLUNT, Piece
 from .fit import OFF, UPRIGHT, Fit
 from .model import Mesh
 from .pieces import Pieces, rows
-from .quantisation import quantise, used_vertices
 from .refine import Edges, edges_of, on_creases, on_three, split_edges, with_neighbours
 from .spatial import Nearest, self_intersecting_triangles
 from .tips import Cap, heights, replace_by_fans, spans, tips_to_end

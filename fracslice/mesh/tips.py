@@ -16,11 +16,11 @@ from ..volume import Plan
 from ..volume.extent import SLANTS, climb
 from ..volume.lattice import values_at
 from ..work import Work
+from .cleaning import quantise, used_vertices
 from .contouring import Piece
 from .fit import OFF, UPRIGHT, Fit
 from .model import Mesh
 from .pieces import NOTHING, Pieces, join_at_seam, near_plane, rows
-from .quantisation import quantise, used_vertices
 from .spatial import self_intersecting_triangles
 
 ANGLES = 0.6, 0.3, 0.1

@@ -9,7 +9,7 @@ import numpy as np
 from ..formulas import Box, Node, cylinder, transform, union
 from ..kernel import Field
 from ..volume import Bricks, Drain
-from ..volume.grid import from_grid, to_grid
+from ..volume.bricks import from_grid, to_grid
 from .components import components_of
 from .samples import Samples, positions
 

@@ -20,10 +20,8 @@ from ..common.parameters import Number, picture_size, validate_value
 from ..errors import ClusterError, RenderError
 from ..formulas.registry import Node
 from ..kernel.devices import choose_device
-from ..scene import Scene
-from ..scene.reader import reads
+from ..scene import Scene, reads, to_xml
 from ..scene.view import Camera, Film, View
-from ..scene.writer import to_xml
 from ..work import Work
 from .accumulator import CHANNELS, Accumulator, PassPlan, grids
 from .cpu import BLOCK, CpuTracer

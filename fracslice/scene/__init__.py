@@ -2,8 +2,7 @@
 
 from ..common.parameters import parse_length
 from ..records import Print
-from .model import Scene, scene
+from .model import Scene, scene, to_xml
 from .reader import read, reads
-from .writer import to_xml
 
 __all__ = ["Print", "Scene", "parse_length", "read", "reads", "scene", "to_xml"]

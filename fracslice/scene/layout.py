@@ -10,8 +10,7 @@ from typing import Any
 from ..common.parameters import REQUIRED, Choice, Length, Number, Parameter, Vector
 from ..formulas import get, names
 from ..formulas.definitions import is_name
-from ..formulas.plugins import load_installed
-from ..formulas.registry import Formula
+from ..formulas.registry import Formula, load_installed
 from ..records import Part, Print
 from .animation import Animation, Track
 from .view import PARTS

@@ -1,20 +1,22 @@
-"""Scene records, and the function that builds a scene in Python."""
+"""Scenes: the record, the function that builds one in Python, and their text in XML."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
-from ..common.parameters import AUTO, AnyLength, parse_length
+from ..common.parameters import AUTO, AnyLength, Vector, parse_length, short_repr
 from ..errors import SceneError
 from ..formulas import Node, get
-from ..formulas.definitions import definitions
-from ..records import Print
+from ..formulas.definitions import Definition, definitions
+from ..records import Part, Print
 from .animation import Animation, Track
+from .layout import DEFINE, PARAMETER, SCENE, SECTIONS, SOLID, VERSION, Element
 from .view import View
 
 
@@ -88,8 +90,6 @@ class Scene:
 
         Equal scenes have equal hashes on every platform.
         """
-        from .writer import to_xml
-
         return hashlib.sha256(to_xml(self).encode()).hexdigest()[:12]
 
     def with_values(self, settings: Iterable[str]) -> Scene:
@@ -186,3 +186,83 @@ def computing(fail: Callable[[str], SceneError]) -> Iterator[None]:
             yield
     except (ArithmeticError, ValueError):
         raise fail("has numbers too large or too small to compute with") from None
+
+
+def to_xml(scene: Scene) -> str:
+    """Return the canonical scene file: non-default values only, indented by two spaces per level.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+
+    Returns
+    -------
+    str
+        XML that reads back as an equal scene.
+
+    Raises
+    ------
+    SceneError
+        For a shape, which has no size.
+    """
+    if isinstance(scene, Node):
+        raise SceneError(f"{short_repr(scene)}: expected a scene, such as Scene(sphere(), 40)")
+    return "\n".join(_lines(scene)) + "\n"
+
+
+def part_to_xml(part: Part | Print) -> str:
+    """Return a record of a scene as an XML element."""
+    section = SECTIONS[part.element]
+    values = {name: getattr(part, name) for name in section.parameters}
+    return f"<{section.name}{_attributes(section, values)}/>"
+
+
+def _lines(scene: Scene) -> Iterator[str]:
+    yield f"<{SCENE.name}{_attributes(SCENE, {'version': VERSION})}>"
+    for definition in definitions(scene.root):
+        yield from _definition(definition)
+    yield f"  <{SOLID.name}{_attributes(SOLID, {'size': scene.size_mm, 'unit': scene.unit_mm})}>"
+    yield from _element(scene.root, "    ")
+    yield f"  </{SOLID.name}>"
+    printing = () if scene.printing == Print() else (scene.printing,)
+    film = () if scene.animation is None else (scene.animation, *scene.tracks)
+    for part in (*printing, *scene.view.parts, *film):
+        yield "  " + part_to_xml(part)
+    yield f"</{SCENE.name}>"
+
+
+def _element(node: Node, indent: str) -> Iterator[str]:
+    start = f"{indent}<{node.formula.name}{_attributes(node.formula, node.values)}"
+    if not node.children:
+        yield start + "/>"
+        return
+    yield start + ">"
+    for child in node.children:
+        yield from _element(child, indent + "  ")
+    yield f"{indent}</{node.formula.name}>"
+
+
+def _definition(definition: Definition) -> Iterator[str]:
+    """Write a definition."""
+    values = {name: getattr(definition, name) for name in DEFINE.parameters}
+    yield f"  <{DEFINE.name}{_attributes(DEFINE, values)}>"
+    for name, kind in definition.parameters:
+        default = kind.default if isinstance(kind, Vector) else (kind.default,)
+        limits = {limit: value for limit in ("least", "most") if isfinite(value := getattr(kind, limit))}
+        given = {"name": name, "default": default, **limits}
+        yield f"    <{PARAMETER.name}{_attributes(PARAMETER, given)}/>"
+    from html import escape  # its table of entities takes a millisecond
+
+    for line in definition.text.split("\n"):
+        yield f"    {escape(line, quote=False)}".rstrip()
+    yield f"  </{DEFINE.name}>"
+
+
+def _attributes(element: Element, values: Mapping[str, Any]) -> str:
+    """Attributes that differ from their defaults, as XML."""
+    from html import escape
+
+    kinds = element.parameters
+    changed = {name: value for name, value in values.items() if value != kinds[name].default}
+    return "".join(f' {name}="{escape(kinds[name].text(value))}"' for name, value in changed.items())

@@ -7,22 +7,22 @@ declare anything. It opens no other file: no entity is expanded, nothing is incl
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+import textwrap
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from xml.parsers import expat
 
 from ..common.files import open_regular
 from ..common.messages import hint
-from ..common.parameters import REQUIRED, File, Parameter, printable
+from ..common.parameters import REQUIRED, File, Number, Parameter, Vector, printable
 from ..errors import SceneError
 from ..formulas import Node
-from ..formulas.definitions import Defined
+from ..formulas.definitions import Defined, Definition, formula
 from ..formulas.registry import DEEPEST, TOO_DEEP
 from ..records import Part, Print
 from .animation import Animation, Track
-from .definitions import make_definition, parameter
 from .layout import (
     DEFINE,
     LISTED,
@@ -37,6 +37,9 @@ from .layout import (
 )
 from .model import Scene, computing, scene
 from .view import View
+
+if TYPE_CHECKING:
+    from .model import Scene
 
 LARGEST_FILE, MOST_ELEMENTS, MOST_DEFINED = 16 << 20, 1 << 17, 100
 """Most bytes and elements of a scene, and most definitions, or parameters of one."""
@@ -240,7 +243,7 @@ class _Builder:
         """Store an element that is no formula."""
         section = closed.element
         if section is PARAMETER:
-            self.open[-1].declared.append(parameter(closed.values, closed.fail))
+            self.open[-1].declared.append(_parameter(closed.values, closed.fail))
             if len(self.open[-1].declared) > MOST_DEFINED:
                 raise closed.fail(f"expected at most {MOST_DEFINED} of them in a definition")
         elif section is DEFINE:
@@ -260,7 +263,7 @@ class _Builder:
         """Add the formula of a definition."""
         if sum(isinstance(formula, Defined) for formula in self.formulas.values()) == MOST_DEFINED:
             raise closed.fail(f"expected at most {MOST_DEFINED} definitions in a scene")
-        made = make_definition(closed.values, closed.declared, closed.lines, self.source)
+        made = _make_definition(closed.values, closed.declared, closed.lines, self.source)
         if made.name in self.formulas:
             raise closed.fail(f"name={_quote(made.name)}: expected one definition of this name")
         self.formulas[made.name] = made
@@ -296,3 +299,30 @@ def _quote(text: str) -> str:
     """A value as one short quoted line."""
     line = printable(text)
     return f'"{line if len(line) <= 60 else line[:57] + "..."}"'
+
+
+def _parameter(values: Mapping[str, Any], fail: Callable[[str], SceneError]) -> tuple[str, Parameter]:
+    """Make the kind of a declared parameter."""
+    default = values["default"]
+    limits = {name: values[name] for name in ("least", "most") if values.get(name) is not None}
+    kind = Vector(default, "", **limits) if len(default) == 3 else Number(default[0], "", **limits)
+    try:
+        kind.check(kind.default)
+    except ValueError as error:
+        raise fail(f'default="{kind.text(kind.default)}": expected {error}') from None
+    return values["name"], kind
+
+
+def _make_definition(
+    values: Mapping[str, Any], parameters: list[tuple[str, Parameter]], lines: Mapping[int, str], source: str
+) -> Defined:
+    """Make the formula of a `<define>`."""
+    used = [number for number, line in lines.items() if line.strip()]
+    first, last = (min(used), max(used)) if used else (min(lines, default=1), 0)
+    text = "\n".join(lines.get(number, "").rstrip() for number in range(first, last + 1))
+    definition = Definition(
+        **values, parameters=tuple(parameters), text=textwrap.dedent(text), place=(source, first)
+    )
+    if definition.name in SECTIONS or definition.name in (PARAMETER.name, "scene"):
+        raise definition.fail(1, "expected a name that no other element has")
+    return formula(definition)

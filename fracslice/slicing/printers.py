@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..common.files import read_table
 from ..common.parameters import REQUIRED, Count, Label, Number, Vector, attribute, from_table, validate
-from ..common.settings import read_table
 from ..errors import SliceError
 
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from ..errors import ExportError
 from ..export import replacing
 from ..rendering.live import CameraInput, Live
+from ..scene.model import to_xml
 from ..scene.view import Camera
-from ..scene.writer import to_xml
 from ..work import Work
 from .canvas import Canvas
 from .screen import need_screen

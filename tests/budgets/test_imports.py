@@ -45,7 +45,7 @@ UNUSED = {
         "tomllib",
         "fracslice.mesh",
         "fracslice.printing.preparation",
-        "fracslice.volume.exploration",
+        "fracslice.volume.sampler",
     ),
     "render": (
         "scipy",

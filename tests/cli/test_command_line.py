@@ -21,7 +21,7 @@ from fracslice.cli.main import NAMES, commands, run
 from fracslice.cli.options import ClusterOptions
 
 from fracslice.scene import library
-from fracslice.volume.grid import read_vdb
+from fracslice.volume.bricks import read_vdb
 
 COMMAND = [sys.executable, "-c", "from fracslice.cli import main; main()"]
 

@@ -27,12 +27,10 @@ from fracslice.jobs.slices import SliceRecipe
 from fracslice.mesh import shells
 from fracslice.records import MeshJob
 from fracslice.rendering import Renderer, progressive
-from fracslice.scene import Scene, scene
-from fracslice.scene.reader import reads
+from fracslice.scene import Scene, reads, scene, to_xml
 from fracslice.scene.view import Camera, View
-from fracslice.scene.writer import to_xml
 from fracslice.slicing import SliceJob
-from fracslice.volume import exploration
+from fracslice.volume import sampler
 from fracslice.work import Work
 
 from .processes import SECONDS, Cluster, wait_until
@@ -111,7 +109,7 @@ def small_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(progressive, "PIXELS", 1024)
     monkeypatch.setattr(shared, "LEAST", 1)
     monkeypatch.setattr(shells, "FAN", 2)
-    monkeypatch.setattr(exploration, "MANY", 1)
+    monkeypatch.setattr(sampler, "MANY_BRICKS", 1)
     monkeypatch.setattr(shared, "BRICKS", 32)
     monkeypatch.setattr(workers, "CONNECT", SECONDS)  # the machine may be busy
 

@@ -24,7 +24,7 @@ from fracslice.mesh import shells
 from fracslice.records import MeshJob
 from fracslice.rendering import progressive
 from fracslice.scene import scene
-from fracslice.volume import exploration
+from fracslice.volume import sampler
 from fracslice.work import Work
 
 from .test_cluster import RECIPE, rendered, sliced
@@ -187,7 +187,7 @@ def test_a_3mf_file_is_concatenated(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 def test_what_needs_the_whole_mesh_is_sampled_by_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Chord and simplification are of the whole mesh, so shard 1 makes them of the shared samples."""
-    monkeypatch.setattr(exploration, "MANY", 1)
+    monkeypatch.setattr(sampler, "MANY_BRICKS", 1)
     monkeypatch.setattr(shared, "BRICKS", 8)
     ball, job = scene(sphere(), size="20mm"), MeshJob(resolution=16, chord=0.2, simplify=0.3)
     pieces, made = ResultFolder(str(tmp_path / "pieces")), list[str]()

@@ -15,7 +15,7 @@ from fracslice.formulas import box, cylinder, sphere
 from fracslice.jobs.slice_checks import CheckTask, check_run
 from fracslice.jobs.slices import SliceRecipe
 from fracslice.scene import scene
-from fracslice.scene.writer import to_xml
+from fracslice.scene.model import to_xml
 from fracslice.slicing import SliceJob
 from fracslice.slicing.layer_checks import check_layers, findings_of
 from fracslice.work import Work

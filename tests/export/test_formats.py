@@ -18,8 +18,8 @@ from fracslice.errors import ExportError, MeshError
 from fracslice.export import FORMATS, application, packages, write
 from fracslice.mesh import Mesh
 from fracslice.mesh.checks import check_mesh
+from fracslice.mesh.cleaning import quantise_mesh
 from fracslice.mesh.model import concatenate
-from fracslice.mesh.quantisation import quantise_mesh
 from fracslice.mesh.reading import read_mesh
 from tests.mesh.shapes import cube, inverted, sphere
 

@@ -8,7 +8,7 @@ import pytest
 from fracslice.cli.main import run
 
 from fracslice.errors import FracsliceWarning
-from fracslice.formulas import plugins
+from fracslice.formulas import registry
 from fracslice.formulas.node import FORMULAS
 
 OWN = '''
@@ -31,12 +31,12 @@ SCENE = '<scene version="1"><solid size="40mm"><own_box iterations="4"/></solid>
 
 @pytest.fixture(autouse=True)
 def forgotten():  # type: ignore[no-untyped-def]
-    known, files = dict(FORMULAS), dict(plugins._FILES)
+    known, files = dict(FORMULAS), dict(registry._FILES)
     yield
     FORMULAS.clear()
     FORMULAS.update(known)
-    plugins._FILES.clear()
-    plugins._FILES.update(files)
+    registry._FILES.clear()
+    registry._FILES.update(files)
 
 
 @pytest.fixture
@@ -121,7 +121,7 @@ class _Entry:
     value = "own.shapes"
 
     def __init__(self, path: str) -> None:
-        self.load = lambda: plugins.run_file(path)
+        self.load = lambda: registry.run_file(path)
 
 
 def test_installed_packages_are_loaded(files: tuple[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -130,13 +130,13 @@ def test_installed_packages_are_loaded(files: tuple[str, str], monkeypatch: pyte
 
     entries = [_Entry("none.py"), _Entry(files[0])]
     monkeypatch.setattr(
-        "importlib.metadata.entry_points", lambda group: entries if group == plugins.GROUP else []
+        "importlib.metadata.entry_points", lambda group: entries if group == registry.GROUP else []
     )
-    plugins.load_installed.cache_clear()
+    registry.load_installed.cache_clear()
     try:
         with pytest.warns(
             FracsliceWarning, match=r"formulas of own\.shapes are left out: SceneError: none\.py"
         ):
             assert read(files[1]).root.formula.name == "own_box"
     finally:
-        plugins.load_installed.cache_clear()
+        registry.load_installed.cache_clear()

@@ -8,13 +8,13 @@ import pytest
 from fracslice.formulas import (
     Node,
     abox,
+    bulbs,
     burning_ship,
     cosine_bulb,
     lambda_bulb,
     mandelbox,
     mandelbulb,
     orbit,
-    power_maps,
 )
 from fracslice.formulas.escape import sure_distance
 from fracslice.formulas.orbits import growth_of, steps
@@ -133,5 +133,5 @@ def test_a_whole_power_has_no_tear() -> None:
 def test_the_radius_of_a_solid_is_iterated_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nodes of one power and depth share it: 30,000 iterations were a tenth of a small picture."""
     bounds = mandelbulb(power=6, iterations=9).bounds
-    monkeypatch.setattr(power_maps, "enclosing_radius", None)
+    monkeypatch.setattr(bulbs, "enclosing_radius", None)
     assert mandelbulb(power=6, iterations=9).bounds == bounds

@@ -39,8 +39,8 @@ from fracslice.kernel.tree import ArrayField
 from fracslice.mesh import Mesh
 from fracslice.mesh.checks import check_mesh
 from fracslice.mesh.contouring import Piece, contour, contour_pieces, extract
+from fracslice.mesh.fit import surface_error
 from fracslice.volume import Bricks, plan, sample_scene
-from fracslice.volume.accuracy import surface_error
 from fracslice.work import Work
 
 pytestmark = pytest.mark.once

@@ -8,7 +8,7 @@ import pytest
 from fracslice._native import bounds, turned
 from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
-from fracslice.mesh.quantisation import place_and_round
+from fracslice.mesh.cleaning import place_and_round
 
 RNG = np.random.default_rng(5)
 SOUP = Mesh(RNG.normal(size=(9000, 3)), RNG.integers(0, 9000, (40000, 3)).astype(np.int32))

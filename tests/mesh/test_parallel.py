@@ -22,8 +22,8 @@ from fracslice._native import (
     touching,
 )
 from fracslice.mesh import Mesh
+from fracslice.mesh.cleaning import place_and_round, quantise
 from fracslice.mesh.model import concatenate
-from fracslice.mesh.quantisation import place_and_round, quantise
 from fracslice.mesh.shells import nesting
 from fracslice.mesh.spatial import self_intersecting_triangles
 from fracslice.mesh.topology import component_sizes

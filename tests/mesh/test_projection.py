@@ -9,7 +9,7 @@ from fracslice._native import trust_regions
 from fracslice.formulas import Node, box, mandelbulb, sphere, transform, union
 from fracslice.kernel import compile_scene
 from fracslice.mesh.contouring import project
-from fracslice.volume.accuracy import surface_error
+from fracslice.mesh.fit import surface_error
 
 
 def projected(

@@ -11,10 +11,10 @@ from scipy.spatial import HalfspaceIntersection
 from fracslice.formulas import Node, difference, intersection, mandelbulb, menger, plane, sphere, transform
 from fracslice.mesh import Mesh
 from fracslice.mesh.checks import check_mesh
+from fracslice.mesh.cleaning import quantise_mesh
 from fracslice.mesh.contouring import contour_whole
 from fracslice.mesh.fit import Fit
 from fracslice.mesh.pieces import Pieces
-from fracslice.mesh.quantisation import quantise_mesh
 from fracslice.mesh.refine import on_creases
 from fracslice.mesh.ridges import with_ridges
 from fracslice.mesh.spatial import Nearest

@@ -11,8 +11,8 @@ from fracslice.errors import Cancelled, MeshError
 from fracslice.formulas import box, cylinder, difference, mandelbulb, menger, transform, union
 from fracslice.mesh import Mesh
 from fracslice.mesh.checks import check_mesh
+from fracslice.mesh.cleaning import quantise_mesh
 from fracslice.mesh.contouring import contour
-from fracslice.mesh.quantisation import quantise_mesh
 from fracslice.mesh.simplify import Collapse, simplify
 from fracslice.mesh.spatial import Nearest, self_intersecting_triangles
 from fracslice.mesh.topology import edge_topology

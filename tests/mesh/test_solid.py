@@ -8,9 +8,8 @@ import pytest
 from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
 from fracslice.mesh.checks import check_mesh
-from fracslice.mesh.cleaning import clean
-from fracslice.mesh.quantisation import quantise_mesh
-from fracslice.mesh.solid import to_manifold
+from fracslice.mesh.cleaning import clean, quantise_mesh
+from fracslice.mesh.model import to_manifold
 
 from .shapes import GOOD, cube, sphere, with_flipped, without
 

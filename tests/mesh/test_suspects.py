@@ -11,9 +11,8 @@ import pytest
 from fracslice.formulas import Node, box, difference, mandelbulb, menger, shell, sphere, transform
 from fracslice.mesh import Mesh
 from fracslice.mesh.checks import MeshReport, Tally, check_mesh
-from fracslice.mesh.cleaning import Finished, clean
+from fracslice.mesh.cleaning import Finished, clean, grid_planes
 from fracslice.mesh.contouring import contour
-from fracslice.mesh.quantisation import grid_planes
 from fracslice.volume import plan, sample_scene
 
 pytestmark = pytest.mark.once

@@ -10,9 +10,9 @@ from fracslice import MeshJob, make_mesh
 from fracslice.formulas import Node, box, cone, menger, octahedron, sphere, transform, union
 from fracslice.mesh import Mesh
 from fracslice.mesh.checks import check_mesh
+from fracslice.mesh.cleaning import quantise_mesh
 from fracslice.mesh.contouring import Piece, contour
 from fracslice.mesh.pieces import Pieces
-from fracslice.mesh.quantisation import quantise_mesh
 from fracslice.mesh.tips import pointed_in, with_tips
 from fracslice.scene import scene
 from fracslice.volume import plan, sample_scene

@@ -45,7 +45,7 @@ from fracslice.scene import Print, scene
 from fracslice.slicing import SliceJob, plan_stack
 from fracslice.slicing.layers import Slicer
 from fracslice.volume import Drain, Plan, plan, sample_scene
-from fracslice.volume.grid import from_grid, to_grid
+from fracslice.volume.bricks import from_grid, to_grid
 from fracslice.volume.sizing import Sizing
 from fracslice.work import Work
 

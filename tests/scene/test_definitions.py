@@ -19,7 +19,7 @@ from fracslice.formulas.definitions import definitions
 from fracslice.kernel import compile_scene, reference
 from fracslice.kernel.depth import resolve_depths
 from fracslice.scene import Scene, read, reads, to_xml
-from fracslice.scene.schema import OPEN, PATH
+from fracslice.scene.manual import OPEN, PATH
 
 STEP = "return scale * ball(fold(w, 1), 0.5) + c"
 FILE = f"""<scene version="1">

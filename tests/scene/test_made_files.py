@@ -6,8 +6,7 @@ import pytest
 from lxml import etree
 
 from fracslice.formulas import names
-from fracslice.scene.manual import markdown
-from fracslice.scene.schema import PATH, relaxng
+from fracslice.scene.manual import PATH, markdown, relaxng
 
 DOCS = Path(__file__).parents[2] / "docs/reference/elements.md"
 

@@ -14,7 +14,7 @@ from lxml import etree
 from fracslice.errors import SceneError
 from fracslice.formulas import box, mandelbulb, menger, plane, repeat, sphere, torus, transform, twist, union
 from fracslice.scene import Print, Scene, reads, scene, to_xml
-from fracslice.scene.schema import PATH
+from fracslice.scene.manual import PATH
 
 from .trees import trees
 

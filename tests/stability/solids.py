@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from fracslice import MeshJob, make_mesh
 from fracslice.errors import FracsliceError
 from fracslice.formulas import Node
-from fracslice.mesh.solid import to_manifold
+from fracslice.mesh.model import to_manifold
 from fracslice.scene import scene
 from fracslice.work import Work
 

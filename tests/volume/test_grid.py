@@ -12,8 +12,7 @@ import pytest
 
 from fracslice.errors import VolumeError
 from fracslice.mesh.contouring import extract
-from fracslice.volume.bricks import INSIDE, Bricks
-from fracslice.volume.grid import NAME, from_grid, read_vdb, to_grid, write_vdb
+from fracslice.volume.bricks import INSIDE, NAME, Bricks, from_grid, read_vdb, to_grid, write_vdb
 from tests.fields import blobs, bricks_of, grid_points
 
 

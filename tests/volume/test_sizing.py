@@ -22,9 +22,7 @@ from fracslice.formulas import (
 )
 from fracslice.jobs.mesh import make_mesh as mesh_of
 from fracslice.records import MeshJob
-from fracslice.scene import Print, Scene, scene
-from fracslice.scene.reader import reads
-from fracslice.scene.writer import to_xml
+from fracslice.scene import Print, Scene, reads, scene, to_xml
 from fracslice.volume import extent
 from fracslice.volume.extent import _kept
 from fracslice.volume.sizing import Sizing, sizing

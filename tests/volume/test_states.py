@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fracslice.volume.states import BORDER, States, distinct
+from fracslice.volume.pruning import BORDER, States, distinct
 from fracslice.work import Work
 
 SHAPE = (3, 4, 5)

@@ -32,10 +32,10 @@ from fracslice.records import MeshJob
 from fracslice.rendering import Renderer
 from fracslice.scene import scene
 from fracslice.scene.animation import Animation
+from fracslice.scene.model import to_xml
 from fracslice.scene.view import Camera, View
-from fracslice.scene.writer import to_xml
 from fracslice.slicing import SliceJob
-from fracslice.volume import exploration
+from fracslice.volume import sampler
 from fracslice.work import Work
 
 from ..runner import Figures, Row, Run, Spread
@@ -239,7 +239,7 @@ def rows(
     workers: tuple[int, ...] = (1, 10, 100, 300, 1000),
     plot: str = "",
 ) -> Iterator[Row]:
-    shared.LEAST, exploration.MANY = bricks, bricks  # samples are tasks, as in the larger job
+    shared.LEAST, sampler.MANY = bricks, bricks  # samples are tasks, as in the larger job
     threads, sizes = run.threads[0], (pixels, layers, voxels, width, frames)
     kinds, smaller = jobs(*sizes), jobs(pixels, 8, voxels // 2, width // 2, 1)
     nothing = [Nothing("nothing", number) for number in range(empty)]

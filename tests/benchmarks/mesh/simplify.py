@@ -14,10 +14,10 @@ import numpy as np
 from fracslice.formulas import julia, mandelbulb, menger, sphere
 from fracslice.mesh import Mesh
 from fracslice.mesh.checks import check_mesh
+from fracslice.mesh.cleaning import quantise_mesh
 from fracslice.mesh.contouring import contour
-from fracslice.mesh.quantisation import quantise_mesh
+from fracslice.mesh.model import to_manifold
 from fracslice.mesh.simplify import simplify
-from fracslice.mesh.solid import to_manifold
 from fracslice.mesh.spatial import Nearest
 from fracslice.volume import plan, sample_scene
 from fracslice.work import Work

@@ -1,7 +1,7 @@
-"""Walls along triply periodic minimal surfaces, without end; put `bounds` around them.
+"""Lattices without end: struts, and walls along triply periodic minimal surfaces; put `bounds` around them.
 
-Level sets: von Schnering and Nesper 1991, "Nodal surfaces of Fourier series". Every field is divided by a
-bound of its gradient, so L = 1 without a grade; walls are thicker where the gradient is smaller.
+Level sets: von Schnering and Nesper 1991, "Nodal surfaces of Fourier series". Every field of a wall is
+divided by a bound of its gradient, so L = 1 without a grade; walls are thicker where the gradient is smaller.
 """
 
 from __future__ import annotations
@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from ..common.parameters import Number, Vector
+from ..common.parameters import Choice, Number, Vector
 from .box import Box
-from .registry import Node, shape
-from .vocabulary import absolute, cos, sin
+from .registry import Fixed, Node, shape
+from .vocabulary import absolute, cos, floor, maximum, minimum, sin, sqrt
 
 WALL: dict[str, Any] = {
     "period": Number(1.0, "length after which the surface repeats", above=0),
@@ -151,3 +151,76 @@ for _surface in (gyroid, schwarz_p, schwarz_d, neovius, iwp, lidinoid, frd, fisc
     _surface.arguments(wall_arguments)
     _surface.bounds(wall_bounds)
     _surface.slope(wall_slope)
+
+
+Segment = tuple[float, float, float, float, float, float]
+
+FACE_DIAGONALS: tuple[Segment, ...] = (
+    (0, 0, 0, 0.5, 0.5, 0),
+    (0, 0, 0, 0.5, 0, 0.5),
+    (0, 0, 0, 0, 0.5, 0.5),
+)
+OCTAHEDRON: tuple[Segment, ...] = (
+    (0.5, 0.5, 0, 0.5, 0, 0.5),
+    (0.5, 0, 0.5, 0, 0.5, 0.5),
+    (0, 0.5, 0.5, 0.5, 0.5, 0),
+)
+SQUARES: tuple[Segment, ...] = (
+    (0.5, 0.25, 0, 0.5, 0, 0.25),
+    (0.25, 0.5, 0, 0, 0.5, 0.25),
+    (0.25, 0, 0.5, 0, 0.25, 0.5),
+)
+HEXAGONS: tuple[Segment, ...] = (
+    (0, 0.25, 0.5, 0, 0.5, 0.25),
+    (0.25, 0, 0.5, 0.5, 0, 0.25),
+    (0.25, 0.5, 0, 0.5, 0.25, 0),
+)
+STRUTS: dict[str, tuple[Segment, ...]] = {
+    "cubic": ((0, 0, 0, 0.5, 0, 0), (0, 0, 0, 0, 0.5, 0), (0, 0, 0, 0, 0, 0.5)),
+    "bcc": ((0, 0, 0, 0.5, 0.5, 0.5),),
+    "fcc": FACE_DIAGONALS,
+    "octet": FACE_DIAGONALS + OCTAHEDRON,
+    "kelvin": SQUARES + HEXAGONS,
+}
+"""Axes of the struts in an eighth of the cell: all lattices are symmetric in its faces and centre planes."""
+
+
+@shape(
+    kind=Choice("octet", "the lattice", tuple(STRUTS)),
+    period=Number(1.0, "length of the edges of a cell", above=0),
+    thickness=Number(0.1, "diameter of the struts", above=0),
+)
+def struts(x, y, z, over, period, radius, segments):  # type: ignore[no-untyped-def]
+    """Struts along a cubic lattice: its edges, the space diagonals (bcc), the face diagonals (fcc), these and
+    an octahedron (octet truss: Fuller 1961; Deshpande, Fleck and Ashby 2001), or the edges of truncated
+    octahedra (Kelvin cells: Thomson 1887, "On the division of space with minimum partitional area").
+
+    L = 1: an exact distance. Space is folded into an eighth of a cell, by mirrors of the lattice.
+    """
+    x, y, z = over * x, over * y, over * z
+    x = absolute(x - floor(x + 0.5))
+    y = absolute(y - floor(y + 0.5))
+    z = absolute(z - floor(z + 0.5))
+    nearest = 1e9 + 0.0 * x
+    for ax, ay, az, bx, by, bz in segments:
+        dx, dy, dz = bx - ax, by - ay, bz - az
+        px, py, pz = x - ax, y - ay, z - az
+        t = minimum(maximum((px * dx + py * dy + pz * dz) / (dx * dx + dy * dy + dz * dz), 0.0), 1.0)
+        qx, qy, qz = px - t * dx, py - t * dy, pz - t * dz
+        nearest = minimum(nearest, qx * qx + qy * qy + qz * qz)
+    return period * sqrt(nearest) - radius
+
+
+@struts.arguments
+def struts_arguments(node: Node) -> dict[str, object]:
+    return {
+        "over": 1.0 / node["period"],
+        "period": node["period"],
+        "radius": node["thickness"] / 2,
+        "segments": Fixed(STRUTS[node["kind"]]),
+    }
+
+
+@struts.bounds
+def struts_bounds(node: Node) -> Box:
+    return Box.everywhere()
