@@ -158,7 +158,7 @@ def refuse_what_needs_triangles(output: str) -> None:
 
 def write_formula(scene: Scene, given: MeshFileOptions, work: Work) -> bool:
     """Write the formula of a scene, and print its size. A formula has no problems."""
-    from fracslice.jobs.implicit import make_implicit
+    from fracslice.jobs.mesh import make_implicit
 
     made = make_implicit(scene, given.mesh_job(scene), given.output, work)
     for note in made.notes:

@@ -98,7 +98,7 @@ register(
     orbit_samples="fracslice.kernel.growth",
     growth="fracslice.kernel.growth",
     orbit_signs="fracslice.kernel.growth",
-    distances="fracslice.api.distances",
+    distances="fracslice.api.meshing",
     parsing="fracslice.kernel.language",
     reference="fracslice.kernel.reference",
     files="fracslice.export",

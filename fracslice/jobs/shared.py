@@ -29,8 +29,8 @@ from ..volume.sampler import Evaluate, brick_signs
 from ..volume.sizing import sizing
 from ..work import Work, chunks
 from .mesh_steps import Contour, Executor, MeshStep, R, Sampled, Summary, joined_summary
-from .planning import apply_edits, plan_mesh
 from .report import Clock
+from .surfaces import apply_edits, plan_mesh
 
 SAMPLES = "samples"
 """File of a job with its samples."""

@@ -15,7 +15,7 @@ from fracslice.common.parameters import AUTO
 from fracslice.errors import KernelError, MeshError, SceneError
 from fracslice.export.implicit import write_implicit
 from fracslice.formulas import Node, mandelbulb, menger, sphere, transform, twist, union
-from fracslice.jobs.implicit import make_implicit
+from fracslice.jobs.mesh import make_implicit
 from fracslice.kernel import graph as graphs
 from fracslice.kernel.reference import reference
 from fracslice.mesh.reading import read_mesh
