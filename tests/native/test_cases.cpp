@@ -6,7 +6,7 @@
 #include <set>
 #include <utility>
 
-#include "mesh/faces.h"
+#include "mesh/cells.h"
 
 namespace fracslice::mesh {
 namespace {

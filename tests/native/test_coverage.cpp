@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "slices/bits.h"
+#include "slices/slab.h"
 #include "slices/marching_squares.h"
 
 namespace fracslice::slices {

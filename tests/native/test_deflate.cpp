@@ -6,7 +6,7 @@
 #include <random>
 #include <string>
 
-#include "slices/adler.h"
+#include "slices/picture.h"
 #include "slices/deflate.h"
 
 namespace fracslice::slices {

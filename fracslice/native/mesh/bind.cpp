@@ -6,19 +6,14 @@
 
 #include "../unlocked.h"
 #include "components.h"
-#include "edge_topology.h"
+#include "topology.h"
 #include "input.h"
-#include "measures.h"
-#include "nesting.h"
-#include "predicates.h"
-#include "proximity.h"
 #include "quantise.h"
+#include "predicates.h"
 #include "selection.h"
 #include "self_intersections.h"
 #include "stl.h"
-#include "text_rows.h"
 #include "tree.h"
-#include "weld.h"
 
 namespace fracslice::mesh {
 namespace {

@@ -5,7 +5,7 @@
 #include "../volume/brick_arrays.h"
 #include "bind_roots.h"
 #include "contour.h"
-#include "trust_regions.h"
+#include "marching_cubes.h"
 
 namespace fracslice::mesh {
 namespace {

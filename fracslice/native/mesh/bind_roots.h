@@ -1,7 +1,6 @@
 // Loops over a field, compiled or in Python, as native code calls them.
 #pragma once
 #include "../volume/bind_field.h"
-#include "projection.h"
 #include "roots.h"
 
 namespace fracslice::mesh {

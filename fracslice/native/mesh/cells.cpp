@@ -1,10 +1,9 @@
 #include "cells.h"
 
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_sort.h>
-
 #include <algorithm>
 #include <bit>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
 
 #include "blocks.h"
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-#include "faces.h"
+#include "cells.h"
 
 namespace fracslice::mesh {
 namespace {

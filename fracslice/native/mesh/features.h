@@ -1,15 +1,103 @@
 // The vertices of a surface that lie in cells and in their faces: found brick by brick, then matched between neighbours.
 #pragma once
-#include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
+#include <span>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
 
 #include "../array.h"
-#include "brick_cells.h"
+#include "cells.h"
+#include "vec3.h"
 
+// Where the planes through a cell's crossings meet.
 namespace fracslice::mesh {
+
+using Normal = std::array<float, 3>;
+
+inline Normal operator-(const Normal& n) { return {-n[0], -n[1], -n[2]}; }
+inline float dot(const Normal& a, const Normal& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+// A crossing: where the surface meets an edge of the unit cell, and its normal there.
+struct Crossing {
+    Vec3 point, normal;
+};
+
+// Unit normals further apart than this (25 degrees) make a feature; Kobbelt et al. 2001 use the same.
+constexpr double kSharp = 0.9;
+
+// Whether a unit normal with these other two coordinates is along an axis, as float32 rounds it.
+inline bool along_axis(float u, float v) { return std::abs(u) + std::abs(v) <= 1e-7f; }
+
+// The cosine of half that angle: normals all nearer to one of them make none.
+constexpr float kHalfSharp = 0.975f;
+
+inline bool sharp(const Crossing& a, const Crossing& b) { return dot(a.normal, b.normal) < kSharp; }
+
+// The point of the unit cell nearest to all the planes, in the least squares sense and no further from their points' mean
+// than they ask for (Kobbelt, Botsch, Schwanecke and Seidel 2001, "Feature sensitive surface extraction"; the quadratic error
+// of Garland and Heckbert 1997). The point lies strictly inside the cell, `margin` from its faces. Returns false where the
+// planes do not meet in one point of the cell: then there is no feature but roughness.
+bool feature_point(std::span<const Crossing> crossings, double margin, Vec3& point);
+
+// Where the surface's trace in the cell's lower face along `axis` has its corner: the two crossings' tangents in the face
+// intersected. Returns false where they do not meet within the face, `margin` from its edges.
+bool face_corner(const Crossing& a, const Crossing& b, int axis, double margin, Vec3& corner);
+
+// --- A brick with what the cells in it look at.
+
+// Where Numbers holds the crossing on each edge of the cell at 0, 0, 0.
+constexpr std::array<uint16_t, 12> make_places() {
+    std::array<uint16_t, 12> places{};
+    for (int e = 0; e < 12; ++e) places[e] = uint16_t(number_at(kEdges[e].axis, kEdges[e].dx, kEdges[e].dy, kEdges[e].dz));
+    return places;
+}
+constexpr std::array<uint16_t, 12> kPlaces = make_places();
+
+// A cell: its lower corner relative to its brick, and in grid units; its case; where Numbers holds its crossings.
+struct Cell {
+    int x, y, z;
+    Vec3 lower;
+    uint8_t number;
+    const uint32_t* numbers;
+
+    uint32_t at(int e) const { return numbers[kPlaces[e]]; }
+    BitPlane bit() const { return BitPlane(1) << (y * 8 + z); }
+};
+
+// A brick's cells; its crossings are still to be numbered.
+struct BrickCells {
+    Octant octant;
+    std::array<CornerPlanes, kSide + 1> corners;
+    Numbers numbers;
+    std::array<int, 3> first;  // its lowest grid point
+
+    BrickCells(const CellGrid& cells, size_t i)
+        : octant(cells.octant(i)), corners(corners_of(octant, cells.signs())), first(cells.place(i)) {
+        for (int& k : first) k *= kSide;
+    }
+
+    // Calls visit(cell) for the cells that the surface passes.
+    template <class Visit>
+    void for_each(const Visit& visit) const {
+        for_each_cell(corners, [&](int x, int y, int z, uint8_t number) { visit(cell(x, y, z, number)); });
+    }
+
+    // The same for some of plane x.
+    template <class Visit>
+    void for_each(int x, BitPlane cells, const Visit& visit) const {
+        for_each_cell(corners[x], corners[x + 1], x, cells,
+                      [&](int, int y, int z, uint8_t number) { visit(cell(x, y, z, number)); });
+    }
+
+  private:
+    Cell cell(int x, int y, int z, uint8_t number) const {
+        Vec3 lower = {double(first[0] + x), double(first[1] + y), double(first[2] + z)};
+        return {x, y, z, lower, number, &numbers[number_at(0, x, y, z)]};
+    }
+};
 
 // Where on its grid edge each of some crossings, `first` to `first + count - 1` as CellGrid numbers them, exactly lies, and
 // the surface's unit normal there, in three rows of `stride` numbers.
@@ -176,5 +264,10 @@ template <class Do>
 void for_each_brick(const LayerBricks& bricks, const Do& act) {
     tbb::parallel_for(size_t(0), bricks.size(), [&](size_t k) { act(bricks.brick(k)); });
 }
+
+// --- The features of one brick's cells.
+
+// Finds brick i's. data: the crossings that its cells have. along: whether their normals are all along their edges.
+void find_features(const CellGrid& cells, const Hermite& data, size_t i, bool along, Features& own, FeatureStore& store);
 
 }  // namespace fracslice::mesh

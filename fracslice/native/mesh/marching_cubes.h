@@ -1,4 +1,11 @@
+// Boxes in which vertices that lie on no grid edge are projected to the surface.
 #pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
 #include "../array.h"
 #include "../volume/bricks.h"
 
@@ -34,5 +41,17 @@ struct Placement {
 // The order of vertices and triangles follows from the bricks alone. Throws std::invalid_argument if a sign change leaves
 // the samples or the arrays contradict each other, std::length_error past 2^31 vertices or triangles.
 Surface marching_cubes(const Bricks& bricks, const Placement& placement);
+
+// Features as Contour has them.
+struct FeatureRows {
+    const double* points;
+    const float* to_means;
+    const uint8_t* cases;
+};
+
+// Of some features, inside or not: the low and the high corner of the interior of the cell or face that each lies in, the
+// nearest of its corners of the other sign, and the mean of the crossings around it, within the box. out: [4, 3, which.size()].
+void trust_regions(const FeatureRows& features, std::span<const int64_t> which, std::span<const bool> inside,
+                   const Placement& placement, double* out);
 
 }  // namespace fracslice::mesh

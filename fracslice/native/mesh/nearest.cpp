@@ -6,7 +6,7 @@
 #include <limits>
 #include <memory>
 
-#include "corner_table.h"
+#include "topology.h"
 
 namespace fracslice::mesh {
 namespace {

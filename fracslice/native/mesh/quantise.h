@@ -1,6 +1,9 @@
 // A mesh at coordinates that a file can hold, and which vertices still lie where the mesher put them.
 #pragma once
+
 #include <algorithm>
+#include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -8,7 +11,16 @@
 #include "triangles.h"
 #include "vec3.h"
 
+// Equal corners made one vertex, bit by bit.
 namespace fracslice::mesh {
+
+struct Welded {
+    Array<int64_t> first;   // of each set of equal points
+    Array<int32_t> labels;  // the set of each point
+};
+
+// bits: [n, 3], of float32 coordinates without negative zeros. Throws std::invalid_argument for more than 2^31 points.
+Welded weld(std::span<const uint32_t> bits);
 
 // The planes of a grid across the axes, ascending along each; [count, 3].
 struct Planes {
@@ -67,5 +79,23 @@ struct Quantised {
 // their faces, edges and cells. It also makes no two such vertices one.
 Quantised quantise(const MeshView& mesh, std::span<const bool> keep, std::span<const bool> displaced, const Edits& edits,
                    const Planes& planes, const Frame& frame);
+
+// --- Triangles of a mesh that rounding turns over, pointed vertices, and the bounding box.
+
+// The triangles, in order, that are flat or turn by a right angle or more when they are quantised.
+std::vector<int64_t> turned(const MeshView& mesh, const Frame& frame);
+
+// The vertices, in order, from which all edges fall off, at an angle of at least that sine. On a surface that has more than
+// `most` of them, only some.
+std::vector<int64_t> pointed(const MeshView& mesh, double sine, size_t most);
+
+// The box around some points; low above high if there are none.
+struct Bounds {
+    static constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    Vec3 low{kInfinity, kInfinity, kInfinity}, high{-kInfinity, -kInfinity, -kInfinity};
+};
+
+// points: [n, 3].
+Bounds bounds(std::span<const double> points);
 
 }  // namespace fracslice::mesh

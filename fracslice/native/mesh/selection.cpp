@@ -4,7 +4,7 @@
 #include <cassert>
 
 #include "blocks.h"
-#include "measures.h"
+#include "quantise.h"
 
 namespace fracslice::mesh {
 namespace {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "blocks.h"
-#include "measures.h"
+#include "quantise.h"
 
 namespace fracslice::mesh {
 namespace {

@@ -10,7 +10,7 @@
 #include <memory>
 
 #include "../machine.h"
-#include "filter.h"
+#include "deflate.h"
 #include "picture.h"
 
 namespace nb = nanobind;

@@ -3,6 +3,7 @@
 // A pixel is the cell between four samples. Corners and edges are counted counter-clockwise from the lower left corner and the
 // lower edge; edge c lies between the corners c and c + 1.
 #pragma once
+
 #include <array>
 #include <vector>
 

@@ -1,15 +1,230 @@
 #include "picture.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <cstddef>
+#include <cstdint>
 #include <cstring>
+#include <numeric>
 #include <utility>
+#include <vector>
 
 #include "../compiler.h"
-#include "band.h"
-#include "tile_rows.h"
+#include "avx512.h"
+#include "coverage.h"
 
 namespace fracslice::slices {
+
+// --- Tiles side by side as rows of pixels, as a screen shows them.
+
+// Turns tiles: their rows are rows of the picture, from above.
+class Orientation {
+ public:
+    // shown: levels as they are shown, by the coverage.
+    Orientation(bool transposed, bool backwards, const std::array<uint8_t, 256>& shown)
+        : transposed_(transposed), reversed_(backwards), shown_(shown) {
+        for (int level = 0; level < 256; ++level) plain_ &= shown_[level] == level;
+    }
+    // n tiles as eight rows, `stride` bytes from row to row.
+    void operator()(Levels* tiles, int n, uint8_t* rows, ptrdiff_t stride) const {
+        for (int i = 0; i < n; ++i, rows += kTile) {
+            if (!plain_)
+                for (uint8_t& level : tiles[i]) level = shown_[level];
+            uint64_t eight[8];
+            std::memcpy(eight, tiles[i].data(), sizeof eight);
+            if (transposed_) swap_rows_and_columns(eight);
+            for (int row = 0; row < kTile; ++row) {
+                const uint64_t bytes = reversed_ ? byteswapped(eight[kTile - 1 - row]) : eight[kTile - 1 - row];
+                std::memcpy(rows + row * stride, &bytes, sizeof bytes);
+            }
+        }
+    }
+    // A bit for each cell, a word for each of n tiles, as eight words for eight rows of eight tiles, and so on.
+    void operator()(const uint64_t* words, int n, uint64_t* rows) const {
+        for (int i = 0; i < n; i += 8) {
+            for (int k = i; k < i + 8; ++k) rows[k] = turned(words[k]);
+            swap_rows_and_columns(std::span<uint64_t, 8>(rows + i, 8));
+        }
+    }
+
+ private:
+    uint64_t turned(uint64_t word) const {
+        if (transposed_) word = transposed(word);
+        word = byteswapped(word);
+        return reversed_ ? mirrored(word) : word;
+    }
+
+    bool transposed_, reversed_, plain_ = true;
+    std::array<uint8_t, 256> shown_;
+};
+
+// --- Eight rows of a picture on their way to a string of bytes.
+
+// The numbers of bits that differ from the one before, of n words that are eight words apart; returns the end. Up to `kSlack`
+// numbers behind the end are written.
+inline int* turns_each(const uint64_t* words, int n, int* end) {
+    uint64_t before = 0;
+    for (int i = 0; i < n; ++i) {
+        const uint64_t word = words[8 * i];
+        each(word ^ (word << 1 | before), [&](int bit) { *end++ = 64 * i + bit; });
+        before = word >> 63;
+    }
+    return end;
+}
+#if defined(FRACSLICE_WIDE)
+FRACSLICE_WIDE inline int* turns_wide(const uint64_t* words, int n, int* end) {
+    uint64_t before = 0;
+    for (int i = 0; i < n; ++i) {
+        const uint64_t word = words[8 * i];
+        const SetBits turns(word ^ (word << 1 | before));
+        before = word >> 63;
+        for (int at = 0; at < turns.count; at += 16)
+            _mm512_storeu_si512(end + at, _mm512_add_epi32(turns.sixteen(at), _mm512_set1_epi32(64 * i)));
+        end += turns.count;
+    }
+    return end;
+}
+inline const auto find_turns = kWide ? turns_wide : turns_each;
+#else
+inline constexpr auto find_turns = turns_each;
+#endif
+
+// Eight rows of a picture, from its column `first` to before `last`: of the tiles the first, those that are cut, and the one
+// after each of these. All else is as its left neighbour.
+class Band {
+ public:
+    Band(const Orientation& orientation, int tiles, int first, int last)
+        : orientation_(orientation), first_(first), last_(last), capacity_(tiles / 8 * 8 + 16), column_(capacity_), tiles_(capacity_),
+          cut_(capacity_), cut_rows_(capacity_), levels_(size_t(kTile * stride())), ends_(kTile * capacity_ + 2 + kSlack) {}
+
+    // Begins with eight rows of which those from `from` to before `to` are on the picture; `at`: the place of the first one's
+    // first byte among all bytes, `across` from row to row.
+    void clear(int from, int to, uint64_t at, uint64_t across) { n_ = 0, from_ = from, to_ = to, at_ = at, across_ = across; }
+    // A tile of which some cells are cut as the next one, if it is on the picture. Its levels are to be set before the end.
+    Levels& cut(int tile, uint64_t cells) {
+        column_[n_] = kTile * tile, cut_[n_] = cells;
+        return tiles_[on(tile) ? n_++ : capacity_ - 1];
+    }
+    // One that is not cut.
+    void uniform(int tile, bool inside) {
+        if (!on(tile)) return;
+        column_[n_] = kTile * tile, cut_[n_] = 0, tiles_[n_++].fill(inside ? 255 : 0);
+    }
+    void close() {
+        if (n_ == 0) return;
+        column_[n_] = last_;
+        lay_out();
+        sum_.add(sums(), at_, across_, uint64_t(to_ - from_));
+    }
+    // The checksum of all bands, of n bytes in all.
+    uint32_t checksum(uint64_t n) const { return sum_.value(n); }
+
+    // The rows, each after `before` zeros and before `after` ones.
+    void write(uint32_t before, uint32_t after, Runs& runs) {
+        Runs::End end = runs.reserve(size_t(to_ - from_) * size_t(2 * kTile * n_ + 8), size_t(to_ - from_) * across_);
+        const int* column = column_.data();
+        for (int row = from_; row < to_; ++row) {
+            const uint8_t* bytes = levels(row);
+            end.add(0, before);
+            if (!(cut_rows_[row] >> (first_ & 7) & 1)) end.add(bytes[first_ & 7], 0);
+            int begin = first_;
+            const int* ends = ends_.data();
+            for (const int* stop = find_turns(&cut_rows_[row], n_ / 8 + 1, ends_.data()); ends != stop; ends += 2) {
+                const int from = ends[0], n = ends[1] - from;
+                end.length += uint64_t(column[from >> 3] + (from & 7) - begin);
+                if (n <= Runs::kAtOnce)
+                    end.cut(bytes + from, n);
+                else
+                    end.mixed(bytes + from, n);
+                begin = column[ends[1] >> 3] + (ends[1] & 7), end.value = bytes[ends[1]];
+            }
+            end.length += uint64_t(last_ - begin);
+            end.add(0, after);
+        }
+        runs.set(end);
+    }
+
+ private:
+    bool on(int tile) const { return kTile * tile > first_ - kTile && kTile * tile < last_; }
+    // From row to row of the levels.
+    ptrdiff_t stride() const { return kTile * capacity_; }
+    const uint8_t* levels(int row) const { return &levels_[size_t(row * stride())]; }
+    // Tiles as rows; zeros beyond the picture.
+    void lay_out() {
+        for (int i = n_; i < n_ + 8; ++i) cut_[i] = 0;
+        orientation_(cut_.data(), n_ + 1, cut_rows_.data());
+        orientation_(tiles_.data(), n_, levels_.data(), stride());
+        const int before = std::max(first_ - column_[0], 0), after = std::max(column_[n_ - 1] + kTile - last_, 0);
+        const int end = kTile * n_ - after;
+        for (int row = 0; row < kTile; ++row) {
+            cut_rows_[row] &= kAll << before, cut_rows_[end / 64 * 8 + row] &= ~(kAll << end % 64);
+            uint8_t* first = &levels_[size_t(row * stride())];
+            std::memset(first, 0, size_t(before)), std::memset(first + end, 0, size_t(after + 64));
+        }
+    }
+    // Of the rows on the picture, the columns counted from the first one's.
+    Sums sums() const {
+        const uint64_t rows = uint64_t(to_ - from_);
+        Sums between;  // the tiles, of one row
+        for (int i = 0; i < n_; ++i) {
+            const uint64_t value = levels(from_)[kTile * i + kTile - 1], begin = uint64_t(column_[i] + kTile);
+            const uint64_t n = uint64_t(std::max(column_[i + 1] - column_[i] - kTile, 0));
+            between.all += value * n, between.columns += value * (n * begin + n * (n - 1) / 2);
+        }
+        Sums sums{rows * between.all, rows * between.columns, rows * (rows + 1) / 2 * between.all};
+        add_bytes(levels(from_), stride(), to_ - from_, column_.data(), n_, sums);
+        sums.columns -= uint64_t(first_) * sums.all;
+        return sums;
+    }
+
+    Orientation orientation_;
+    int first_, last_, capacity_, n_ = 0;
+    std::vector<int> column_;
+    std::vector<Levels> tiles_;
+    std::vector<uint64_t> cut_, cut_rows_;  // by tiles; by eights of these, and by their rows
+    std::vector<uint8_t> levels_;
+    std::vector<int> ends_;
+    int from_ = 0, to_ = 0;
+    uint64_t at_ = 0, across_ = 0;
+    Adler sum_;
+};
+
+// --- The tiles of a layer as a picture meets them.
+
+// Eight rows of pixels after eight rows, sorted by counting: first by columns, then by rows.
+class TileRows {
+ public:
+    struct Spot {
+        int32_t across, tile;
+    };
+
+    TileRows(const Slab& slab, const View& view, int down, int across) {
+        const auto first = kTiles, last = int32_t(slab.tiles().count());
+        spots_.resize(size_t(last - first));
+        Rows<int32_t> by_column(spots_.size());
+        auto row = [&](int32_t t) { return down - (view.transposed ? slab.tiles().place[t].x : slab.tiles().place[t].y); };
+        auto column = [&](int32_t t) {
+            const int at = view.transposed ? slab.tiles().place[t].y : slab.tiles().place[t].x;
+            return view.backwards ? across - at : at - 1;
+        };
+        std::vector<int32_t> columns(across + 1), rows(down + 1);
+        for (int32_t t = first; t < last; ++t) ++columns[column(t) + 1], ++rows[row(t) + 1];
+        std::partial_sum(columns.begin(), columns.end(), columns.begin());
+        std::partial_sum(rows.begin(), rows.end(), rows.begin());
+        begin_ = rows;
+        for (int32_t t = first; t < last; ++t) by_column[columns[column(t)]++] = t;
+        for (int32_t t : by_column) spots_[rows[row(t)]++] = {column(t), t};
+    }
+    std::pair<const Spot*, const Spot*> operator[](int row) const {
+        return {spots_.data() + begin_[row], spots_.data() + begin_[row + 1]};
+    }
+
+ private:
+    Rows<Spot> spots_;
+    std::vector<int32_t> begin_;  // of each row of tiles
+};
+
 namespace {
 
 // A tile of which some cells are cut, and where their levels go.

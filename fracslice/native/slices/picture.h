@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "deflate.h"
 #include "marching_squares.h"
-#include "run_lengths.h"
 
 namespace fracslice::slices {
 

@@ -1,8 +1,7 @@
 // The sides of an object, and climbs to its tips, for fracslice._native.
 #include "../unlocked.h"
 #include "bind_field.h"
-#include "climb.h"
-#include "side.h"
+#include "extent.h"
 #include "surface_error.h"
 
 #include <tbb/parallel_for.h>

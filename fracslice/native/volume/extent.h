@@ -1,11 +1,6 @@
-// Proven bounds of an object on one side, by free balls. fracslice/volume/extent.py says how sides are used.
-//
-// Seen from that side, the object stands in columns, each with a ceiling above which it is proven empty. A free ball, of
-// radius f / L around a point, lowers the ceiling of a column that it spans; a column that it does not span is split in four.
-// The highest ceilings are processed first, so that a wall on a plate is found before any work is spent on the plate. From
-// high above a flat face a ball spans a wide column and still comes near the face: where values are distances, some thousand
-// balls prove it.
+// Extreme points of a solid in given directions, by pattern search (Hooke and Jeeves 1961).
 #pragma once
+
 #include <array>
 #include <limits>
 #include <vector>
@@ -13,6 +8,27 @@
 #include "field_values.h"
 
 namespace fracslice::volume {
+
+// The steps of a direction, and what each gains; the same number and gains for all directions.
+struct Steps {
+    const double *x, *y, *z;  // [directions][steps]
+    const double* gain;       // [steps]
+    size_t count;
+};
+
+// Moves interior points outwards as far as possible: a step is taken if it ends inside, the one that gains most; if none of a
+// direction's points moves, its step length is halved, from `first` until it is below `exact`. points[k] is row k of
+// [directions][starts]. Points are evaluated in blocks, on the threads of the arena.
+void climb(const FieldValues& field, const std::array<double*, 3>& points, size_t directions, size_t starts, const Steps& steps,
+           double first, double exact);
+
+// --- Proven bounds of an object on one side, by free balls. fracslice/volume/extent.py says how sides are used.
+//
+// Seen from that side, the object stands in columns, each with a ceiling above which it is proven empty. A free ball, of
+// radius f / L around a point, lowers the ceiling of a column that it spans; a column that it does not span is split in four.
+// The highest ceilings are processed first, so that a wall on a plate is found before any work is spent on the plate. From
+// high above a flat face a ball spans a wide column and still comes near the face: where values are distances, some thousand
+// balls prove it.
 
 using Point = std::array<double, 3>;
 
