@@ -32,8 +32,8 @@ from .options import (
 from .summary import DENSITIES, figures, of_material, sizes, summary
 
 if TYPE_CHECKING:
-    from fracslice.formulas.box import Triple
-    from fracslice.kernel import Field
+    from fracslice.fields.box import Triple
+    from fracslice.fields.field import Field
     from fracslice.mesh import Mesh
     from fracslice.printing.problems import Limits
     from fracslice.scene import Scene
@@ -235,7 +235,7 @@ def of_model(given: CheckOptions, work: Work) -> Checked:
 
 def place(mesh: Mesh, up: Triple, scale: Triple) -> Mesh:
     """Mesh turned and scaled."""
-    from fracslice.formulas.algebra import product
+    from fracslice.fields.algebra import product
     from fracslice.records import SAME, UP
     from fracslice.volume.sizing import orientation
 

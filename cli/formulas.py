@@ -48,8 +48,8 @@ def formulas(given: FormulaOptions) -> None:
             raise click.UsageError("--picture: expected --check FILE")
         click.echo(manual.overview() if given.name is None else manual.page(given.name))
         return
-    from fracslice.formulas.registry import run_file
-    from fracslice.kernel.validation import trial
+    from fracslice.fields.registry import run_file
+    from fracslice.fields.validation import trial
 
     check_targets(given.file, given.picture)
     trials = [(formula.name, trial(formula)) for formula in run_file(given.file)]

@@ -93,7 +93,7 @@ def mesh(given: MeshFileOptions) -> int:
     fracslice mesh geode -o geode.3mf --thickness 0.8mm --bridge 1.5mm
     fracslice mesh menger-sponge -o sponge.stl --set menger.level=1..3
     """
-    from fracslice.kernel.devices import choose_device
+    from fracslice.fields.devices import choose_device
 
     check_outputs(given)
     if Path(given.output).suffix.lower() == GRID:

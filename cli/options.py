@@ -238,7 +238,7 @@ DEVICE = option(
 def run_formulas(context: click.Context, option: click.Parameter, files: Sequence[str]) -> None:
     """Run the files of --formulas before the scene is read."""
     for file in files:
-        from fracslice.formulas.registry import run_file
+        from fracslice.fields.registry import run_file
 
         run_file(file)
 

@@ -64,8 +64,6 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-from .providers import register
-
 _WHERE = {
     "Camera": "scene.view",
     "FracsliceError": "errors",
@@ -90,19 +88,6 @@ _WHERE = {
     "to_xml": "scene",
     "write": "export",
 }
-
-
-register(
-    compiler="fracslice.kernel.tree",
-    orbits="fracslice.kernel.orbits",
-    orbit_samples="fracslice.kernel.growth",
-    growth="fracslice.kernel.growth",
-    orbit_signs="fracslice.kernel.growth",
-    distances="fracslice.api.meshing",
-    parsing="fracslice.kernel.language",
-    reference="fracslice.kernel.reference",
-    files="fracslice.export",
-)
 
 
 def __getattr__(name: str) -> Any:

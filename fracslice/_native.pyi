@@ -9,7 +9,7 @@ from typing import Any
 from numpy import bool_, float32, float64, int16, int32, int64, uint8
 from numpy.typing import NDArray
 
-from .kernel.machine import Function
+from .expr.machine import Function
 
 Point = tuple[float, float, float]
 Loop = tuple[Function, NDArray[Any], NDArray[Any]] | Callable[..., None]

@@ -10,7 +10,7 @@ from enum import Enum
 from numpy import float32, float64, int32, uint8
 from numpy.typing import NDArray
 
-from .kernel.machine import Function
+from .expr.machine import Function
 
 class BorderError(ValueError):
     """The solid reaches the border of the lattice."""

@@ -14,8 +14,8 @@ import numpy as np
 
 from .common.cache import Kept, key, program
 from .errors import ExportError, VolumeError
-from .kernel import Field
-from .kernel.host import toolchain
+from .expr.host import toolchain
+from .fields.field import Field
 
 Arrays = Mapping[str, np.ndarray]
 

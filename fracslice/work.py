@@ -17,7 +17,7 @@ from .errors import Cancelled, SceneError
 
 if TYPE_CHECKING:
     from .cluster import Pool
-    from .formulas.field import Device
+    from .fields.field import Device
     from .store import Store
 
 T = TypeVar("T")

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from fracslice.common.parameters import Number
+from fracslice.fields.definitions import Definition, formula
 from fracslice.formulas import (
     Formula,
     Node,
@@ -77,7 +78,6 @@ from fracslice.formulas import (
     union,
     voronoi,
 )
-from fracslice.formulas.definitions import Definition, formula
 
 
 def cut(endless: Node) -> Node:

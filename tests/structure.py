@@ -18,7 +18,7 @@ MESH = "mesh", "mandelbulb", "-o", "x.stl", "--resolution", "32", "--quiet"
 
 COMPILE = """
 from fracslice import mandelbulb
-from fracslice.kernel import compile_scene
+from fracslice.fields.cpu import compile_scene
 compile_scene(mandelbulb(8, iterations=10))
 """
 

@@ -17,8 +17,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fracslice.fields import cpu
+from fracslice.fields.cpu import CpuKernel, compile_scene
+from fracslice.fields.linker import link
 from fracslice.formulas import difference, julia, sphere, transform, union
-from fracslice.kernel import CpuKernel, compile_scene, cpu, link
 from fracslice.mesh.contouring import contour
 from fracslice.printing.walls import Walls
 from fracslice.rendering import Renderer

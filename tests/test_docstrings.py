@@ -40,7 +40,7 @@ def test_no_two_public_classes_have_one_name(trees: dict[Path, ast.Module]) -> N
 
 
 TWINS = {
-    "cpu", "cuda", "cuda_loops", "field", "film", "machine", "model", "orbits",
+    "cpu", "cuda", "cuda_loops", "field", "film", "machine", "model",
     "pictures", "slices",
 }  # fmt: skip
 """Modules of one name in two packages: mostly two sides of one thing, such as a formula and its kernel."""
@@ -95,7 +95,7 @@ def test_every_name_in_backticks_exists(trees: dict[Path, ast.Module]) -> None:
 
 
 PACKAGES = [
-    "animation", "cluster", "errors", "export", "formulas", "kernel", "mesh", "printing", "rendering",
+    "animation", "cluster", "errors", "export", "formulas", "mesh", "printing", "rendering",
     "scene", "slicing", "viewer", "volume",
 ]  # fmt: skip
 

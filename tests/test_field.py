@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from fracslice.expr.loops import points as points_loop
+from fracslice.fields.field import Field, Precision
+from fracslice.fields.reference import reference
 from fracslice.formulas import mandelbulb, sphere, transform, union
-from fracslice.formulas.field import Field, Precision
-from fracslice.kernel import reference
-from fracslice.kernel.loops import points as points_loop
 from fracslice.printing.edits import Does, EditedField, edited_field
 from fracslice.printing.samples import Samples
 from fracslice.printing.thin_features import OffsetField

@@ -96,7 +96,7 @@ def begin(*_: object, **__: object) -> None:
 
 OWN = """
 from fracslice.formulas import orbit
-from fracslice.formulas.orbits import ball, fold
+from fracslice.fields.maps import ball, fold
 
 @orbit()
 def own(w, c):
@@ -118,10 +118,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         write(shapes.cube(), tmp_path / name)
     (tmp_path / "my.ini").write_text("")
     (tmp_path / "own.py").write_text(OWN)
-    for name in ("registry.FORMULAS", "registry._FILES"):
-        monkeypatch.setattr(
-            f"fracslice.formulas.{name}", dict(pkgutil.resolve_name(f"fracslice.formulas.{name}"))
-        )
+    for name in ("fields.registry.FORMULAS", "fields.registry._FILES"):
+        monkeypatch.setattr(f"fracslice.{name}", dict(pkgutil.resolve_name(f"fracslice.{name}")))
     (tmp_path / "scenes").symlink_to(ROOT / "scenes")
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -135,7 +133,7 @@ def test_commands_are_understood(line: str, folder: Path, monkeypatch, capfd) ->
         return
     for work in (
         "jobs.mesh.make_mesh",
-        "jobs.implicit.make_implicit",
+        "jobs.mesh.make_implicit",
         "slicing.plan_stack",
         "jobs.slices.plan_layers",
         "jobs.pictures.make_picture",

@@ -22,7 +22,7 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
         "fracslice.api.meshing",
         "fracslice.api.pictures",
         "fracslice.api.slices",
-        "fracslice.formulas.node",
+        "fracslice.fields.node",
         "fracslice.mesh.model",
         "fracslice.common.messages",
         "fracslice.common.parameters",

@@ -6,7 +6,7 @@ import pytest
 from lxml import etree
 
 from fracslice import MeshJob, make_mesh
-from fracslice.formulas.definitions import definitions
+from fracslice.fields.definitions import definitions
 from fracslice.mesh.model import to_manifold
 from fracslice.scene import library, read, reads, to_xml
 from fracslice.scene.layout import formulas

@@ -11,8 +11,9 @@ import pytest
 from fracslice import MeshJob, Work, make_mesh
 from fracslice.common import cache
 from fracslice.errors import FracsliceWarning, VolumeError
+from fracslice.fields.cpu import compile_scene
+from fracslice.fields.field import Field
 from fracslice.formulas import Box, Node, mandelbulb, offset, sphere
-from fracslice.kernel import Field, compile_scene
 from fracslice.printing.edits import EditedField
 from fracslice.printing.samples import Samples
 from fracslice.scene import scene
@@ -78,7 +79,7 @@ def test_samples_follow_from_the_guard(tmp_path: Path, monkeypatch: pytest.Monke
     assert sampled(work, sphere())[0] > 0
 
 
-CHANGED = ["formulas/primitives.py", "kernel/linker.py", "common/arrays.py", "_native"]
+CHANGED = ["formulas/primitives.py", "fields/linker.py", "common/arrays.py", "_native"]
 
 
 @pytest.mark.parametrize("changed", CHANGED)

@@ -17,10 +17,10 @@ from fracslice.bench.measurements import BenchmarkTask
 from fracslice.common.parameters import AUTO, REQUIRED, Count, Number, Vector
 from fracslice.errors import FracsliceError
 from fracslice.export.resins import Resin
+from fracslice.fields.devices import choose_device
+from fracslice.fields.registry import Formula
 from fracslice.formulas import Node, names, sphere
 from fracslice.formulas import get as formula
-from fracslice.formulas.registry import Formula
-from fracslice.kernel.devices import choose_device
 from fracslice.mesh.simplify import simplify
 from fracslice.printing.problems import Limits
 from fracslice.rendering import Renderer

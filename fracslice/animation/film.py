@@ -13,9 +13,9 @@ from ..common.parameters import Number, validate_value
 from ..errors import RenderError
 from ..export import application
 from ..export.images import encoded_image
-from ..formulas.registry import Node
-from ..kernel.depth import resolve_depths
-from ..kernel.devices import choose_device
+from ..fields.depth import resolve_depths
+from ..fields.devices import choose_device
+from ..fields.registry import Node
 from ..rendering import Renderer, develop, picture
 from ..rendering.progressive import layers
 from ..rendering.sequence import SampleRange

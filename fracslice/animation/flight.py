@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..formulas.registry import Node
-from ..kernel.depth import resolve_depths
+from ..fields.depth import resolve_depths
+from ..fields.registry import Node
 from ..rendering.setup import prepare
 from ..scene.animation import Animation, Keyframes, Track
 from ..scene.model import Scene

@@ -15,8 +15,8 @@ from ..common.files import locked_folder, remove_leftovers, replacing, reporting
 from ..common.messages import format_count
 from ..errors import RenderError, SharedError
 from ..export.resuming import FinishedFiles, sort_finished
-from ..kernel.devices import choose_device
-from ..kernel.host import toolchain
+from ..expr.host import toolchain
+from ..fields.devices import choose_device
 from ..scene import reads, to_xml
 from ..work import Work
 from .film import FilmJob

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from ..common.parameters import Number, Vector
 from ..errors import SceneError
-from ..formulas.registry import Node
-from ..kernel.depth import resolve_depths
+from ..fields.depth import resolve_depths
+from ..fields.registry import Node
 from ..scene.animation import Animation, Track
 from ..scene.model import Scene
 from ..scene.overrides import kind_of

@@ -14,9 +14,9 @@ from typing import Any, Literal, ParamSpec, TypeAlias, TypedDict, TypeVar, get_t
 from ..common.messages import hint
 from ..common.parameters import REQUIRED, AnyLength, AnyScale, Record, parameter_lines, short_repr
 from ..errors import SceneError
+from ..fields.devices import choose_device
 from ..formulas import Formula, Node, get
 from ..formulas import names as formula_names
-from ..kernel.devices import choose_device
 from ..records import Colour, MeshJob, RenderJob, SliceJob
 from ..scene import Print, Scene, library, read, scene
 from ..work import Work

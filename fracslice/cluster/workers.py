@@ -38,7 +38,7 @@ class Identity:
     @classmethod
     def here(cls) -> Identity:
         """Identity of this process."""
-        from ..kernel.host import toolchain
+        from ..expr.host import toolchain
 
         return cls(__version__, platform.python_version(), program(), toolchain())
 

@@ -20,8 +20,8 @@ from .packages import HEAD, package
 from .threemf import CORE_NAMES, mesh_element
 
 if TYPE_CHECKING:
-    from ..formulas.box import Box
-    from ..kernel.graph import Operation
+    from ..fields.box import Box
+    from ..fields.graph import Operation
 
 LEVEL = 9
 ELEMENTS = {

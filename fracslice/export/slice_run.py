@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..common.cache import key, program
 from ..errors import SliceError
-from ..kernel.host import toolchain
+from ..expr.host import toolchain
 from ..records import SECTIONS
 from ..slicing import Slicer, Stack
 from ..slicing.layers import MeanSlicer

@@ -14,25 +14,14 @@ from functools import lru_cache
 from typing import Any
 
 from ..common.parameters import Count, Number, Vector
-from ..providers import provider
-from .escape import enclosing_radius, farthest, stop
-from .orbits import (
-    ITERATIONS,
-    LENGTHS,
-    MAJORANTS,
-    REPEAT,
-    Stepped,
-    orbit,
-    orbit_step,
-    positive,
-    rounds,
-    steps,
-    turn,
-)
-from .powers import calm_power, power_length, products, square, square_length
-from .powers import power as raised
-from .registry import Fixed, Node
-from .vocabulary import absolute, atan2, cos, exp, floor, log, maximum, rsqrt, sin, sqrt, where
+from ..expr.vocabulary import absolute, atan2, cos, exp, floor, log, maximum, rsqrt, sin, sqrt, where
+from ..fields.escape import enclosing_radius, farthest, stop
+from ..fields.growth import stays
+from ..fields.maps import LENGTHS, MAJORANTS, positive, turn
+from ..fields.orbits import ITERATIONS, REPEAT, Stepped, orbit, orbit_step, rounds, steps
+from ..fields.powers import calm_power, power_length, products, square, square_length
+from ..fields.powers import power as raised
+from ..fields.registry import Fixed, Node
 
 ESCAPED = 1e4
 """|w| one step past the radius where an orbit stops."""
@@ -70,7 +59,7 @@ def power_alone(node: Node) -> dict[str, Any]:
 
 
 def power_growth(node: Node) -> dict[str, Any]:
-    """Return the attributes of `kernel.growth.Growth`."""
+    """Return the attributes of `fields.growth.Growth`."""
     return {
         "powers": (float(node["power"]),),
         "factors": (0.0,),
@@ -120,8 +109,7 @@ def _is_connected(node: Node) -> bool:
         return True
     bailout, (code, values) = _bailout(node), steps(node, alone=False)
     outer = stop(node["power"], bailout, ESCAPED)
-    stays: bool = provider("orbit_samples").stays(code, values, rounds(node), bailout, outer)
-    return stays
+    return stays(code, values, rounds(node), bailout, outer)
 
 
 @orbit(

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 from ..common.parameters import REQUIRED, Number, Vector
-from .box import Box
-from .field import Bounds
-from .registry import Fixed, Node, always_keeps_sign, domain_operator
-from .vocabulary import absolute, any_of, floor, maximum, minimum
+from ..expr.vocabulary import absolute, any_of, floor, maximum, minimum
+from ..fields.box import Box
+from ..fields.field import Bounds
+from ..fields.registry import Fixed, Node, always_keeps_sign, domain_operator
 
 # An operator that confines its child returns ``maximum(d, minimum(child, 2 m - d))``, where d is the signed
 # distance to a volume around the child and m > 0 a margin. The surface is unchanged where d <= 0, and the

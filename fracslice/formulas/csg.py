@@ -7,9 +7,9 @@ from functools import reduce
 from typing import Any
 
 from ..common.parameters import REQUIRED, SMALLEST, Number
-from .box import Box
-from .registry import Node, csg_operator
-from .vocabulary import absolute, maximum, minimum
+from ..expr.vocabulary import absolute, maximum, minimum
+from ..fields.box import Box
+from ..fields.registry import Node, csg_operator
 
 SMOOTH = Number(
     0.0,

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 from ..common.parameters import Count, Number
-from .box import Box
-from .registry import Fixed, Node, shape
-from .vocabulary import absolute, atan2, cos, floor, maximum, minimum, sin, sqrt, where
+from ..expr.vocabulary import absolute, atan2, cos, floor, maximum, minimum, sin, sqrt, where
+from ..fields.box import Box
+from ..fields.registry import Fixed, Node, shape
 
 Row = tuple[tuple[int, ...], ...]
 

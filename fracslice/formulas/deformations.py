@@ -8,10 +8,10 @@ from __future__ import annotations
 import math
 
 from ..common.parameters import REQUIRED, SMALLEST, Axis, Number
-from .box import Box
-from .registry import Node, always_keeps_sign, domain_operator
+from ..expr.vocabulary import absolute, any_of, atan2, cos, maximum, minimum, sin, sqrt, where
+from ..fields.box import Box
+from ..fields.registry import Node, always_keeps_sign, domain_operator
 from .transforms import chosen_axis
-from .vocabulary import absolute, any_of, atan2, cos, maximum, minimum, sin, sqrt, where
 
 
 @domain_operator(

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 from ..common.parameters import Choice, Count
-from .box import Box
-from .orbits import mirror
-from .registry import Fixed, Node, shape
-from .vocabulary import orbit
+from ..expr.vocabulary import orbit
+from ..fields.box import Box
+from ..fields.maps import mirror
+from ..fields.registry import Fixed, Node, shape
 
 Triple = tuple[float, float, float]
 

@@ -9,12 +9,12 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from ..common.parameters import Number, Vector
-from .box import Box
-from .escape import CORE, enclosing_radius, levels, potential_distance, stop
-from .orbits import ITERATIONS, REPEAT, Stepped, escape_sign, rounds, single
-from .powers import square
-from .registry import Fixed, Node, shape
-from .vocabulary import any_of, maximum, orbit, sqrt, where
+from ..expr.vocabulary import any_of, maximum, orbit, sqrt, where
+from ..fields.box import Box
+from ..fields.escape import CORE, enclosing_radius, levels, potential_distance, stop
+from ..fields.orbits import ITERATIONS, REPEAT, Stepped, escape_sign, rounds, single
+from ..fields.powers import square
+from ..fields.registry import Fixed, Node, shape
 
 ESCAPED = 256.0
 """|w| one step past the escape circle."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 from ..common.parameters import Choice, Count, Number, Vector
-from .box import Box
-from .registry import Fixed, Node, shape
-from .vocabulary import absolute, maximum, minimum, orbit, ratio, rsqrt, sqrt, where
+from ..expr.vocabulary import absolute, maximum, minimum, orbit, ratio, rsqrt, sqrt, where
+from ..fields.box import Box
+from ..fields.registry import Fixed, Node, shape
 
 UPWARD = math.sqrt(1 / 3)
 AXES = tuple(

@@ -9,8 +9,9 @@ import math
 from typing import Any
 
 from ..common.parameters import Number
+from ..fields.maps import mirror, turn
+from ..fields.orbits import orbit
 from .flakes import CORNERS, MIRRORS, folded
-from .orbits import mirror, orbit, turn
 
 
 def turned(scale: float) -> dict[str, Any]:

@@ -10,9 +10,9 @@ import math
 from typing import Any
 
 from ..common.parameters import Choice, Number, Vector
-from .box import Box
-from .registry import Fixed, Node, shape
-from .vocabulary import absolute, cos, floor, maximum, minimum, sin, sqrt
+from ..expr.vocabulary import absolute, cos, floor, maximum, minimum, sin, sqrt
+from ..fields.box import Box
+from ..fields.registry import Fixed, Node, shape
 
 WALL: dict[str, Any] = {
     "period": Number(1.0, "length after which the surface repeats", above=0),

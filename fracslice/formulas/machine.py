@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 from ..common.parameters import Count, Number
-from .box import Box
-from .registry import Node, shape
-from .vocabulary import absolute, atan2, floor, maximum, minimum, sqrt
+from ..expr.vocabulary import absolute, atan2, floor, maximum, minimum, sqrt
+from ..fields.box import Box
+from ..fields.registry import Node, shape
 
 
 @shape(

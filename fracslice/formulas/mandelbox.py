@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ..common.parameters import Number, Vector
-from .orbits import ball, fold, fold_to, orbit, turn
+from ..fields.maps import ball, fold, fold_to, turn
+from ..fields.orbits import orbit
 
 SCALE = Number(2.0, "how much each step enlarges; less than -1 or more than 1", least=-10, most=10)
 INNER = Number(0.5, "radius within which the ball's fold only scales", above=0, most=1)

@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import get_args
 
 from ..common.parameters import Choice, File, Number, Vector
+from ..fields.box import Box
+from ..fields.registry import Node, always_keeps_sign, domain_operator
 from ..records import Colour
-from .box import Box
-from .registry import Node, always_keeps_sign, domain_operator
 
 OWN = "colours"
 """The stops are the material's own colours."""

@@ -8,10 +8,10 @@ precisions give the same foam.
 from __future__ import annotations
 
 from ..common.parameters import Choice, Count, Number
-from .box import Box
+from ..expr.vocabulary import absolute, floor, maximum, minimum, sqrt, where
+from ..fields.box import Box
+from ..fields.registry import Fixed, Node, domain_operator, shape
 from .confining import beyond, frame
-from .registry import Fixed, Node, domain_operator, shape
-from .vocabulary import absolute, floor, maximum, minimum, sqrt, where
 
 FARTHEST = 1e6
 """Lattice coordinate beyond which noise and foam are constant: float32 has no fraction there."""

@@ -6,9 +6,9 @@ import math
 from typing import Any
 
 from ..common.parameters import Count, Number, Vector
-from .box import Box
-from .registry import Node, shape
-from .vocabulary import absolute, atan2, cos, exp, floor, log, maximum, minimum, sin, sqrt, where
+from ..expr.vocabulary import absolute, atan2, cos, exp, floor, log, maximum, minimum, sin, sqrt, where
+from ..fields.box import Box
+from ..fields.registry import Node, shape
 
 
 @shape(radius=Number(1.0, "the radius", above=0))

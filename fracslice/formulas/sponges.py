@@ -7,9 +7,9 @@ from __future__ import annotations
 import math
 
 from ..common.parameters import Count, Vector
-from .box import Box
-from .registry import Fixed, Node, shape
-from .vocabulary import absolute, floor, maximum, minimum, orbit, sqrt
+from ..expr.vocabulary import absolute, floor, maximum, minimum, orbit, sqrt
+from ..fields.box import Box
+from ..fields.registry import Fixed, Node, shape
 
 
 @shape(level=Count(3, "how often holes are cut; meshes and layers stop at bars of a voxel", most=20))

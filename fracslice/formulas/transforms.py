@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-
 import numpy as np
 
 from ..common.parameters import REQUIRED, SMALLEST, Axis, Vector
-from .algebra import inverse, length, product, stretches
-from .box import Box
-from .registry import Fixed, Node, always_keeps_sign, domain_operator
-from .vocabulary import absolute
+from ..expr.vocabulary import absolute
+from ..fields.algebra import affine, inverse, product, stretches
+from ..fields.box import Box
+from ..fields.registry import Fixed, Node, always_keeps_sign, domain_operator
 
 
 @domain_operator(
@@ -42,38 +39,13 @@ def translate_node(child, x, y, z, offset):  # type: ignore[no-untyped-def]
     return child(x - tx, y - ty, z - tz)
 
 
-def _rotation(rotate: Sequence[float]) -> np.ndarray:
-    """Rotation matrix of an axis and an angle in degrees, by Rodrigues' formula."""
-    axis = np.array(rotate[:3]) / length(np.array(rotate[:3]))
-    angle = math.radians(rotate[3])
-    cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-    turn: np.ndarray = np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * product(cross, cross)
-    return turn
-
-
-def affine(node: Node) -> tuple[np.ndarray, np.ndarray]:
-    """Affine map of a transform node.
-
-    Returns float64.
-    """
-    linear = np.diag(np.broadcast_to(np.array(node["scale"]), 3))
-    if node["rotate"]:
-        linear = product(_rotation(node["rotate"]), linear)
-    offset = np.array(node["translate"])
-    if node["matrix"]:
-        given = np.array(node["matrix"][:12]).reshape(3, 4)
-        offset = offset + product(linear, given[:, 3])
-        linear = product(linear, given[:, :3])
-    return linear, offset
-
-
 @transform.check
 def transform_check(node: Node) -> None:
     if node["rotate"] and not max(map(abs, node["rotate"][:3])) >= SMALLEST:
         raise node.fail("rotate: expected an axis that is not zero, then degrees")
     if node["matrix"] and len(node["matrix"]) == 16 and node["matrix"][12:] != (0, 0, 0, 1):
         raise node.fail("matrix: expected the last row 0 0 0 1")
-    stretch = stretches(affine(node)[0])
+    stretch = stretches(affine(node.values)[0])
     if not stretch[-1] > max(1e-9 * stretch[0], SMALLEST / 2):
         name = "matrix" if node["matrix"] else "scale"
         value = " ".join(f"{number:g}" for number in node[name])
@@ -82,18 +54,18 @@ def transform_check(node: Node) -> None:
 
 @transform.identity
 def transform_identity(node: Node) -> bool:
-    linear, offset = affine(node)
+    linear, offset = affine(node.values)
     return bool((linear == np.eye(3)).all() and not offset.any())
 
 
 @transform.select
 def transform_select(node: Node):  # type: ignore[no-untyped-def]
-    return translate_node if (affine(node)[0] == np.eye(3)).all() else transform.function
+    return translate_node if (affine(node.values)[0] == np.eye(3)).all() else transform.function
 
 
 @transform.arguments
 def transform_arguments(node: Node) -> dict[str, object]:
-    linear, offset = affine(node)
+    linear, offset = affine(node.values)
     if node.function is translate_node:
         return {"offset": tuple(offset.tolist())}
     undone = inverse(linear)
@@ -109,7 +81,7 @@ def transform_bounds(node: Node) -> Box:
     box = node.children[0].bounds.box
     if box.empty:
         return box
-    linear, offset = affine(node)
+    linear, offset = affine(node.values)
     lo, hi = np.array(box.lo), np.array(box.hi)
     with np.errstate(invalid="ignore"):
         ends = np.stack([linear * lo, linear * hi])

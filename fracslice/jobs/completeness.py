@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..common.messages import decimal
+from ..fields.algebra import dot
+from ..fields.box import Triple
 from ..formulas import Box, Node
-from ..formulas.algebra import dot
-from ..formulas.box import Triple
 from ..volume import Lattice, Plan
 from ..volume.amount import FINER, MARGIN, SCATTERED, SURE, amount, finer, lost_share, scattered
 from ..work import Work
 
 if TYPE_CHECKING:
-    from ..kernel import Field
+    from ..fields.field import Field
     from ..slicing import Slicer
 
 Grid = tuple[Triple, Triple, Callable[[float], str]]

@@ -14,8 +14,8 @@ import numpy as np
 
 from ..common.memory import peak_rss_mb
 from ..errors import SceneError, SharedError, TooLargeError, keeping
+from ..fields.box import Box
 from ..formulas import Node
-from ..formulas.box import Box
 from ..records import MeshJob
 from ..scene import Print, Scene
 from ..version import __version__
@@ -229,7 +229,7 @@ class _Job:
 
     def result(self, sized: Sized, surface: Surface, executor: Executor) -> tuple[Result, int]:
         """Finished mesh and report, and the refinement of the samples that does not lose the object."""
-        from ..kernel.depth import shallower
+        from ..fields.depth import shallower
         from ..mesh.shells import touching_note
         from .completeness import lost_size, mesh_amount
         from .finishing import choose_bodies
@@ -316,7 +316,7 @@ def make_implicit(
     """
     from ..export import check_target
     from ..export.implicit import write_implicit
-    from ..kernel.graph import graph
+    from ..fields.graph import graph
     from ..volume.sizing import sizing
     from .mesh_writing import metadata
 

@@ -15,8 +15,8 @@ import numpy as np
 from ..common.memory import available_bytes
 from ..errors import Cancelled, KeptError, RenderError, SharedError
 from ..export.images import BANDED, LINEAR, check_image, write_bands, write_image
-from ..formulas.registry import Node
-from ..kernel.devices import for_picture
+from ..fields.devices import for_picture
+from ..fields.registry import Node
 from ..records import RenderJob
 from ..rendering import Pass, Renderer
 from ..rendering.crops import BYTES, MARGIN, Crop

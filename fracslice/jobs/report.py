@@ -20,7 +20,7 @@ from ..mesh import Mesh
 from ..work import Work
 
 if TYPE_CHECKING:
-    from ..kernel import Field
+    from ..fields.field import Field
     from ..mesh.checks import MeshReport
     from ..mesh.refine import Refined
     from ..mesh.simplify import Simplified

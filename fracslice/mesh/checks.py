@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from .._native import bounds, near
 from ..common.messages import format_count
 from ..errors import MeshError
-from ..formulas.algebra import dot
+from ..fields.algebra import dot
 from ..mesh.fit import NEAR, surface_error, surface_points
 from ..volume import Plan
 from ..work import Work

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from .. import _native
 from .._native import touching, turned
 from ..errors import MeshError
-from ..formulas.algebra import dot, length
+from ..fields.algebra import dot, length
 from ..volume.bricks import SignBricks
 from ..volume.lattice import BRICK
 from .model import Mesh

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from .. import _native
 from .._native import Cells, RootLoops
 from ..errors import MeshError
-from ..kernel import Field
+from ..fields.field import Field
 from ..store import Arrays, stored
 from ..volume.bricks import Bricks, SignBricks
 from ..volume.lattice import BRICK

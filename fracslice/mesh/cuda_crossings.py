@@ -8,9 +8,9 @@ from typing import Any, cast
 import numpy as np
 
 from .._native import Cells
-from ..kernel.cuda_driver import require
-from ..kernel.cuda_launching import CudaLoop, launch, load_loops
-from ..kernel.linker import Linked
+from ..expr.cuda_driver import require
+from ..expr.language import Linked
+from ..fields.cuda_launching import CudaLoop, launch, load_loops
 from .root_loops import LOOPS
 from .roots import SURE, Roots
 

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._native import surface_error as measured
-from ..formulas.algebra import length
-from ..formulas.box import Box
-from ..kernel import Field
+from ..fields.algebra import length
+from ..fields.box import Box
+from ..fields.field import Field
 from ..work import Work, chunks
 from .model import Mesh
 

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from ..common.messages import format_count, lacking
 from ..errors import MeshError
-from ..providers import provider
 from .topology import Sizes, component_sizes, edge_topology
 
 if TYPE_CHECKING:
@@ -53,8 +52,9 @@ class Exchange:
         ExportError
             For an empty mesh, an unknown extension, or a file that cannot be written.
         """
-        written: Path = provider("files").write(self, path, metadata)
-        return written
+        from ..export import write
+
+        return write(cast("Mesh", self), path, metadata)
 
     def to_trimesh(self) -> trimesh.Trimesh:
         """Copy of the mesh as a `trimesh.Trimesh`, unprocessed.

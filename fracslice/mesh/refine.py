@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernel import Field
+from ..fields.field import Field
 from ..work import Work
 from .contouring import anywhere, project
 from .fit import OFF, UPRIGHT, Fit, Fitted

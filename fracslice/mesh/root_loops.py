@@ -11,8 +11,8 @@ segment.
 
 from __future__ import annotations
 
-from ..formulas.vocabulary import absolute, any_of, maximum, minimum, rsqrt, where
-from ..kernel.loops import WIDTH, field, kernel, load, loop, real, store, thread
+from ..expr.loops import WIDTH, field, kernel, load, loop, real, store, thread
+from ..expr.vocabulary import absolute, any_of, maximum, minimum, rsqrt, where
 
 STEPS = 48
 """Largest number of steps to a root."""

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..formulas.field import Device, Field, Precision
-from ..kernel.machine import constant
+from ..expr.machine import constant
+from ..fields.field import Device, Field, Precision
 from .root_loops import aim, find, lead, polish
 
 SURE = 8e-5

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from .._native import near_bodies
 from .._native import nesting as _nesting
 from ..errors import MeshError
-from ..kernel.depth import WIDE
+from ..fields.depth import WIDE
 from ..records import JOINING, PIECES
 from ..work import ahead
 from .model import Mesh

@@ -10,8 +10,8 @@
 
 namespace fracslice {
 
-// A loop that fracslice.kernel compiled, and the arrays that it is always called with: a tuple of a
-// `fracslice.kernel.machine.Function` and arrays of Real. Holds them; copied and let go with the interpreter's lock only.
+// A loop that fracslice.expr compiled, and the arrays that it is always called with: a tuple of a
+// `fracslice.expr.machine.Function` and arrays of Real. Holds them; copied and let go with the interpreter's lock only.
 template <class Real>
 class Machine {
   public:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..common.cache import key
 from ..common.compiled import compiled
-from ..kernel import Kernel
+from ..fields.field import Kernel
 from ..volume import Bricks
 from ..volume.bricks import INSIDE, OUTSIDE
 from ..volume.lattice import values_at

@@ -9,11 +9,10 @@ from typing import Literal
 import numpy as np
 
 from ..common.cache import key
+from ..fields.box import Box
+from ..fields.field import Bounds, Cells, Device, Field, Kernel, Precision
+from ..fields.tree import ArrayField
 from ..formulas import difference, intersection, union
-from ..formulas.box import Box
-from ..formulas.field import Bounds, Cells, Device, Precision
-from ..kernel import Field, Kernel
-from ..kernel.tree import ArrayField
 
 Does = Literal["cut", "add", "keep"]
 _FOLDED = {"cut": difference, "add": union, "keep": intersection}
@@ -72,7 +71,7 @@ class EditedField(ArrayField):
 
 @dataclass(frozen=True, eq=False)
 class _CompositeCells:
-    """`formulas.field.Cells` of an edited field."""
+    """`fields.field.Cells` of an edited field."""
 
     root: Cells
     does: Does

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..fields.field import Field
 from ..formulas import box as box_node
 from ..formulas import transform
-from ..kernel import Field
 from ..records import PIECES
 from ..volume import Plan, extent
 from ..volume.sizing import Sizing, box_of_the_rest

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..fields.field import Field
 from ..formulas import Box, Node, cylinder, transform, union
-from ..kernel import Field
 from ..volume import Bricks, Drain
 from ..volume.bricks import from_grid, to_grid
 from .components import components_of

@@ -16,8 +16,8 @@ import numpy as np
 
 from ..common.messages import format_count, place
 from ..errors import VolumeError
+from ..fields.field import Field
 from ..formulas import Box, box, plane, transform
-from ..kernel import Field
 from ..records import DUST, PIECES
 from ..scene import Print
 from ..volume import Bricks, Plan, extent, sample_scene

@@ -9,10 +9,9 @@ import numpy as np
 
 from ..common.cache import key
 from ..common.compiled import compiled
-from ..formulas.box import Box
-from ..formulas.field import Bounds, Device, Precision
-from ..kernel import Kernel
-from ..kernel.tree import ArrayField
+from ..fields.box import Box
+from ..fields.field import Bounds, Device, Kernel, Precision
+from ..fields.tree import ArrayField
 from ..volume import Bricks
 from ..volume.bricks import INSIDE, OUTSIDE
 from ..volume.lattice import BRICK

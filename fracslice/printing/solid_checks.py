@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..common.messages import format_count, place, significant
+from ..fields.box import Triple
+from ..fields.field import Field
 from ..formulas import Box
-from ..formulas.box import Triple
-from ..kernel import Field
 from ..volume import Bricks, Drain
 from ..work import Work
 from .components import components_of

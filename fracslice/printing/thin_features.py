@@ -18,11 +18,10 @@ from ..common.arrays import Rows, weighted_quantiles
 from ..common.cache import key
 from ..common.compiled import compiled, connected_components
 from ..errors import VolumeError
-from ..formulas.box import Box
+from ..fields.box import Box
+from ..fields.field import Bounds, Device, Field, Kernel, Precision
+from ..fields.tree import ArrayField
 from ..formulas.confining import moved_slope
-from ..formulas.field import Bounds, Device, Precision
-from ..kernel import Field, Kernel
-from ..kernel.tree import ArrayField
 from ..volume import Bricks, Lattice, sample
 from ..volume.lattice import BRICK, values_at
 from ..work import Work

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..common.arrays import Rows
 from ..common.compiled import compiled
-from ..kernel import Field, Kernel
+from ..fields.field import Field, Kernel
 from ..volume.lattice import values_at
 from ..work import Work, chunks
 from .samples import SIDE, STRIDE, Samples, between, gather, is_beside

@@ -7,9 +7,9 @@ import threading
 import numpy as np
 
 from ..errors import Cancelled
-from ..kernel.cpu import load_functions
-from ..kernel.host import lane_count
-from ..kernel.machine import constant
+from ..expr.host import lane_count
+from ..expr.machine import constant
+from ..fields.cpu import load_functions
 from ..work import Work, chunks
 from .accumulator import PassPlan
 from .linking import Frame

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ..formulas.field import Precision
-from ..kernel.cuda_driver import require
-from ..kernel.cuda_launching import launch, load_loops, parameters
-from ..kernel.linker import Linked
+from ..expr.cuda_driver import require
+from ..expr.language import Linked
+from ..fields.cuda_launching import launch, load_loops, parameters
+from ..fields.field import Precision
 from ..scene.view import View
 from ..work import Work
 from .accumulator import TRUSTED, PassPlan, grids, least_gain, next_choice, tile_order

@@ -8,8 +8,8 @@ handles every pixel whose index is b modulo the number of rows, so that the sums
 
 from __future__ import annotations
 
-from ..formulas.vocabulary import maximum, minimum
-from ..kernel.loops import Loop, device, divide, kernel, real, thread, together, whole
+from ..expr.loops import Loop, device, divide, kernel, real, thread, together, whole
+from ..expr.vocabulary import maximum, minimum
 from .accumulator import CHANNELS, COUNT, COVER, GOAL
 from .linking import Frame
 from .units.intrinsics import background, camera_ray, span_box, step_cone, step_ray, surface

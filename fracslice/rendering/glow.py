@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ..fields.linker import Linker
+from ..fields.registry import Fixed, Node
 from ..formulas.material import material, stops
-from ..formulas.registry import Fixed, Node
-from ..kernel.linker import Linker
 from .setup import Optics
 from .units import glowing
 from .units.glossy import highlight

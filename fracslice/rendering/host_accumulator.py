@@ -14,12 +14,12 @@ import numpy as np
 from numpy.lib.npyio import NpzFile
 
 from ..errors import RenderError
-from ..formulas.vocabulary import maximum, where
-from ..kernel.cpu import load_functions
-from ..kernel.host import lane_count
-from ..kernel.linker import Linked
-from ..kernel.loops import WIDTH, load, loop, store
-from ..kernel.machine import Function
+from ..expr.host import lane_count
+from ..expr.language import Linked
+from ..expr.loops import WIDTH, load, loop, store
+from ..expr.machine import Function
+from ..expr.vocabulary import maximum, where
+from ..fields.cpu import load_functions
 from ..scene.view import View
 from ..work import Work, chunks
 from .accumulator import (

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from ..formulas.registry import Fixed, Node
-from ..kernel.linker import FieldDialect, Linker, link_tree
+from ..fields.linker import FieldDialect, Linker, link_tree
+from ..fields.registry import Fixed, Node
 from ..scene.view import Camera, Fog, Light, View
 from . import glow
 from .environments import PIXELS, Environment, environment, load_picture

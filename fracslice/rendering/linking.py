@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from ..formulas.registry import Fixed, Node
-from ..formulas.vocabulary import maximum, minimum
-from ..kernel.linker import Linked, Linker
+from ..expr.language import Linked
+from ..expr.vocabulary import maximum, minimum
+from ..fields.linker import Linker
+from ..fields.registry import Fixed, Node
 from ..scene.view import Camera, View
 from .glow import Drawn, glowing_bodies, wholly_met
 from .lighting import Lighting

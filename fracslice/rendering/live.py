@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import Cancelled, FracsliceError, SceneError
-from ..formulas.registry import Node
+from ..fields.registry import Node
 from ..scene.model import Scene
 from ..scene.reader import read
 from ..scene.view import Camera, View

@@ -12,11 +12,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from ..formulas.material import material, stops
-from ..formulas.registry import Fixed, Node
-from ..kernel import functions, source
-from ..kernel.language import parse
-from ..kernel.linker import (
+from ..expr import functions
+from ..expr.language import parse
+from ..fields import source
+from ..fields.linker import (
     OF_FORMULAS,
     FieldDialect,
     Linker,
@@ -27,7 +26,9 @@ from ..kernel.linker import (
     leading,
     link_tree,
 )
-from ..kernel.source import Arguments, append_numbers, arguments
+from ..fields.registry import Fixed, Node
+from ..fields.source import Arguments, append_numbers, arguments
+from ..formulas.material import material, stops
 from .environments import load_picture
 from .glow import glowing_bodies
 from .units import shade

@@ -21,8 +21,8 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-from ..formulas.vocabulary import any_of, where
-from ..kernel.loops import WIDTH, Loop, load, loop, store
+from ..expr.loops import WIDTH, Loop, load, loop, store
+from ..expr.vocabulary import any_of, where
 from .accumulator import CHANNELS, COUNT, COVER, GOAL
 from .linking import Frame
 from .units.intrinsics import background, camera_ray, span_box, step_cone, step_ray, surface

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import from_linear
-from ..formulas import vocabulary
+from ..expr import vocabulary
+from ..expr.language import CALLED
+from ..fields.linker import Linker, link_tree
+from ..fields.registry import Node
 from ..formulas.material import material
-from ..formulas.registry import Node
-from ..kernel.linker import CALLED, Linker, link_tree
 from ..work import Work, chunks
 from .materials import Look, TraceDialect, traps
 

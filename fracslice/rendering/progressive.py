@@ -18,8 +18,8 @@ from ..common.cache import key, program
 from ..common.memory import available_bytes
 from ..common.parameters import Number, picture_size, validate_value
 from ..errors import ClusterError, RenderError
-from ..formulas.registry import Node
-from ..kernel.devices import choose_device
+from ..fields.devices import choose_device
+from ..fields.registry import Node
 from ..scene import Scene, reads, to_xml
 from ..scene.view import Camera, Film, View
 from ..work import Work

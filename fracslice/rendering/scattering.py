@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..kernel.linker import Linker
+from ..fields.linker import Linker
 from . import glow
 from .glow import Drawn
 from .materials import Look

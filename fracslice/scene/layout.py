@@ -8,9 +8,9 @@ from types import MappingProxyType
 from typing import Any
 
 from ..common.parameters import REQUIRED, Choice, Length, Number, Parameter, Vector
+from ..fields.definitions import is_name
+from ..fields.registry import Formula, load_installed
 from ..formulas import get, names
-from ..formulas.definitions import is_name
-from ..formulas.registry import Formula, load_installed
 from ..records import Part, Print
 from .animation import Animation, Track
 from .view import PARTS

@@ -21,9 +21,9 @@ from .. import formulas as formula_package
 from ..common.messages import hint
 from ..common.parameters import MILLIMETRES, REQUIRED, Axis, Choice, Count, File, Length, Number, Vector
 from ..errors import SceneError
-from ..formulas import vocabulary
-from ..formulas.node import docstring, signature
-from ..formulas.registry import Formula, Node, get, names, origin
+from ..expr import vocabulary
+from ..fields.node import docstring, signature
+from ..fields.registry import Formula, Node, get, names, origin
 from .animation import AttributePath, Keys, Seconds
 from .layout import DEFINE, LISTED, PARAMETER, SCENE, SECTIONS, Element, Identifier, formulas
 
@@ -129,7 +129,7 @@ def stub() -> str:
     ]
     lines = [_HEAD]
     for node in imports:
-        exported = sorted(vocabulary.NAMES) if node.module == "vocabulary" else [a.name for a in node.names]
+        exported = sorted(vocabulary.NAMES) if node.names[0].name == "*" else [a.name for a in node.names]
         lines += [
             f"from {'.' * node.level}{node.module} import {name} as {name}" for name in exported if node.level
         ]
@@ -140,7 +140,8 @@ def stub() -> str:
 
 def _shipped_formulas() -> list[str]:
     """Names of the formulas of this package."""
-    return [name for name in names() if get(name).function.__module__.startswith(formula_package.__name__)]
+    package = formula_package.__name__.partition(".")[0] + "."
+    return [name for name in names() if get(name).function.__module__.startswith(package)]
 
 
 def package_stub(modules: Mapping[str, str]) -> str:
@@ -160,7 +161,7 @@ from typing import Literal, Union
 
 def _function(formula: Formula) -> str:
     """Function of a formula in the stub file."""
-    text = re.sub(r"\b(?:fracslice\.formulas\.\w+|collections\.abc)\.", "", str(signature(formula, Node)))
+    text = re.sub(r"\b(?:fracslice\.fields\.\w+|collections\.abc)\.", "", str(signature(formula, Node)))
     body = docstring(formula).replace("\n", "\n    ").replace("\n    \n", "\n\n")
     return f'def {formula.name}{text}:\n    """{body}\n    """'
 

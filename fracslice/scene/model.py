@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from ..common.parameters import AUTO, AnyLength, Vector, parse_length, short_repr
 from ..errors import SceneError
+from ..fields.definitions import Definition, definitions
 from ..formulas import Node, get
-from ..formulas.definitions import Definition, definitions
 from ..records import Part, Print
 from .animation import Animation, Track
 from .layout import DEFINE, PARAMETER, SCENE, SECTIONS, SOLID, VERSION, Element

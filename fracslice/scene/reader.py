@@ -18,9 +18,9 @@ from ..common.files import open_regular
 from ..common.messages import hint
 from ..common.parameters import REQUIRED, File, Number, Parameter, Vector, printable
 from ..errors import SceneError
+from ..fields.definitions import Defined, Definition, formula
+from ..fields.registry import DEEPEST, TOO_DEEP
 from ..formulas import Node
-from ..formulas.definitions import Defined, Definition, formula
-from ..formulas.registry import DEEPEST, TOO_DEEP
 from ..records import Part, Print
 from .animation import Animation, Track
 from .layout import (

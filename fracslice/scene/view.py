@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from ..common.parameters import Choice, Count, File, Number, Vector, attribute, validate_value
-from ..formulas.box import Box
+from ..fields.box import Box
 from ..records import Part
 
 if TYPE_CHECKING:

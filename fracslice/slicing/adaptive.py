@@ -9,7 +9,7 @@ import numpy as np
 from ..common.arrays import quantile
 from ..common.parameters import Length, validate_value
 from ..errors import SliceError
-from ..kernel import Field
+from ..fields.field import Field
 from ..records import SliceJob
 from ..volume.sizing import Sizing
 from ..work import Work

@@ -11,7 +11,7 @@ import numpy as np
 from .._slices import Slab
 from ..common.arrays import Rows
 from ..common.messages import format_count
-from ..kernel import Kernel
+from ..fields.field import Kernel
 from .stack import Stack
 
 # Pictures need no contours: what traces them is imported where needed.

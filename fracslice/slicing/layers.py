@@ -35,8 +35,7 @@ import numpy as np
 
 from .._slices import BorderError, Encoding, Memory, ProbeBounds, Slab
 from ..errors import SliceError
-from ..formulas.field import Bounds
-from ..kernel import Field, Kernel
+from ..fields.field import Bounds, Field, Kernel
 from ..work import Work
 from .contours import Contours, contours
 from .stack import Stack

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import SliceError
-from ..formulas.box import Box
-from ..kernel import Field
+from ..fields.box import Box
+from ..fields.field import Field
 from ..printing import printable
 from ..records import SliceJob
 from ..volume import Drain, plan

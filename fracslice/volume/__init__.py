@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import VolumeError
-from ..formulas.box import Box, Triple
-from ..formulas.registry import Node
-from ..kernel import Field
-from ..kernel.depth import depth_notes, resolve_depths, visible, with_depth_advice
+from ..fields.box import Box, Triple
+from ..fields.depth import depth_notes, resolve_depths, visible, with_depth_advice
+from ..fields.field import Field
+from ..fields.registry import Node
 from ..records import RESOLUTION
 from ..work import Work
 from .extent import Extent, extent, reached

@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..fields.algebra import length
+from ..fields.boxes import possible_cells
+from ..fields.field import Bounds, Field, Kernel
 from ..formulas import Box, Node
-from ..formulas.algebra import length
-from ..formulas.field import Bounds
-from ..kernel import Field, Kernel
-from ..kernel.boxes import possible_cells
 from ..records import DUST
 from ..work import Work, chunks
 from .lattice import values_at

@@ -10,10 +10,10 @@ import numpy as np
 from .._native import Sides
 from .._native import climb as climbed
 from ..errors import EmptyError, VolumeError
+from ..fields.box import Box
+from ..fields.boxes import possible_cells
+from ..fields.field import Field, Kernel
 from ..formulas import Node
-from ..formulas.box import Box
-from ..kernel import Field, Kernel
-from ..kernel.boxes import possible_cells
 from ..work import Work
 from .lattice import values_at
 

@@ -10,8 +10,8 @@ import numpy as np
 from ..common.memory import available_bytes
 from ..common.messages import significant
 from ..errors import GridError, TooLargeError, VolumeError
-from ..formulas.box import Box, Triple
-from ..kernel import Kernel
+from ..fields.box import Box, Triple
+from ..fields.field import Kernel
 from ..work import Work, chunks
 
 BRICK = 8

@@ -12,8 +12,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from ..formulas.field import Bounds, Cells
-from ..kernel import Kernel
+from ..fields.field import Bounds, Cells, Kernel
 from ..work import Work, chunks
 from .bricks import INSIDE, OUTSIDE
 from .lattice import BRICK, Lattice

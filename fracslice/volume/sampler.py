@@ -22,9 +22,8 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from ..errors import EmptyError, VolumeError
-from ..formulas.field import Bounds
-from ..kernel import Kernel
-from ..kernel.depth import with_depth_advice
+from ..fields.depth import with_depth_advice
+from ..fields.field import Bounds, Kernel
 from ..store import Arrays, stored
 from ..work import Work, chunks
 from .bricks import Bricks, SignBricks

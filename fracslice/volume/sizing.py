@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SliceError
+from ..fields.algebra import affine, length
+from ..fields.box import Box, Triple
+from ..fields.field import Field
 from ..formulas import sphere, transform
-from ..formulas.algebra import length
-from ..formulas.box import Box, Triple
-from ..formulas.transforms import affine
-from ..kernel import Field
 from ..records import SAME, UP
 from ..scene import Scene
 from ..work import Work
@@ -93,7 +92,7 @@ def orientation(up: Triple, factors: Triple = SAME) -> NDArray[np.float64]:
 
     `up`: direction. Returns float64 (3, 3).
     """
-    linear, _ = affine(transform(sphere(), rotate=_turn(up)))
+    linear, _ = affine(transform(sphere(), rotate=_turn(up)).values)
     matrix: NDArray[np.float64] = (linear * np.array(factors)[:, None]).T
     return matrix
 

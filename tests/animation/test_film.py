@@ -149,10 +149,10 @@ def test_frames_of_another_device_are_another_film(monkeypatch: pytest.MonkeyPat
     def keys() -> list[str]:
         return [replace(job(scene()), device=device).key for device in ("cpu", "auto")]
 
-    monkeypatch.setattr("fracslice.kernel.cuda_driver.missing", lambda: "no GPU")
+    monkeypatch.setattr("fracslice.expr.cuda_driver.missing", lambda: "no GPU")
     cpu, auto = keys()
     assert cpu == auto
-    monkeypatch.setattr("fracslice.kernel.cuda_driver.missing", lambda: "")
+    monkeypatch.setattr("fracslice.expr.cuda_driver.missing", lambda: "")
     assert keys()[0] == cpu != keys()[1]
 
 

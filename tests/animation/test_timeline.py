@@ -8,7 +8,7 @@ import pytest
 from fracslice import reads
 from fracslice.animation import Timeline
 from fracslice.errors import SceneError
-from fracslice.kernel.linker import link
+from fracslice.fields.linker import link
 from fracslice.rendering.setup import clearance
 from fracslice.scene import Scene, to_xml
 

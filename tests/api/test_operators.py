@@ -11,8 +11,8 @@ from hypothesis import given, settings
 
 from fracslice import box, difference, intersection, sphere, torus, transform, union
 from fracslice.errors import SceneError
+from fracslice.fields.reference import reference
 from fracslice.formulas import Node, get, names
-from fracslice.kernel import reference
 from tests.examples import EXAMPLES, stamped
 from tests.formulas.test_bounds import TREES
 

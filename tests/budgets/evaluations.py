@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from fracslice.fields.cpu import compile_scene
 from fracslice.formulas import Node
-from fracslice.kernel import compile_scene
 from fracslice.rendering import Renderer
 from fracslice.scene.view import Camera, Light, Shading, View
 from fracslice.slicing import SliceJob, Slicer, plan_stack

@@ -9,9 +9,10 @@ import json
 import re
 from collections.abc import Sequence
 
-from fracslice.kernel.host import REGISTERS
-from fracslice.kernel.linker import Linked, link
-from fracslice.kernel.loops import Loop, points
+from fracslice.expr.host import REGISTERS
+from fracslice.expr.language import Linked
+from fracslice.expr.loops import Loop, points
+from fracslice.fields.linker import link
 
 from .workloads import WORKLOADS
 
@@ -35,7 +36,7 @@ def instructions() -> dict[str, int]:
 
 def assembly(linked: Linked, bits: int, loops: Sequence[Loop] = (points,)) -> list[str]:
     """The lines of a scene's loops: labels and instructions."""
-    from fracslice.kernel import compiler
+    from fracslice.expr import compiler
 
     class Text:
         """In the place of LLVM's target machine: gives assembly where an object file is asked for."""

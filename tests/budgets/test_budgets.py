@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import pytest
 
+from fracslice.fields.linker import link
 from fracslice.formulas import sphere, union
-from fracslice.kernel import link
 
 from .evaluations import evaluations, per_sample
 from .instructions import assembly, instructions, sizes

@@ -24,7 +24,7 @@ JOBS = {
     "render": ("render", "ball.xml", "-o", "ball.png", "--size", "16x16", "--samples", "1", "--quiet"),
 }
 UNUSED = {
-    "help": ("numpy", "llvmlite", "concurrent", "json", "fracslice.scene", "fracslice.kernel"),
+    "help": ("numpy", "llvmlite", "concurrent", "json", "fracslice.scene", "fracslice.fields"),
     "mesh": (
         "scipy",
         "email",

@@ -14,10 +14,10 @@ from fracslice.cli.main import run
 from fracslice.common.parameters import AUTO
 from fracslice.errors import KernelError, MeshError, SceneError
 from fracslice.export.implicit import write_implicit
+from fracslice.fields import graph as graphs
+from fracslice.fields.reference import reference
 from fracslice.formulas import Node, mandelbulb, menger, sphere, transform, twist, union
 from fracslice.jobs.mesh import make_implicit
-from fracslice.kernel import graph as graphs
-from fracslice.kernel.reference import reference
 from fracslice.mesh.reading import read_mesh
 from fracslice.records import MeshJob
 from fracslice.scene import Print, library, read, scene

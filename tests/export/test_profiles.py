@@ -182,7 +182,7 @@ def test_a_file_that_may_not_be_read(name: str, monkeypatch: pytest.MonkeyPatch)
     def refused(*_: object) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("fracslice.common.settings.open_regular", refused)
+    monkeypatch.setattr("fracslice.common.files.open_regular", refused)
     with pytest.raises(ExportError, match=rf"^{name}: Permission denied$"):
         resin(name, None, 0.05)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fracslice.formulas import algebra
+from fracslice.fields import algebra
 
 RNG = np.random.default_rng(3)
 MATRICES = [RNG.normal(size=(3, 3)) * 10.0 ** RNG.integers(-6, 7, size=(3, 1)) for _ in range(50)]

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fracslice.fields.reference import reference
 from fracslice.formulas import (
     Node,
     bend,
@@ -32,7 +33,6 @@ from fracslice.formulas import (
     twist,
     union,
 )
-from fracslice.kernel import reference
 from tests.examples import EXAMPLES, stamped
 
 pytestmark = pytest.mark.once

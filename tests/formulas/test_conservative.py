@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fracslice.fields.cpu import compile_scene
+from fracslice.fields.escape import sure_distance
+from fracslice.fields.field import Precision
+from fracslice.fields.linker import link
+from fracslice.fields.reference import reference
 from fracslice.formulas import Node, julia, mandelbulb, sphere, transform, union
-from fracslice.formulas.escape import sure_distance
-from fracslice.formulas.field import Precision
-from fracslice.kernel import compile_scene, link, reference
 from tests.examples import EXAMPLES
 
 pytestmark = pytest.mark.once

@@ -12,6 +12,7 @@ from PIL import Image
 
 from fracslice import make_mesh
 from fracslice.errors import SceneError
+from fracslice.fields.cpu import compile_scene
 from fracslice.formulas import (
     Node,
     apollonian,
@@ -29,7 +30,6 @@ from fracslice.formulas import (
     voronoi,
 )
 from fracslice.formulas.inversions import MIDDLE, mirrors
-from fracslice.kernel import compile_scene
 from tests.benchmarks.formulas import pictures
 from tests.examples import EXAMPLES, STRUCTURES, stamped
 

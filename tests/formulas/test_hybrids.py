@@ -6,6 +6,10 @@ import numpy as np
 import pytest
 
 from fracslice.errors import SceneError
+from fracslice.fields.cpu import compile_scene
+from fracslice.fields.linker import link
+from fracslice.fields.orbits import growth_of
+from fracslice.fields.reference import reference
 from fracslice.formulas import (
     Node,
     bristorbrot,
@@ -18,8 +22,6 @@ from fracslice.formulas import (
     sphere,
     transform,
 )
-from fracslice.formulas.orbits import growth_of
-from fracslice.kernel import compile_scene, link, reference
 from fracslice.scene import reads, scene, to_xml
 from tests.examples import stamped
 from tests.stability.bounds import verdict
@@ -145,7 +147,7 @@ def test_proofs_lose_no_inside_sample(seed: int) -> None:
 
 
 def test_automatic_rounds_are_resolved() -> None:
-    from fracslice.kernel.depth import resolve_depths
+    from fracslice.fields.depth import resolve_depths
 
     root = resolve_depths(orbit(mandelbulb(), mandelbox(scale=-1.5)), 0.05)
     assert 1 < root["iterations"] < 10

@@ -7,14 +7,19 @@ import pytest
 
 from fracslice import formulas
 from fracslice.errors import KernelError, SceneError
+from fracslice.fields import maps as verbs
+from fracslice.fields import orbit_code
+from fracslice.fields.cpu import compile_scene
+from fracslice.fields.depth import resolve_depths
+from fracslice.fields.growth import image
+from fracslice.fields.linker import link
+from fracslice.fields.maps import ball, fold, positive, turn
+from fracslice.fields.node import FORMULAS
+from fracslice.fields.orbits import growth_of, orbit, steps
+from fracslice.fields.powers import power
+from fracslice.fields.reference import reference
+from fracslice.fields.steps import trace
 from fracslice.formulas import Number, Vector, bristorbrot, julia, mandelbox, quaternion_mandelbrot
-from fracslice.formulas import orbits as verbs
-from fracslice.formulas.node import FORMULAS
-from fracslice.formulas.orbits import ball, fold, growth_of, orbit, positive, power, steps, turn
-from fracslice.kernel import compile_scene, link, orbits, reference
-from fracslice.kernel.depth import resolve_depths
-from fracslice.kernel.growth import image
-from fracslice.kernel.steps import trace
 from tests.benchmarks.formulas.steps import SCENES
 from tests.budgets.instructions import assembly, sizes
 
@@ -62,7 +67,7 @@ def triplex(w, c):  # type: ignore[no-untyped-def]
 
 def scope_of(step, sizes: dict[str, int]):  # type: ignore[no-untyped-def]
     """Code of a step, and a function of points and constants that returns its images and stretches."""
-    from fracslice.formulas import vocabulary
+    from fracslice.expr import vocabulary
 
     made = trace(step, sizes, {})
     names = "".join(f", v0_{name}" for name in sizes)
@@ -285,6 +290,6 @@ def test_the_code_of_a_step_is_cached(monkeypatch: pytest.MonkeyPatch) -> None:
     bulbs = [steps(formulas.mandelbulb(power=power), alone=False)[0][0] for power in (5, 6)]
     texts = [code.traced(0) for code in bulbs]
     assert texts[0] != texts[1]
-    orbits._trace_step.cache_clear()
-    monkeypatch.setattr(orbits, "trace", None)
+    orbit_code._trace_step.cache_clear()
+    monkeypatch.setattr(orbit_code, "trace", None)
     assert [code.traced(0) for code in bulbs] == texts

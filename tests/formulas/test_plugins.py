@@ -8,12 +8,12 @@ import pytest
 from fracslice.cli.main import run
 
 from fracslice.errors import FracsliceWarning
-from fracslice.formulas import registry
-from fracslice.formulas.node import FORMULAS
+from fracslice.fields import registry
+from fracslice.fields.node import FORMULAS
 
 OWN = '''
 from fracslice.formulas import Number, orbit, shape
-from fracslice.formulas.orbits import ball, fold
+from fracslice.fields.maps import ball, fold
 
 @orbit(scale=Number(-1.7, "enlarges"))
 def own_box(w, c, scale):

@@ -5,6 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fracslice.fields.escape import sure_distance
+from fracslice.fields.growth import image
+from fracslice.fields.orbit_code import function_of_text
+from fracslice.fields.orbits import growth_of, steps
+from fracslice.fields.powers import by_angles, triplex
+from fracslice.fields.reference import reference
 from fracslice.formulas import (
     Node,
     abox,
@@ -16,12 +22,6 @@ from fracslice.formulas import (
     mandelbulb,
     orbit,
 )
-from fracslice.formulas.escape import sure_distance
-from fracslice.formulas.orbits import growth_of, steps
-from fracslice.formulas.powers import by_angles, triplex
-from fracslice.kernel import reference
-from fracslice.kernel.growth import image
-from fracslice.kernel.orbits import function_of_text
 from fracslice.scene.layout import formulas
 from tests.stability.bounds import verdict
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from fracslice.fields.cpu import compile_scene
 from fracslice.formulas import bend, box
-from fracslice.kernel import compile_scene
 
 
 @pytest.mark.parametrize("degrees", [1e-12, 1e-6, 1e-3, 0.1, -0.1])

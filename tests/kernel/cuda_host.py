@@ -13,8 +13,9 @@ from unittest import mock
 import numpy as np
 import pytest
 
+from fracslice.expr import cuda_driver, cuda_memory
+from fracslice.fields import cuda, cuda_launching
 from fracslice.formulas import sphere
-from fracslice.kernel import cuda, cuda_driver, cuda_launching, cuda_memory
 
 H200 = (9, 0)
 

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from fracslice.kernel import Linked, cuda_source
-from fracslice.kernel.loops import Loop
+from fracslice.expr import cuda_source
+from fracslice.expr.language import Linked
+from fracslice.expr.loops import Loop
 
 
 def compiled(

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from fracslice.formulas.node import FORMULAS
-from fracslice.kernel import cuda, reference
+from fracslice.fields import cuda
+from fracslice.fields.node import FORMULAS
+from fracslice.fields.reference import reference
 from fracslice.mesh.roots import LOOPS, Roots
 from tests.examples import DEFINED, EXAMPLES
 from tests.kernel.idioms import HEAD, SAME, P, imported

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fracslice.fields.cpu import compile_scene
+from fracslice.fields.linker import link
+from fracslice.fields.reference import reference
 from fracslice.formulas import mandelbulb, sphere
-from fracslice.kernel import compile_scene, link, reference
 from tests.examples import DEFINED, EXAMPLES, stamped
 
 ALL = EXAMPLES | DEFINED
@@ -94,9 +96,9 @@ def test_second_process_compiles_nothing(tmp_path, monkeypatch) -> None:  # type
 
     monkeypatch.setenv("FRACSLICE_CACHE", str(tmp_path))
     script = (
-        "import sys; from fracslice.formulas import julia; from fracslice.kernel import compile_scene;"
+        "import sys; from fracslice.formulas import julia; from fracslice.fields.cpu import compile_scene;"
         "compile_scene(julia(iterations=5)).points([0.1], [0.2], [0.3]);"
-        "print('fracslice.kernel.compiler' in sys.modules, 'numba' in sys.modules)"
+        "print('fracslice.expr.compiler' in sys.modules, 'numba' in sys.modules)"
     )
     runs = [
         subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout

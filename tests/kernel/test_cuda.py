@@ -15,8 +15,10 @@ from pathlib import Path
 import pytest
 
 from fracslice.errors import KernelError
+from fracslice.expr import cuda_loops, cuda_source
+from fracslice.fields import cuda
+from fracslice.fields.linker import link
 from fracslice.formulas import Node, sphere
-from fracslice.kernel import cuda, cuda_loops, cuda_source, link
 from tests.examples import DEFINED, EXAMPLES, STRUCTURES, stamped
 from tests.kernel.cuda_ptx import compiled
 
@@ -90,7 +92,7 @@ def test_without_numba_cuda_one_line_says_how_to_get_it(monkeypatch: pytest.Monk
 
 
 def test_asking_for_nothing_imports_nothing() -> None:
-    script = "import sys, fracslice.kernel.cuda; print('numba' in sys.modules)"
+    script = "import sys, fracslice.fields.cuda; print('numba' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
 

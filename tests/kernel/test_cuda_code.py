@@ -18,8 +18,9 @@ import numpy as np
 import pytest
 
 from fracslice.errors import KernelError
-from fracslice.kernel import cuda_driver, cuda_launching, cuda_memory
-from fracslice.kernel import cuda_memory as cuda_api
+from fracslice.expr import cuda_driver, cuda_memory
+from fracslice.expr import cuda_memory as cuda_api
+from fracslice.fields import cuda_launching
 from tests.kernel.cuda_host import HostDriver, driven, words
 
 pytestmark = pytest.mark.once

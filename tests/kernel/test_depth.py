@@ -9,6 +9,18 @@ import pytest
 from fracslice import MeshJob, make_mesh
 from fracslice.common.parameters import AUTO
 from fracslice.errors import EmptyError
+from fracslice.expr.vocabulary import sqrt
+from fracslice.fields import depth
+from fracslice.fields.depth import (
+    Known,
+    _step,
+    _surface_points,
+    depth_notes,
+    resolve_depths,
+    shallower,
+    visible,
+)
+from fracslice.fields.node import FORMULAS
 from fracslice.formulas import (
     Box,
     Count,
@@ -23,18 +35,6 @@ from fracslice.formulas import (
     sphere,
     transform,
     union,
-)
-from fracslice.formulas.node import FORMULAS
-from fracslice.formulas.vocabulary import sqrt
-from fracslice.kernel import depth
-from fracslice.kernel.depth import (
-    Known,
-    _step,
-    _surface_points,
-    depth_notes,
-    resolve_depths,
-    shallower,
-    visible,
 )
 from fracslice.scene import scene
 from fracslice.slicing import SliceJob, plan_stack

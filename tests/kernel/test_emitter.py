@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from fracslice.errors import KernelError
-from fracslice.kernel.cpu import object_code
-from fracslice.kernel.host import lane_count
-from fracslice.kernel.linker import Linked
-from fracslice.kernel.loops import Loop
-from fracslice.kernel.machine import load_object
+from fracslice.expr.host import lane_count
+from fracslice.expr.language import Linked
+from fracslice.expr.loops import Loop
+from fracslice.expr.machine import load_object
+from fracslice.fields.cpu import object_code
 
 N = 7
 HEAD = """\
-from fracslice.formulas.vocabulary import any_of, minimum, where
-from fracslice.kernel.loops import WIDTH, load, store
-from fracslice.kernel.loops import loop
+from fracslice.expr.vocabulary import any_of, minimum, where
+from fracslice.expr.loops import WIDTH, load, store
+from fracslice.expr.loops import loop
 """
 
 

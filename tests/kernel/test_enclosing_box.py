@@ -7,6 +7,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from fracslice.expr.intervals import Interval
+from fracslice.fields.boxes import proved_half
+from fracslice.fields.reference import enclosure, reference
+from fracslice.fields.registry import Node
 from fracslice.formulas import (
     bristorbrot,
     burning_ship,
@@ -16,10 +20,6 @@ from fracslice.formulas import (
     orbit,
     transform,
 )
-from fracslice.formulas.registry import Node
-from fracslice.kernel.boxes import proved_half
-from fracslice.kernel.intervals import Interval
-from fracslice.kernel.reference import enclosure, reference
 
 pytestmark = pytest.mark.once
 

@@ -8,6 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fracslice.fields.escape_radius import constant_stretch, least_size
+from fracslice.fields.growth import _prove_growth, arguments, compose_steps, image, norm
+from fracslice.fields.maps import modulo
+from fracslice.fields.orbit_code import Code
+from fracslice.fields.orbits import growth_of, orbit_select, steps
 from fracslice.formulas import (
     Node,
     abox,
@@ -26,10 +31,6 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.formulas.orbits import growth_of, modulo, orbit_select, steps
-from fracslice.kernel.escape_radius import constant_stretch, least_size
-from fracslice.kernel.growth import _prove_growth, arguments, compose_steps, image, norm
-from fracslice.kernel.orbits import Code
 from fracslice.scene.layout import formulas
 from tests.stability.bounds import verdict
 from tests.stability.random_hybrids import random_hybrid

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from fracslice.kernel import devices, host
+from fracslice.expr import host
+from fracslice.fields import devices
 
 CPU = "processor\t: 0\n" + "".join(f"{line}\t: 1\n" for line in sorted(host.DESCRIBED)) + "\nprocessor\t: 1\n"
 
@@ -61,7 +62,7 @@ def test_a_small_render_does_not_look_for_a_gpu(monkeypatch: pytest.MonkeyPatch,
 
     from fracslice import render, sphere
 
-    monkeypatch.setattr("fracslice.kernel.cuda_driver.missing", lambda: pytest.fail("looked for a GPU"))
+    monkeypatch.setattr("fracslice.expr.cuda_driver.missing", lambda: pytest.fail("looked for a GPU"))
     (tmp_path / "a.xml").write_text('<scene version="1"><solid size="9mm"><sphere/></solid></scene>')
     command = "render", tmp_path / "a.xml", "-o", tmp_path / "a.png", "--size", "8x6", "--samples", 1, "-q"
     assert run([str(word) for word in command]) == 0

@@ -7,17 +7,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fracslice.formulas import Node, gyroid, mandelbox, mandelbulb, menger, sphere, vocabulary
-from fracslice.formulas.box import Box
-from fracslice.formulas.field import Precision
-from fracslice.kernel import compile_scene
-from fracslice.kernel.cpu import compile_loops
-from fracslice.kernel.depth import resolve_depths
-from fracslice.kernel.intervals import ARRAYS, Interval
-from fracslice.kernel.linker import CALLED, FIELD, link
-from fracslice.kernel.loops import enclosures
-from fracslice.kernel.reference import enclosure
-from fracslice.kernel.tree import Enclosures
+from fracslice.expr import vocabulary
+from fracslice.expr.intervals import ARRAYS, Interval
+from fracslice.expr.language import CALLED, FIELD
+from fracslice.expr.loops import enclosures
+from fracslice.fields.box import Box
+from fracslice.fields.cpu import compile_loops, compile_scene
+from fracslice.fields.depth import resolve_depths
+from fracslice.fields.field import Precision
+from fracslice.fields.linker import link
+from fracslice.fields.reference import enclosure
+from fracslice.fields.tree import Enclosures
+from fracslice.formulas import Node, gyroid, mandelbox, mandelbulb, menger, sphere
 from tests.examples import EXAMPLES, stamped
 
 pytestmark = pytest.mark.once

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from fracslice.kernel import source
-from fracslice.kernel.source import Copy, shared_copy
+from fracslice.fields import source
+from fracslice.fields.source import Copy, shared_copy
 
 TEXT = """
 SCALE = 2.0

@@ -10,8 +10,11 @@ import numpy as np
 import pytest
 
 from fracslice.errors import FracsliceError, SceneError
-from fracslice.formulas.node import FORMULAS
-from fracslice.kernel import compile_scene, cuda_loops, cuda_source, link, reference
+from fracslice.expr import cuda_loops, cuda_source
+from fracslice.fields.cpu import compile_scene
+from fracslice.fields.linker import link
+from fracslice.fields.node import FORMULAS
+from fracslice.fields.reference import reference
 from tests.kernel.idioms import HEAD, SAME, P, X, Y, Z, imported
 
 

@@ -11,13 +11,14 @@ from types import ModuleType
 
 import pytest
 
+from fracslice.fields import source
+from fracslice.fields.linker import link
+from fracslice.fields.registry import Formula
 from fracslice.formulas import Node, sphere
-from fracslice.formulas.registry import Formula
-from fracslice.kernel import link, source
 
 SOURCE = """
 import constants
-from fracslice.formulas.vocabulary import sqrt
+from fracslice.expr.vocabulary import sqrt
 SCALE = 2.0
 
 def helper(r):

@@ -13,16 +13,16 @@ import numpy as np
 import pytest
 
 from fracslice.errors import KernelError
+from fracslice.expr import loop_linker
+from fracslice.expr import loops as intrinsics
+from fracslice.expr.host import lane_count
+from fracslice.expr.language import Linked
+from fracslice.expr.loop_linker import loop_source
+from fracslice.expr.loops import Loop, load, loop, store
+from fracslice.fields.cpu import load_functions
+from fracslice.fields.field import Kernel, Precision
+from fracslice.fields.tree import ArrayField
 from fracslice.formulas import box
-from fracslice.formulas.field import Kernel, Precision
-from fracslice.kernel import loop_linker
-from fracslice.kernel import loops as intrinsics
-from fracslice.kernel.cpu import load_functions
-from fracslice.kernel.host import lane_count
-from fracslice.kernel.linker import Linked
-from fracslice.kernel.loop_linker import loop_source
-from fracslice.kernel.loops import Loop, load, loop, store
-from fracslice.kernel.tree import ArrayField
 from fracslice.mesh import roots
 from fracslice.rendering import packets
 
@@ -190,7 +190,7 @@ def test_the_text_of_loops_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_identity_of_a_function_is_the_same_in_every_process() -> None:
     """And follows every number that it or a function that it calls uses."""
     code = (
-        "from fracslice.rendering.packets import tile; from fracslice.kernel.loop_linker import identity; "
+        "from fracslice.rendering.packets import tile; from fracslice.expr.loop_linker import identity; "
         "print(identity(tile.function))"
     )
     one, other = (

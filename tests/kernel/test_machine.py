@@ -17,10 +17,12 @@ import pytest
 import fracslice
 from fracslice._native import RootLoops
 from fracslice._slices import Memory, ProbeBounds, Slab
+from fracslice.expr import machine
+from fracslice.expr.loops import bricks, points
+from fracslice.expr.machine import Image, UnsupportedError
+from fracslice.fields.cpu import CpuKernel
+from fracslice.fields.linker import link
 from fracslice.formulas import box, mandelbulb, sphere
-from fracslice.kernel import CpuKernel, link, machine
-from fracslice.kernel.loops import bricks, points
-from fracslice.kernel.machine import Image, UnsupportedError
 from fracslice.mesh.roots import Roots
 
 
@@ -73,8 +75,8 @@ def test_arrays_become_addresses_in_one_place() -> None:
         str(path.relative_to(package)) for path in package.rglob("*.py") if address.search(path.read_text())
     }
     own = {"viewer/screen.py"}  # names X11's result type
-    driver = {f"kernel/cuda_{part}.py" for part in ("launching", "memory")}  # returns when it has copied
-    assert result == {"kernel/machine.py"} | own | driver
+    driver = {"fields/cuda_launching.py", "expr/cuda_memory.py"}  # returns when it has copied
+    assert result == {"expr/machine.py"} | own | driver
 
 
 def test_a_file_that_the_loader_does_not_know_is_left_to_llvm(monkeypatch: pytest.MonkeyPatch) -> None:

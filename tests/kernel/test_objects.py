@@ -14,12 +14,13 @@ from pathlib import Path
 import pytest
 
 from fracslice.errors import FracsliceWarning
+from fracslice.expr import compiler
+from fracslice.expr.host import toolchain
+from fracslice.expr.language import Linked
+from fracslice.expr.loops import Loop, points
+from fracslice.fields.cpu import object_code
+from fracslice.fields.linker import link
 from fracslice.formulas import sphere
-from fracslice.kernel import compiler
-from fracslice.kernel.cpu import object_code
-from fracslice.kernel.host import toolchain
-from fracslice.kernel.linker import Linked, link
-from fracslice.kernel.loops import Loop, points
 
 LINKED = link(sphere())
 
@@ -145,7 +146,7 @@ def test_planted_code_does_not_run_and_is_reported_once(folder: Path) -> None:
 
     def values(*shapes: str) -> subprocess.CompletedProcess[str]:
         program = (
-            "from fracslice.formulas import box, sphere; from fracslice.kernel import compile_scene\n"
+            "from fracslice.formulas import box, sphere; from fracslice.fields.cpu import compile_scene\n"
             f"for shape in ({', '.join(shapes)},): print(compile_scene(shape).points(1.0, 1.0, 0.0))"
         )
         return subprocess.run([sys.executable, "-c", program], text=True, capture_output=True, check=True)

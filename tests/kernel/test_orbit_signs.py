@@ -5,6 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fracslice.expr.intervals import ARRAYS, Interval
+from fracslice.fields.cpu import compile_scene
+from fracslice.fields.field import Precision
+from fracslice.fields.reference import enclosure, reference
 from fracslice.formulas import (
     Node,
     burning_ship,
@@ -15,10 +19,6 @@ from fracslice.formulas import (
     quaternion_mandelbrot,
     transform,
 )
-from fracslice.formulas.field import Precision
-from fracslice.kernel import compile_scene
-from fracslice.kernel.intervals import ARRAYS, Interval
-from fracslice.kernel.reference import enclosure, reference
 
 pytestmark = pytest.mark.once
 

@@ -9,8 +9,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
+from fracslice.fields.linker import link
 from fracslice.formulas import mandelbulb, menger
-from fracslice.kernel import link
 
 
 @pytest.fixture

@@ -7,6 +7,12 @@ import numpy as np
 import pytest
 
 from fracslice.errors import SceneError
+from fracslice.expr import compiler
+from fracslice.expr.host import REGISTERS, host
+from fracslice.expr.loops import points
+from fracslice.fields.cpu import compile_scene
+from fracslice.fields.linker import link
+from fracslice.fields.reference import reference
 from fracslice.formulas import (
     Node,
     bounds,
@@ -22,9 +28,6 @@ from fracslice.formulas import (
     twist,
     union,
 )
-from fracslice.kernel import compile_scene, compiler, link, reference
-from fracslice.kernel.host import REGISTERS, host
-from fracslice.kernel.loops import points
 from fracslice.rendering.linking import link_frame
 from fracslice.rendering.setup import optics
 from fracslice.scene.view import Camera, Light, View

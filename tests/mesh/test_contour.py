@@ -13,6 +13,10 @@ from scipy.spatial.transform import Rotation
 
 from fracslice._native import Cells, Contouring
 from fracslice.errors import MeshError
+from fracslice.fields.field import Bounds, Device, Kernel, Precision
+from fracslice.fields.node import FORMULAS
+from fracslice.fields.reference import reference
+from fracslice.fields.tree import ArrayField
 from fracslice.formulas import (
     Node,
     Number,
@@ -32,10 +36,6 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.formulas.field import Bounds, Device, Precision
-from fracslice.formulas.node import FORMULAS
-from fracslice.kernel import Kernel, reference
-from fracslice.kernel.tree import ArrayField
 from fracslice.mesh import Mesh
 from fracslice.mesh.checks import check_mesh
 from fracslice.mesh.contouring import Piece, contour, contour_pieces, extract

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from fracslice.fields.field import Field
 from fracslice.formulas import box, sphere
-from fracslice.kernel import Field
 from fracslice.mesh import Mesh
 from fracslice.mesh.field import MeshField
 from fracslice.mesh.spatial import Nearest

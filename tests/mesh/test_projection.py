@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fracslice._native import trust_regions
+from fracslice.fields.cpu import compile_scene
 from fracslice.formulas import Node, box, mandelbulb, sphere, transform, union
-from fracslice.kernel import compile_scene
 from fracslice.mesh.contouring import project
 from fracslice.mesh.fit import surface_error
 

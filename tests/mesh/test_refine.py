@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from fracslice import MeshJob, make_mesh
+from fracslice.fields.reference import reference
 from fracslice.formulas import (
     Node,
     box,
@@ -21,7 +22,6 @@ from fracslice.formulas import (
     transform,
     twist,
 )
-from fracslice.kernel import reference
 from fracslice.mesh import Mesh
 from fracslice.mesh.checks import check_mesh
 from fracslice.mesh.contouring import contour

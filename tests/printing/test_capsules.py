@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fracslice.fields.cpu import compile_scene
 from fracslice.formulas import sphere
-from fracslice.kernel import compile_scene
 from fracslice.printing.bridging import capsules
 from fracslice.printing.samples import positions
 from fracslice.volume import Bricks, Lattice, sample

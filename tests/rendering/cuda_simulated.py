@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fracslice.kernel.cuda import require
+from fracslice.fields.cuda import require
 from fracslice.rendering.accumulator import CHANNELS, PassPlan, tile_order
 from fracslice.rendering.cpu import CpuTracer
 from fracslice.rendering.cuda import CudaAccumulator, CudaTracer

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fracslice.kernel import Linked
+from fracslice.expr.language import Linked
 from fracslice.rendering import cuda
 from fracslice.rendering.cuda_loops import loops
 from tests.examples import stamped

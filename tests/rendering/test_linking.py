@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from fracslice import render
+from fracslice.fields.linker import link
+from fracslice.fields.registry import Node
 from fracslice.formulas import mandelbulb, material, sphere, union
 from fracslice.formulas.material import TRAPS
-from fracslice.formulas.registry import Node
-from fracslice.kernel.linker import link
 from fracslice.rendering.linking import Frame, link_frame
 from fracslice.rendering.setup import optics
 from fracslice.scene.view import Camera, Fog, Light, Shading, View

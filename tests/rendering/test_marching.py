@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fracslice.fields.cpu import compile_scene
+from fracslice.fields.reference import reference
 from fracslice.formulas import (
     Node,
     box,
@@ -20,7 +22,6 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.kernel import compile_scene, reference
 from fracslice.rendering import Renderer
 from fracslice.rendering import setup as optics
 from fracslice.scene import library, read

@@ -7,17 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fracslice.formulas import (
-    Node,
-    box,
-    difference,
-    mandelbulb,
-    material,
-    plane,
-    sphere,
-    transform,
-    union,
-)
+from fracslice.formulas import Node, box, difference, mandelbulb, material, plane, sphere, transform, union
 from fracslice.rendering import Renderer, materials
 from fracslice.rendering.glow import glowing_bodies
 from fracslice.rendering.scattering import reflected_shares

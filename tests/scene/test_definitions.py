@@ -14,10 +14,11 @@ from fracslice.cli.main import run
 from lxml import etree
 
 from fracslice.errors import SceneError
+from fracslice.fields.cpu import compile_scene
+from fracslice.fields.definitions import definitions
+from fracslice.fields.depth import resolve_depths
+from fracslice.fields.reference import reference
 from fracslice.formulas import get, mandelbox, orbit
-from fracslice.formulas.definitions import definitions
-from fracslice.kernel import compile_scene, reference
-from fracslice.kernel.depth import resolve_depths
 from fracslice.scene import Scene, read, reads, to_xml
 from fracslice.scene.manual import OPEN, PATH
 

@@ -13,6 +13,7 @@ import pytest
 
 from fracslice import MeshJob, make_mesh
 from fracslice.errors import Cancelled, SceneError, SliceError
+from fracslice.fields.field import Bounds
 from fracslice.formulas import (
     Node,
     box,
@@ -27,7 +28,6 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.formulas.field import Bounds
 from fracslice.jobs.completeness import layers_amount
 from fracslice.scene import scene
 from fracslice.slicing import Layer, SliceJob, Slicer, Stack, plan_stack

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fracslice.fields.cpu import compile_scene
 from fracslice.formulas import Node
-from fracslice.kernel import compile_scene
 
 from .places import points
 

@@ -6,9 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from fracslice.fields.cpu import compile_scene
+from fracslice.fields.field import Precision
+from fracslice.fields.reference import reference
 from fracslice.formulas import Node
-from fracslice.formulas.field import Precision
-from fracslice.kernel import compile_scene, reference
 
 from .extremes import extreme_versions, hostile_points
 from .scaling import SCALINGS

@@ -11,8 +11,8 @@ import numpy as np
 
 from fracslice.common.parameters import AUTO, REQUIRED, Axis, Choice, Count, Number, Vector
 from fracslice.errors import FracsliceError
+from fracslice.fields.reference import reference
 from fracslice.formulas import Formula, Node, bounds, orbit
-from fracslice.kernel import reference
 from fracslice.scene.layout import formulas
 
 from .draws import number

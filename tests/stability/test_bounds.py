@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fracslice.fields.cpu import compile_scene
 from fracslice.formulas import (
     Node,
     difference,
@@ -19,7 +20,6 @@ from fracslice.formulas import (
     sphere,
     union,
 )
-from fracslice.kernel import compile_scene
 from tests.examples import EXAMPLES, STRUCTURES, stamped
 
 from .bounds import verdict

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from fracslice.fields.cpu import compile_scene
+from fracslice.fields.field import Precision
 from fracslice.formulas import names, sphere, transform
-from fracslice.formulas.field import Precision
-from fracslice.kernel import compile_scene
 from tests.examples import EXAMPLES, STRUCTURES, stamped
 from tests.stability.random_scenes import ORBITS
 

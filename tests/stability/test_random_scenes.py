@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fracslice.fields.depth import AUTO
 from fracslice.formulas import Formula, Node
-from fracslice.kernel.depth import AUTO
 from tests.examples import stamped
 
 from .random_scenes import LEAVES, OTHERS, leaf, random_scene

@@ -6,8 +6,8 @@ import re
 
 import pytest
 
+from fracslice.fields.depth import resolve_depths
 from fracslice.formulas import intersection, sphere, transform
-from fracslice.kernel.depth import resolve_depths
 from fracslice.scene import library
 from tests.benchmarks.stability.scenes import drawn_settings
 from tests.examples import stamped

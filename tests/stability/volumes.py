@@ -8,9 +8,9 @@ import numpy as np
 
 from fracslice import MeshJob, make_mesh
 from fracslice.errors import VolumeError
+from fracslice.fields.cpu import compile_scene
 from fracslice.formulas import Box, Node
 from fracslice.jobs.completeness import layers_amount
-from fracslice.kernel import compile_scene
 from fracslice.scene import scene
 from fracslice.slicing import SliceJob, Slicer, plan_stack
 from fracslice.work import Work

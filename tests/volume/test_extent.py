@@ -12,6 +12,10 @@ import pytest
 from fracslice import MeshJob, make_mesh
 from fracslice._native import Sides
 from fracslice.errors import Cancelled, SceneError
+from fracslice.fields.box import Box
+from fracslice.fields.cpu import compile_scene
+from fracslice.fields.field import Bounds, Device, Kernel, Precision
+from fracslice.fields.tree import ArrayField
 from fracslice.formulas import (
     Node,
     box,
@@ -28,10 +32,6 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.formulas.box import Box
-from fracslice.formulas.field import Bounds, Device, Kernel, Precision
-from fracslice.kernel import compile_scene
-from fracslice.kernel.tree import ArrayField
 from fracslice.scene import Print, scene
 from fracslice.slicing import SliceJob, plan_stack
 from fracslice.volume import extent, plan

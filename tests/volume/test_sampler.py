@@ -11,6 +11,9 @@ import numpy as np
 import pytest
 
 from fracslice.errors import Cancelled, SceneError, TooLargeError, VolumeError
+from fracslice.fields.box import Box
+from fracslice.fields.cpu import compile_scene
+from fracslice.fields.field import Bounds
 from fracslice.formulas import (
     Node,
     box,
@@ -24,9 +27,6 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.formulas.box import Box
-from fracslice.formulas.field import Bounds
-from fracslice.kernel import compile_scene
 from fracslice.volume import Bricks, Lattice, extent, plan, sample, sample_scene
 from fracslice.volume.bricks import INSIDE, OUTSIDE
 from fracslice.volume.pruning import Proofs

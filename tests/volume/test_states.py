@@ -48,7 +48,7 @@ def test_where_is_the_same_for_any_ranges(monkeypatch: pytest.MonkeyPatch) -> No
     result = states()
     expected = np.flatnonzero(result.flat == 2)
     for size in (1, 7, 1 << 20):
-        monkeypatch.setattr("fracslice.volume.states.RANGE", size)
+        monkeypatch.setattr("fracslice.volume.pruning.RANGE", size)
         np.testing.assert_array_equal(result.where(lambda part: result.flat[part] == 2, Work(3)), expected)
 
 

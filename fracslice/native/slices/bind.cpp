@@ -18,7 +18,7 @@ namespace nb = nanobind;
 namespace fracslice::slices {
 namespace {
 
-// Machine code of a scene, `fracslice.kernel.loops.points` on float.
+// Machine code of a scene, `fracslice.expr.loops.points` on float.
 class Compiled : public Field {
  public:
     explicit Compiled(const nb::tuple& entry)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...formulas.vocabulary import cos, maximum, minimum, sin, sqrt, where
+from ...expr.vocabulary import cos, maximum, minimum, sin, sqrt, where
 from .lights import disc
 from .march import normalised
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...formulas.vocabulary import absolute, exp, maximum, minimum, where
+from ...expr.vocabulary import absolute, exp, maximum, minimum, where
 
 
 def fog(t, density):

@@ -5,7 +5,7 @@ Trowbridge and Reitz 1975 (GGX of Walter et al. 2007), with Smith's height-corre
 
 from __future__ import annotations
 
-from ...formulas.vocabulary import cos, floor, maximum, rsqrt, sin, sqrt, where
+from ...expr.vocabulary import cos, floor, maximum, rsqrt, sin, sqrt, where
 from .environment import bounded
 from .intrinsics import gather
 from .lights import TURN, frame

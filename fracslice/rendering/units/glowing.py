@@ -7,7 +7,7 @@ Carlo Rendering", with one sample. The ray itself finds what it meets, so that b
 
 from __future__ import annotations
 
-from ...formulas.vocabulary import absolute, maximum, where
+from ...expr.vocabulary import absolute, maximum, where
 from .march import normalised, span
 from .weights import HALF_TURN, facet_density
 

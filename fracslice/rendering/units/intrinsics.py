@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...kernel.loops import field, gather, intrinsic
+from ...expr.loops import field, gather, intrinsic
 
 __all__ = [
     "GIVEN",

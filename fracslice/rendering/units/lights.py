@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...formulas.vocabulary import absolute, cos, maximum, rsqrt, sin, sqrt, where
+from ...expr.vocabulary import absolute, cos, maximum, rsqrt, sin, sqrt, where
 from .march import normalised
 
 TURN = 6.283185307179586

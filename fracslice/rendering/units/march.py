@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...formulas.vocabulary import absolute, any_of, exp, maximum, minimum, rsqrt, sqrt, where
+from ...expr.vocabulary import absolute, any_of, exp, maximum, minimum, rsqrt, sqrt, where
 from .intrinsics import blocker, field, transparent
 
 MOST = 1.8

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...formulas.vocabulary import exp, log, maximum, minimum, where
+from ...expr.vocabulary import exp, log, maximum, minimum, where
 
 UNKNOWN = 1e30
 """Squared error of a pixel with fewer than two samples."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...formulas.vocabulary import absolute, exp, floor, log, maximum, minimum, sqrt, where
+from ...expr.vocabulary import absolute, exp, floor, log, maximum, minimum, sqrt, where
 from .intrinsics import field
 from .march import normalised
 

@@ -7,7 +7,7 @@ a mirror or glass, for which no light is sampled.
 
 from __future__ import annotations
 
-from ...formulas.vocabulary import maximum, sqrt, where
+from ...expr.vocabulary import maximum, sqrt, where
 from .glossy import hidden, highlight, width
 
 HALF_TURN = 3.141592653589793

@@ -10,10 +10,10 @@ from inspect import signature
 from types import MappingProxyType
 from typing import Any
 
+from fracslice.expr.vocabulary import absolute, any_of, maximum, minimum, ratio, sqrt, where
+from fracslice.fields.escape import CORE, potential_distance
+from fracslice.fields.orbits import orbit_arguments
 from fracslice.formulas import Formula, Node
-from fracslice.formulas.escape import CORE, potential_distance
-from fracslice.formulas.orbits import orbit_arguments
-from fracslice.formulas.vocabulary import absolute, any_of, maximum, minimum, ratio, sqrt, where
 
 BRISTOR, LEAST = 2.985, 2 * CORE**0.5
 """Most that the Bristorbrot's step stretches, per |w|; least derivative of a disconnected Julia set."""

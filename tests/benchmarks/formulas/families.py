@@ -14,8 +14,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from fracslice import make_mesh
+from fracslice.fields.cpu import compile_scene
+from fracslice.fields.reference import reference
 from fracslice.formulas import Formula, Node
-from fracslice.kernel import compile_scene, reference
 from fracslice.scene.layout import formulas
 from tests.examples import EXAMPLES
 from tests.formulas.truths import TRUTHS

@@ -12,6 +12,8 @@ from math import cos, radians, sin
 
 import numpy as np
 
+from fracslice.fields.cpu import compile_scene
+from fracslice.fields.definitions import Definition, formula
 from fracslice.formulas import (
     Node,
     bristorbrot,
@@ -20,8 +22,6 @@ from fracslice.formulas import (
     mandelbulb,
     quaternion_mandelbrot,
 )
-from fracslice.formulas.definitions import Definition, formula
-from fracslice.kernel import compile_scene
 from fracslice.volume import plan
 from fracslice.volume.sampler import sample_signs
 from fracslice.work import Work

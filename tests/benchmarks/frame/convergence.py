@@ -13,8 +13,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fracslice.expr.loop_linker import link_loops
 from fracslice.formulas import Node, julia, mandelbulb, menger, plane, transform, union
-from fracslice.kernel.loop_linker import link_loops
 from fracslice.rendering import Renderer, packets
 from fracslice.rendering.accumulator import CHANNELS, COUNT, GOAL, PassPlan, tile_order
 from fracslice.rendering.units.random import hashed

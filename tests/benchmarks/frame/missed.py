@@ -10,8 +10,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fracslice.fields.cpu import compile_scene
 from fracslice.formulas import Node
-from fracslice.kernel import compile_scene
 from fracslice.scene.view import Camera
 from tests.examples import EXAMPLES
 from tests.rendering.rays import directions, distances

@@ -13,8 +13,8 @@ from itertools import product
 
 import numpy as np
 
+from fracslice.fields.reference import reference
 from fracslice.formulas import Node, julia, mandelbulb, menger, sphere
-from fracslice.kernel import reference
 
 from ..runner import Row, Run
 

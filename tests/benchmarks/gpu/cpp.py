@@ -7,7 +7,7 @@ import ast
 from collections.abc import Sequence
 from typing import Any
 
-from fracslice.kernel.cuda_source import after_parameters
+from fracslice.expr.cuda_source import after_parameters
 
 WORDS = {
     "where": "({} ? {} : {})",

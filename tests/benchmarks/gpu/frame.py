@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
+from fracslice.fields import cuda
 from fracslice.formulas import mandelbulb
-from fracslice.kernel import cuda
 from fracslice.rendering.accumulator import CHANNELS, COUNT, COVER, GOAL, PassPlan, tile_order
 from fracslice.rendering.cpu import BLOCK, STEPS, CpuTracer
 from fracslice.rendering.cuda import CudaTracer

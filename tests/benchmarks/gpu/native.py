@@ -7,7 +7,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-from fracslice.kernel import Linked
+from fracslice.expr.language import Linked
 
 from .cpp import translated
 

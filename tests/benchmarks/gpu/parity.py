@@ -9,8 +9,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fracslice.fields import cuda
+from fracslice.fields.reference import reference
 from fracslice.formulas import Node
-from fracslice.kernel import cuda, reference
 from tests.examples import EXAMPLES
 
 from ..runner import Row, Run

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fracslice.fields import cuda
 from fracslice.formulas import mandelbulb
-from fracslice.kernel import cuda
 from fracslice.rendering import Renderer
 from fracslice.rendering.accumulator import CHANNELS, GOAL, PassPlan, tile_order
 from fracslice.scene.view import Camera, Film, Light, View

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from fracslice import kernel as cpu
+from fracslice.fields import cpu, cuda
+from fracslice.fields.linker import link
 from fracslice.formulas import Node, mandelbulb, menger
-from fracslice.kernel import cuda, link
 from fracslice.volume import Lattice, sample
 
 from ..runner import Row, Run
@@ -38,7 +38,7 @@ def surface(root: Node) -> np.ndarray:
 
 def best(run: Callable[[], None], rounds: int = 10) -> float:
     """The shortest of a few times on the GPU, ms; it is kept busy before, so that launching costs nothing."""
-    from fracslice.kernel.cuda_intrinsics import cuda as numba_cuda
+    from fracslice.expr.cuda_intrinsics import cuda as numba_cuda
 
     times = []
     for _ in range(rounds):

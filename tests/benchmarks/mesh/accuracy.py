@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fracslice.fields.reference import reference
 from fracslice.formulas import Node, box, julia, menger, sphere, torus, transform
-from fracslice.kernel import reference
 from fracslice.mesh.contouring import contour, extract
 from fracslice.mesh.refine import refine
 from fracslice.volume import plan, sample_scene

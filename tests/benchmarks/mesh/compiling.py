@@ -8,10 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import partial
 
+from fracslice.expr import compiler
+from fracslice.expr.host import REGISTERS, host, lane_count
+from fracslice.expr.loops import bricks, points
+from fracslice.fields.linker import link
 from fracslice.formulas import Node, bounds, box, sphere, transform, union
-from fracslice.kernel import compiler, link
-from fracslice.kernel.host import REGISTERS, host, lane_count
-from fracslice.kernel.loops import bricks, points
 
 from ..runner import Row, Run
 

@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from fracslice._native import Cells, Contouring
-from fracslice.kernel import Field
+from fracslice.fields.field import Field
 from fracslice.mesh.contouring import Crossings, Refiner, contour, extract, minimum_edge_parameter
 from fracslice.scene import library, read
 from fracslice.volume import plan, sample_scene

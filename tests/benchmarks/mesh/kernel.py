@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from fracslice.fields.cpu import compile_scene
 from fracslice.formulas import julia, mandelbulb, menger
-from fracslice.kernel import compile_scene
 
 from ..programs import output
 from ..runner import Figures, Row, Run, Spread

@@ -13,8 +13,8 @@ import numpy as np
 
 from fracslice.export import png
 from fracslice.export.slice_run import SliceRun
+from fracslice.fields.box import Box
 from fracslice.formulas import mandelbulb
-from fracslice.formulas.box import Box
 from fracslice.slicing import Layer, Slicer, Stack
 from fracslice.slicing.raster import Screen
 from fracslice.work import Work

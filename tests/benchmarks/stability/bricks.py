@@ -9,9 +9,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fracslice.formulas import Node, vocabulary
-from fracslice.kernel import compile_scene, link
-from fracslice.kernel.linker import CALLED, FIELD
+from fracslice.expr import vocabulary
+from fracslice.expr.language import CALLED, FIELD
+from fracslice.fields.cpu import compile_scene
+from fracslice.fields.linker import link
+from fracslice.formulas import Node
 from fracslice.volume import Lattice, sample
 from fracslice.volume.bricks import INSIDE, Bricks
 from tests.budgets.instructions import LANES

@@ -13,6 +13,11 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from fracslice.expr.loops import enclosures
+from fracslice.fields.cpu import compile_loops, compile_scene
+from fracslice.fields.field import Cells
+from fracslice.fields.linker import link
+from fracslice.fields.tree import Enclosures
 from fracslice.formulas import (
     Node,
     bounds,
@@ -28,12 +33,6 @@ from fracslice.formulas import (
     quaternion_mandelbrot,
     transform,
 )
-from fracslice.formulas.field import Cells
-from fracslice.kernel import compile_scene
-from fracslice.kernel.cpu import compile_loops
-from fracslice.kernel.linker import link
-from fracslice.kernel.loops import enclosures
-from fracslice.kernel.tree import Enclosures
 from fracslice.volume import Plan, plan
 from fracslice.volume.pruning import Proofs
 from fracslice.volume.sampler import sample_signs

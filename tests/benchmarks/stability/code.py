@@ -11,9 +11,9 @@ import subprocess
 import sys
 from collections.abc import Iterator
 
+from fracslice.expr.language import Linked
+from fracslice.fields.linker import link
 from fracslice.formulas import Node, mandelbulb, material, sphere, transform, union
-from fracslice.kernel import link
-from fracslice.kernel.linker import Linked
 from fracslice.rendering.linking import link_frame
 from fracslice.rendering.packets import loops
 from fracslice.rendering.setup import optics

@@ -1,0 +1,129 @@
+"""Functions that a formula may use, with their NumPy implementation.
+
+A formula is a plain function of ``x, y, z``. It is written once, with these functions, Python arithmetic,
+``for`` and ``if not any_of(mask): break``. Here the functions act on NumPy arrays (the reference);
+`fracslice.expr` implements the same names for SIMD lanes and CUDA threads.
+
+Two rules keep one source fast on all targets. Branches on points use `where`, never ``if``. Float constants
+are written as floats (``2.0 * x``), so that each target can set the width of literals.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+where = np.where
+sqrt = np.sqrt
+log = np.log
+exp = np.exp
+sin = np.sin
+cos = np.cos
+atan2 = np.arctan2
+floor = np.floor
+minimum = np.minimum
+maximum = np.maximum
+absolute = np.abs
+
+
+def any_of(mask: np.ndarray) -> bool:
+    """Whether a condition holds at any point: the only way for points to affect control flow.
+
+    Parameters
+    ----------
+    mask
+        Condition at each point.
+
+    Returns
+    -------
+    bool
+    """
+    return bool(np.any(mask))
+
+
+def rsqrt(a: np.ndarray) -> np.ndarray:
+    """Reciprocal square root; SIMD units have an instruction for it.
+
+    Parameters
+    ----------
+    a
+        Positive, finite numbers.
+
+    Returns
+    -------
+    ndarray
+        1/sqrt(a).
+    """
+    result: np.ndarray = 1.0 / np.sqrt(a)
+    return result
+
+
+def ratio(a: np.ndarray | float, b: np.ndarray) -> np.ndarray:
+    """Quotient; GPUs have an instruction for the reciprocal.
+
+    Parameters
+    ----------
+    a
+        Dividend.
+    b
+        Divisor: normal, finite numbers whose reciprocal is normal, too.
+
+    Returns
+    -------
+    ndarray
+        a/b.
+    """
+    result: np.ndarray = a / b
+    return result
+
+
+def orbit(r2: np.ndarray, alive: np.ndarray, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> None:
+    """Record a step of an orbit for the palettes of pictures; elsewhere it does nothing.
+
+    Parameters
+    ----------
+    r2
+        |w|^2 after the step.
+    alive
+        Mask of the points whose orbit is still running.
+    x, y, z
+        w after the step.
+    """
+
+
+def cell_middle(a: np.ndarray) -> np.ndarray:
+    """Number near the middle of the values of a cell; of a point its own. For code of the kernel alone.
+
+    Parameters
+    ----------
+    a
+        Numbers, or intervals.
+
+    Returns
+    -------
+    ndarray
+        Numbers, or intervals of one number.
+    """
+    return a
+
+
+def cell_extent(a: np.ndarray) -> np.ndarray:
+    """Largest distance of the values of a cell from `cell_middle`.
+
+    Parameters
+    ----------
+    a
+        Numbers, or intervals.
+
+    Returns
+    -------
+    ndarray
+        Numbers, or intervals of one number.
+    """
+    return 0.0 * a
+
+
+_FUNCTIONS = ("where", "sqrt", "rsqrt", "ratio", "log", "exp", "sin", "cos", "atan2", "floor")
+NAMES = frozenset((*_FUNCTIONS, "minimum", "maximum", "absolute", "any_of"))
+OF_CELLS = frozenset(("cell_middle", "cell_extent"))
+"""Functions that only code of the kernel calls."""
+__all__ = sorted(NAMES)

@@ -1,0 +1,1 @@
+"""Distance fields: scene trees and what is computed of them: boxes, bounds, orbits, kernels."""

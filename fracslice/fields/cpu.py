@@ -1,0 +1,154 @@
+"""CPU back end: a scene's field as machine code, compiled or read from the cache of object files.
+
+Loading it takes milliseconds. Its functions (`machine`) release the GIL, so plain threads scale.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..common.cache import Kept, cache_folder, key
+from ..expr.host import REGISTERS, host, lane_count, toolchain
+from ..expr.language import Linked
+from ..expr.loop_linker import loop_source
+from ..expr.loops import Loop, bricks, points
+from ..expr.machine import Function, constant, load_object
+from .field import Kernel, Loops, Precision
+from .linker import link
+
+if TYPE_CHECKING:
+    from .node import Node
+
+
+def object_code(linked: Linked, bits: int, width: int, loops: Sequence[Loop]) -> bytes:
+    """Return the object file of loops over a linked scene: cached, or compiled and cached.
+
+    A file that other users could have written is not used.
+    """
+    texts_of_all = linked.source, loop_source(loops), [loop.arguments for loop in loops]
+    name = f"{key(*texts_of_all, bits, width, toolchain())}.o"
+
+    def compiled() -> bytes:
+        from ..expr.compiler import Target, compile_object
+
+        return compile_object(linked, Target(bits, width, REGISTERS, *host()), loops)
+
+    return Kept(cache_folder()).cached(name, compiled)  # incomplete code would crash the process
+
+
+BATCH = 1 << 10
+"""Points per call of a loop: few enough to stay in the fastest cache."""
+
+
+class CpuKernel(Kernel):
+    """Compiled field of one scene.
+
+    Parameters
+    ----------
+    linked
+        Linked scene.
+    precision
+        "float32" or "float64".
+
+    Attributes
+    ----------
+    dtype
+        Floating-point type.
+    width
+        Lanes.
+    """
+
+    def __init__(self, linked: Linked, precision: Precision = "float32") -> None:
+        self.dtype = np.dtype(precision)
+        self.width = lane_count(self.dtype.itemsize * 8)
+        functions = load_functions(linked, self.dtype.itemsize * 8, self.width, (points, bricks))
+        self._points, self._bricks = functions["points"], functions["bricks"]
+        self._parameters = constant(linked.parameters, self.dtype)
+        self._offsets = constant(np.indices((8, 8, 8)).reshape(3, 512), self.dtype)
+
+    @property
+    def entry(self) -> tuple[Function, np.ndarray]:
+        """Compiled `loops.points` and its parameters."""
+        return self._points, self._parameters
+
+    def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+        shape, n = np.shape(x), np.size(x)
+        padded = -(-max(n, 1) // self.width) * self.width
+        coordinates = np.empty((4, padded), self.dtype)
+        coordinates[:3, n:] = 0
+        with np.errstate(over="ignore"):
+            for row, values in zip(coordinates, (x, y, z), strict=False):
+                row[:n].reshape(shape)[...] = values
+        self._points(self._parameters, *coordinates, padded)
+        return coordinates[3, :n].reshape(shape)
+
+    def bricks(
+        self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray
+    ) -> None:
+        assert corners.shape == (len(out), 3) and out.shape == (len(corners), 512)
+        frame = np.array([*origin, voxel], self.dtype)
+        self._bricks(self._parameters, frame, *self._offsets, corners, out, len(corners))
+
+
+_kernel = lru_cache(maxsize=32)(CpuKernel)
+
+
+def compile_scene(root: Node, precision: Precision = "float32") -> CpuKernel:
+    """Compile the kernel of a scene tree.
+
+    Parameters
+    ----------
+    root
+        Scene with resolved depths.
+    precision
+        "float32" or "float64".
+
+    Returns
+    -------
+    CpuKernel
+        Compiled field.
+
+    Raises
+    ------
+    KernelError
+        If the scene cannot be linked or compiled.
+    """
+    return _kernel(link(root), precision)
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledLoop:
+    """Machine-code implementation of `fields.field.FieldLoop`."""
+
+    function: Function  # compiled loop
+    parameters: np.ndarray  # parameters P of the scene
+
+    def __call__(self, frame: np.ndarray, rows: np.ndarray, out: np.ndarray) -> None:
+        self.function(self.parameters, frame, *rows, *out, rows.shape[1])
+
+    def native(self, frame: np.ndarray) -> tuple[Function, np.ndarray, np.ndarray]:
+        """Return the loop for native code; see `FieldLoop.native`."""
+        return self.function, self.parameters, frame
+
+
+@lru_cache(maxsize=32)
+def compile_loops(linked: Linked, loops: tuple[Loop, ...], precision: Precision) -> Loops:
+    """Compile loops over a linked scene.
+
+    `precision`: "float32" or "float64".
+    """
+    parameters = constant(linked.parameters, precision)
+    bits = parameters.dtype.itemsize * 8
+    width = lane_count(bits)
+    functions = load_functions(linked, bits, width, loops)
+    return Loops(width, BATCH, {name: CompiledLoop(f, parameters) for name, f in functions.items()})
+
+
+def load_functions(linked: Linked, bits: int, width: int, loops: Sequence[Loop]) -> dict[str, Function]:
+    """Load or compile the functions of loops over a linked scene."""
+    return load_object(object_code(linked, bits, width, loops), loops, np.dtype(f"float{bits}"))

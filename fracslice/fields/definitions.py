@@ -1,0 +1,352 @@
+"""Formulas that a scene defines by the text of their step or distance, which is checked before anything of
+it is executed.
+
+A text that passes is straight-line arithmetic: assignments, loops over constants and a return of numbers,
+points and calls of named functions. It holds no attribute, no text, no other call and no import; its size,
+its powers and its loops are bounded, so that no text is expensive to compile.
+"""
+
+from __future__ import annotations
+
+import ast
+import linecache
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from hashlib import sha256
+from keyword import iskeyword
+from types import MappingProxyType
+from typing import Any, Literal, NoReturn
+
+import numpy as np
+
+from ..common.messages import hint
+from ..common.parameters import Parameter
+from ..errors import KernelError, SceneError
+from ..expr import vocabulary
+from ..expr.language import parse
+from ..expr.vocabulary import NAMES
+from . import maps
+from .box import Box, Triple
+from .maps import NAMES as VERBS
+from .orbit_code import Code
+from .orbits import HOOKS, LIPSCHITZ, OWN, orbit_step
+from .reference import reference
+from .registry import Formula, Hook, Node, names
+
+LONGEST, DEEPEST, MOST = 4000, 24, 600
+"""Characters of a text, levels of its tree, and operations with its powers and loops written out, where a
+statement counts as one at least.
+"""
+
+HIGHEST, LARGEST = 16, 1e9
+"""Largest exponent and largest number."""
+
+PYTHON = frozenset({"abs", "min", "max"})
+
+_OPERATORS = (
+    ast.Add,
+    ast.Sub,
+    ast.Mult,
+    ast.Div,
+    ast.Mod,
+    ast.Pow,
+    ast.BitAnd,
+    ast.BitOr,
+    ast.USub,
+    ast.UAdd,
+)
+_COMPARED = (ast.Lt, ast.LtE, ast.Gt, ast.GtE)
+_NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
+RESERVED = frozenset({*NAMES, *PYTHON, *VERBS, "orbit", "range", "int", "child"})
+"""Names that a text cannot define."""
+
+Fail = Callable[[int, str], Exception]
+"""Makes the error to raise from a line of the text and a message."""
+
+
+def is_name(text: str) -> bool:
+    """True for a name that a text may define: lower-case letters, digits and underscores."""
+    return _NAME.fullmatch(text) is not None and text not in RESERVED and not iskeyword(text)
+
+
+def parse_checked(text: str, given: Iterable[str], functions: Iterable[str], fail: Fail) -> list[ast.stmt]:
+    """Parse a text and check it."""
+    if len(text) > LONGEST:
+        raise fail(1, f"has a text of {len(text)} characters: expected at most {LONGEST}")
+    try:
+        body: list[ast.stmt] = parse(text).body
+    except SyntaxError as error:
+        raise fail(error.lineno or 1, f"is not written in Python: {error.msg}") from None
+    except (RecursionError, MemoryError, ValueError):
+        raise fail(1, "has a text that is nested too deeply") from None
+    check = _Check(set(given), frozenset(functions) | PYTHON, fail)
+    check.depth(body)
+    check.body(body)
+    if not body or not isinstance(body[-1], ast.Return):
+        raise fail(getattr(body[-1], "lineno", 1) if body else 1, "expected a return as the last statement")
+    if check.cost(body) > MOST:
+        raise fail(1, f"has more than {MOST} operations with its loops and powers written out")
+    return body
+
+
+class _Check:
+    """Goes through statements in order, and knows the names that have a value."""
+
+    def __init__(self, known: set[str], functions: frozenset[str], fail: Fail) -> None:
+        self.known, self.functions, self.fail = known, functions, fail
+
+    def refuse(self, node: ast.AST, expected: str) -> NoReturn:
+        shown = " ".join(ast.unparse(node).split())
+        shown = shown if len(shown) <= 40 else shown[:37] + "..."
+        raise self.fail(getattr(node, "lineno", 1), f"{shown!r} is not allowed: expected {expected}")
+
+    def depth(self, body: list[ast.stmt]) -> None:
+        """Refuse deep trees, level by level: the other checks are recursive."""
+        level: list[ast.AST] = [*body]
+        for _ in range(DEEPEST):
+            level = [child for node in level for child in ast.iter_child_nodes(node)]
+        if level:
+            raise self.fail(body[0].lineno, f"has a text nested more than {DEEPEST} levels deep")
+
+    def body(self, statements: list[ast.stmt]) -> None:
+        for statement in statements:
+            match statement:
+                case ast.Assign([target], value):
+                    statement.value = self.value(value)
+                    self.assign(target)
+                case ast.AugAssign(ast.Name(name) as target, op, value):
+                    self.operator(statement, op)
+                    self.value(ast.copy_location(ast.Name(name, ast.Load()), target))
+                    statement.value = self.value(value)
+                case ast.For(target, iterated, body, [], None):
+                    statement.iter = self.iterated(iterated)
+                    self.assign(target)
+                    self.body(body)
+                case ast.Return(ast.expr() as value):
+                    statement.value = self.value(value)
+                case _:
+                    self.refuse(statement, "assignments, for over constants, and return")
+
+    def assign(self, target: ast.expr) -> None:
+        if isinstance(target, ast.Tuple):
+            for part in target.elts:
+                self.assign(part)
+        elif not isinstance(target, ast.Name):
+            self.refuse(target, "a name to assign to")
+        elif not is_name(target.id):
+            self.refuse(target, "a name of lower-case letters that is not that of a function")
+        else:
+            self.known.add(target.id)
+
+    def iterated(self, node: ast.expr) -> ast.expr:
+        match node:
+            case ast.Call(ast.Name("range"), [ast.Constant(int(n))], []) if 0 < n <= MOST:
+                return node
+            case ast.Tuple():
+                return self.value(node)
+        self.refuse(node, f"range of a number up to {MOST}, or a tuple")
+
+    def value(self, node: ast.expr) -> ast.expr:
+        """Check an expression; return it with numbers as floats."""
+        match node:
+            case ast.Constant(value):
+                if isinstance(value, bool) or not isinstance(value, (int, float)) or abs(value) > LARGEST:
+                    self.refuse(node, f"numbers up to {LARGEST:g}")
+                return ast.copy_location(ast.Constant(float(value)), node)
+            case ast.Name(name):
+                if name not in self.known:
+                    near = hint(name, self.known | self.functions, "{}")
+                    raise self.fail(node.lineno, f"{name!r} has no value here; {near}")
+            case ast.Tuple(elements) if elements:
+                node.elts = [self.value(element) for element in elements]
+            case ast.UnaryOp(op, operand):
+                self.operator(node, op)
+                node.operand = self.value(operand)
+            case ast.BinOp(left, ast.Pow(), right):
+                node.left = self.value(left)
+                self.exponent(right)
+            case ast.BinOp(left, op, right):
+                self.operator(node, op)
+                node.left, node.right = self.value(left), self.value(right)
+            case ast.Compare(left, [op], [right]) if isinstance(op, _COMPARED):
+                node.left, node.comparators = self.value(left), [self.value(right)]
+            case ast.Call(ast.Name(name), arguments, []):
+                if name not in self.functions:
+                    near = hint(name, self.functions, "{}")
+                    raise self.fail(node.lineno, f"{name!r} is no function here; {near}")
+                node.args = [self.value(argument) for argument in arguments]
+            case _:
+                self.refuse(node, "numbers, points, arithmetic, comparisons and calls of functions by name")
+        return node
+
+    def operator(self, node: ast.AST, op: ast.AST) -> None:
+        if not isinstance(op, _OPERATORS) or (isinstance(node, ast.AugAssign) and isinstance(op, ast.Pow)):
+            self.refuse(node, "+, -, *, /, %, **, & and |")
+
+    def exponent(self, node: ast.expr) -> None:
+        match node:
+            case ast.Constant(int(n)) if type(n) is int and 1 <= n <= HIGHEST:
+                return
+            case ast.Constant(0.5):
+                return
+        self.refuse(node, f"a whole exponent from 1 to {HIGHEST}, or 0.5")
+
+    def cost(self, node: ast.AST | list[ast.stmt]) -> int:
+        """Operations of a tree whose loops and powers are written out."""
+        match node:
+            case list():
+                return sum(map(self.cost, node))
+            case ast.BinOp(base, ast.Pow(), ast.Constant(int(n))):
+                return n * (1 + self.cost(base))
+            case ast.For(_, ast.Call(_, [ast.Constant(int(n))]), body):
+                return n * self.cost(body)
+            case ast.For(_, ast.Tuple(elements) as values, body):
+                return self.cost(values) + len(elements) * self.cost(body)
+        own = 8 if isinstance(node, ast.Call) else isinstance(node, (ast.operator, ast.Compare))
+        inner = own + sum(map(self.cost, ast.iter_child_nodes(node)))
+        return max(inner, 1) if isinstance(node, ast.stmt) else inner
+
+
+POINTS = {"step": ("w", "c"), "distance": ("x", "y", "z")}
+"""Names that a text has the point from."""
+
+ERRORS = KernelError, ArithmeticError, LookupError, TypeError, ValueError
+"""Errors of texts that are not in the language, or confuse points and numbers."""
+
+_DOC = "Defined in the scene."
+
+
+@dataclass(frozen=True)
+class Definition:
+    """Text of a formula, with everything that the formula states."""
+
+    name: str  # name of its elements
+    parameters: tuple[tuple[str, Parameter], ...]  # kinds of the parameters by name
+    # statements. Names of the vocabulary, of the verbs (in a step) and of the parameters have a value
+    text: str
+    # what the text returns: the next point of an orbit, or the signed distance of a solid
+    kind: Literal["step", "distance"] = "step"
+    lipschitz: float = 1.0  # lipschitz bound of a distance
+    half: Triple | None = None  # half sizes of a box around the solid of a distance; None: endless
+    place: tuple[str, int] | None = field(default=None, compare=False)  # file and line of the text
+
+    def fail(self, line: int, message: str) -> SceneError:
+        """Error about a line of the text, from 1."""
+        place = f"{self.place[0]}:{self.place[1] + line - 1}: " if self.place else ""
+        return SceneError(f"{place}<define> {self.name}: {message}")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Defined(Formula):
+    """Formula of a definition; formulas of equal definitions are equal."""
+
+    definition: Definition = field(kw_only=True)  # the definition
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Defined) and self.definition == other.definition
+
+    def __hash__(self) -> int:
+        return hash(self.definition)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return formula, (self.definition,)
+
+
+def formula(definition: Definition) -> Defined:
+    """Make the formula of a definition."""
+    _check_names(definition)
+    called = [*vocabulary.NAMES - {"any_of"}, *(VERBS if definition.kind == "step" else ())]
+    given = [*POINTS[definition.kind], *dict(definition.parameters)]
+    body = parse_checked(definition.text, given, called, definition.fail)
+    made = _make_definition(definition, given, body)
+    try:
+        _try(made)
+    except ERRORS as error:
+        raise _locate_error(definition, given, body, error) from None
+    return made
+
+
+def _make_definition(definition: Definition, arguments: list[str], body: list[ast.stmt]) -> Defined:
+    return Defined(
+        definition.name,
+        "shape",
+        _function(definition, arguments, body),
+        MappingProxyType(dict(definition.parameters) | (OWN if definition.kind == "step" else {})),
+        lipschitz=LIPSCHITZ if definition.kind == "step" else definition.lipschitz,
+        exterior_only=definition.kind == "step",
+        hooks=_hooks(definition),
+        definition=definition,
+    )
+
+
+def _check_names(definition: Definition) -> None:
+    taken = {*POINTS[definition.kind], *OWN, "place"}
+    for name in dict(definition.parameters):
+        if not is_name(name) or name in taken:
+            raise definition.fail(1, f"parameter {name!r}: expected another name of lower-case letters")
+    if len(dict(definition.parameters)) < len(definition.parameters):
+        raise definition.fail(1, "has two parameters of one name")
+    if not is_name(definition.name) or definition.name in names():
+        raise definition.fail(1, "expected a name of lower-case letters that no other element has")
+
+
+def _hooks(definition: Definition) -> dict[str, Hook]:
+    if definition.kind == "step":
+        return {**HOOKS, "step": orbit_step}
+    half = definition.half
+    return {"bounds": lambda _: Box.centred(*half)} if half else {}
+
+
+def _function(definition: Definition, arguments: list[str], body: list[ast.stmt]) -> Callable[..., Any]:
+    """Function of checked statements, whose source the linker can read."""
+    lines = "\n".join(map(ast.unparse, body)).replace("\n", "\n    ")
+    text = f"def {definition.name}({', '.join(arguments)}):\n    {lines}\n"
+    file = f"<define {definition.name} {sha256(text.encode()).hexdigest()[:12]}>"
+    scope: dict[str, Any] = {n: getattr(vocabulary, n) for n in vocabulary.NAMES}
+    scope |= {n: getattr(maps, n) for n in VERBS} | {"__name__": __name__}
+    exec(compile(text, file, "exec"), scope)
+    linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
+    function: Callable[..., Any] = scope[definition.name]
+    function.__doc__ = _DOC
+    return function
+
+
+def _try(made: Defined) -> None:
+    """Translate the text; evaluate a distance at a point.
+
+    A step is translated to straight-line code, which knows points from numbers; a distance is not.
+    """
+    definition = made.definition
+    if definition.kind == "step":
+        kinds = dict(definition.parameters).items()
+        sizes = tuple((name, len(k.default) if isinstance(k.default, tuple) else 1) for name, k in kinds)
+        Code(made.function, sizes).traced(0)
+        return
+    value = reference(made())(*np.full((3, 1), 0.3))
+    if value.dtype != np.float64 or value.shape != (1,):
+        raise KernelError("expected it to return a number that depends on the point")
+
+
+def _locate_error(
+    definition: Definition, arguments: list[str], body: list[ast.stmt], error: Exception
+) -> SceneError:
+    """Error of the first statement with which the text is at fault."""
+    end = parse("return w" if definition.kind == "step" else "return x").body
+    for count, statement in enumerate(body, 1):
+        try:
+            _try(_make_definition(definition, arguments, [*body[:count], *end]))
+        except ERRORS as first:
+            message = str(first).rpartition(f" {definition.name}: ")[2]
+            return definition.fail(statement.lineno, message)
+    return definition.fail(body[-1].lineno, str(error).rpartition(f" {definition.name}: ")[2])
+
+
+def definitions(root: Node) -> list[Definition]:
+    """Definitions of a tree's formulas, in the order of the tree."""
+    used = dict.fromkeys(n.formula.definition for n in root.walk() if isinstance(n.formula, Defined))
+    named: dict[str, Definition] = {}
+    for definition in used:
+        if named.setdefault(definition.name, definition) != definition:
+            raise SceneError(f"<define> {definition.name}: expected one definition of this name in a scene")
+    return list(used)

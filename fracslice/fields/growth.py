@@ -1,0 +1,495 @@
+"""Growth of orbits: power, radius of escape, box of the solid and the sign of an orbit's field, from
+samples and by proofs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache, reduce
+from itertools import accumulate, islice, product
+from operator import mul
+from typing import Any, cast
+
+import numpy as np
+
+from ..expr import functions
+from ..expr.intervals import Interval, on_intervals
+from . import orbit_code
+from .box import Box
+from .boxes import possible_cells, proved_half
+from .escape import CORE, levels
+from .escape_radius import constant_stretch, escape_radius, least_size
+from .orbit_code import R2, Code, Form, Round, field, function_of_text, indent_lines, mapped
+
+DIRECTIONS, RADII, FARTHEST = 64, np.geomspace(1e-2, 1e4, 56).round(4), 1e6
+"""Samples of the search for the radius of escape."""
+
+SAMPLES, OCTAVES = 1 << 13, (12.0, 1.0, 0.5, 0.5)
+"""Samples of each search of `widened_escapes`, and the octaves beyond the radius that they lie in."""
+
+POWER, FLAT = 1.2, 0.2
+"""Least growth that counts as a power; largest logarithm of a factor that counts as 1, for it changes the
+potential of an escaped orbit by a thirtieth.
+"""
+
+Image = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""Image of points [3, n] with constants [3, n]."""
+
+
+def step_power(step: Image, rays: np.ndarray, origin: np.ndarray) -> tuple[float, float]:
+    """Return the power by which a step grows far out, and the logarithm of its factor."""
+    near, far = (np.log(np.maximum(norm(step(rays * r, origin)), 1e-300)) for r in (1e4, 1e5))
+    rate = round(float(np.median(far - near)) / math.log(10), 3)
+    rate = rate if rate > POWER else 1.0
+    factor = float(np.median(near)) - rate * math.log(1e4)
+    return rate, factor if abs(factor) > FLAT else 0.0
+
+
+def sampled_escape(whole: Image, points: np.ndarray, size: float) -> float:
+    """Return a radius beyond which a round leads farther out, for constants of a given size.
+
+    Constants against the image, against the point and along it are tried.
+    """
+    grows, radii = np.ones(points.shape[1], bool), norm(points)
+    for against in (whole(points, np.zeros(3)), points, -points) if size else (points,):
+        grows &= norm(whole(points, _against(against, size))) > 1.02 * radii
+    stays = np.flatnonzero(~grows.reshape(-1, len(RADII)).all(axis=0))
+    return float(RADII[min(stays.max(initial=0) + 1, len(RADII) - 1)])
+
+
+def widened_escapes(images: Sequence[Image], escapes: Sequence[float], size: float) -> tuple[float, ...]:
+    """Return radii of escape, enlarged until no orbit of dense random samples comes back from beyond
+    them.
+    """
+    rng, radii, last = np.random.default_rng(0), list(escapes), len(images) - 1
+    for octaves in OCTAVES:
+        for place in range(len(images)):
+            rest = compose_steps(images[place + 1 :] or images)
+            w = _random(rng, radii[place] * 2.0 ** rng.uniform(0, octaves, SAMPLES))
+            limit = norm(w) if place == last else radii[-1]
+            back = np.zeros(SAMPLES, bool)
+            for against in (0.0 * w, rest(w, np.zeros(3)), w, -w, _random(rng, norm(w))):
+                back |= norm(rest(w, _against(against, size))) <= limit
+            radii[place] = max(radii[place], 1.02 * float(norm(w[:, back]).max(initial=0.0)))
+    return tuple(radii)
+
+
+def _random(rng: np.random.Generator, radius: np.ndarray) -> np.ndarray:
+    """Return points of given radii in random directions."""
+    w = rng.normal(size=(3, SAMPLES))
+    w *= radius / norm(w)
+    return w
+
+
+def _against(vectors: np.ndarray, size: float) -> np.ndarray:
+    """Return constants against vectors: as long as they are, at most of a size."""
+    length = norm(vectors)
+    against: np.ndarray = vectors * (-np.minimum(size, length) / np.maximum(length, 1e-300))
+    return against
+
+
+def sampled_radius(whole: Image, points: np.ndarray, rounds: int, radius: float) -> float:
+    """Return a radius that encloses the points whose orbit is within a radius after some rounds."""
+    w = start = points
+    for _ in range(rounds):
+        w = whole(w, start)
+        kept = norm(w) < max(radius, FARTHEST)
+        w, start = w[:, kept], start[:, kept]
+    inside = norm(start[:, norm(w) <= radius])
+    return float(inside.max(initial=RADII[0]) * (RADII[1] / RADII[0]) * 1.02)
+
+
+def directions() -> np.ndarray:
+    """Return unit vectors [3, n]: to the corners, edges and faces of a cube, and at random."""
+    lattice = np.array([v for v in product((-1, 0, 1), repeat=3) if any(v)], float).T
+    rays = np.hstack([lattice, np.random.default_rng(0).normal(size=(3, DIRECTIONS))])
+    unit: np.ndarray = rays / np.linalg.norm(rays, axis=0)
+    return unit
+
+
+def norm(w: np.ndarray) -> np.ndarray:
+    """Return the lengths of vectors [3, n], of any size."""
+    length: np.ndarray = np.hypot(np.hypot(w[0], w[1]), w[2])
+    return length
+
+
+def image(steps: Round, place: int, values: Mapping[str, Any]) -> Image:
+    """Return a step on arrays.
+
+    Returns function of points [3, n] and constants, [3, n] or [3], that returns their images [3, n].
+    """
+    code = steps[place]
+    names = code.arguments(place)
+    body = [*code.before(place, ("px", "py", "pz")), *code.image(place)]
+    function = function_of_text(steps, ["x", "y", "z", "px", "py", "pz", *names], [*body, "return x, y, z"])
+    given = [values[name] for name in names]
+
+    def taken(w: np.ndarray, c: np.ndarray) -> np.ndarray:
+        constant = c if c.ndim == 2 else c[:, None]
+        with np.errstate(all="ignore"):
+            values = np.array(np.broadcast_arrays(*function(*w, *constant, *given), w[0])[:3])
+        finite: np.ndarray = np.nan_to_num(values, nan=1e300, posinf=1e300, neginf=-1e300)
+        return finite.clip(-1e170, 1e170)
+
+    return taken
+
+
+def stays(steps: Round, values: Mapping[str, Any], rounds: int, radius: float, outer: float) -> bool:
+    """Return True if the orbit that starts at the origin is within a radius after some rounds."""
+    step, start = compose_steps([image(steps, k, values) for k in range(len(steps))]), np.zeros((3, 1))
+    w = start
+    for _ in range(rounds):
+        w = step(w, start)
+        if float(norm(w)[0]) >= outer:
+            return False
+    return float(norm(w)[0]) <= radius
+
+
+def compose_steps(images: Sequence[Image]) -> Image:
+    """Return steps one after the other."""
+    return lambda w, c: reduce(lambda v, step: step(v, c), images, w)
+
+
+LIPSCHITZ, CELLS = 3.0, 1 << 15
+"""Lipschitz bound of the fields of hybrids, and the most cells of the search for the box."""
+
+ROUNDS = 60
+"""Rounds after which an orbit counts as bounded."""
+
+FEW, THICK = 8, 3
+"""Rounds of a solid that has no thin tips, and of one that is no dust: it holds those of more rounds."""
+
+STOP, STOPPED = 4.0, 300.0
+"""An orbit stops at this times R; if its next step grows by a power, where that step leads to a radius."""
+
+LEAST, LARGEST = 1.1, 27.0
+"""Least scaled radius of escape of an orbit that grows by a power; largest log |w| one step past the radius
+where it stops.
+"""
+
+TRIES, LARGER = 3, 1.65
+"""Radii that are tried to be proved, each that of the search before; most that the first is enlarged by."""
+
+
+@dataclass(frozen=True)
+class Growth:
+    """Growth of an orbit for given parameters.
+
+    The solid is by definition what has not left for good after its rounds, so a radius that is too large
+    moves no surface by more than one step. One that is too small makes another solid of each number of
+    rounds, for orbits come back.
+    """
+
+    powers: tuple[float, ...]  # of each step: |w| grows as this power far out, at least 1
+    factors: tuple[float, ...]  # of each step: logarithm of the factor of this power
+    escapes: tuple[float, ...]  # of each step: radius after it beyond which |w| grows with every round
+    half: tuple[float, float, float] = (math.inf,) * 3  # half sizes of a box around the solid
+    # true if it is proved that no orbit comes back from beyond the radii (`escape_radius`)
+    proved: bool = False
+    stretch: float | None = None  # stretch of a round if it is the same at all points, else None
+    least: float = LEAST  # least scaled radius of the surface of an orbit that grows by a power
+    # |w| one step past the radius where an orbit that grows by a power stops: there the value depends little
+    # on the number of steps
+    stopped: float = STOPPED
+    # true if no critical point is outside, False if one is, None if that is not known
+    connected: bool | None = None
+    reach: float = math.inf  # radius of a ball around the solids of all numbers of rounds
+    torn: bool = True  # false if no orbit comes to the tears of the steps
+
+    @property
+    def power(self) -> float:
+        """Power by which a round grows."""
+        return math.prod(self.powers)
+
+    @property
+    def by_power(self) -> bool:
+        """True if rounds grow by a power greater than 1."""
+        return self.power > POWER
+
+    @property
+    def escape(self) -> float:
+        """Radius of escape at the end of a round."""
+        return self.escapes[-1]
+
+    @property
+    def surface(self) -> float:
+        """The last |w| on the surface: the radius of escape, or more, for the potential of 1 is 0."""
+        scale = self.scales[-1] if self.scaled else 1.0
+        return max(self.escape, self.least / scale) if self.by_power else self.escape
+
+    @property
+    def lipschitz(self) -> float | None:
+        """Proved Lipschitz bound outside of the solid, or None.
+
+        With a constant stretch s, ``|w(p)| - |w(q)| <= s |p - q|`` for all points. An orbit that stops after
+        a step, at `STOP` times the larger of its radius and R, must be out of its radius for all q as near
+        as ``(|w(p)| - R) / (L s)``; L is 1 if no radius within a round exceeds R.
+        """
+        if not self.proved or self.stretch is None or self.by_power:
+            return None
+        largest = STOP * max(self.escapes) / self.escape
+        return (largest - 1) / (largest * (1 - 1 / STOP))
+
+    @property
+    def following(self) -> tuple[float, ...]:
+        """Power of the step after each step."""
+        return (*self.powers[1:], self.powers[0])
+
+    @property
+    def scales(self) -> tuple[float, ...]:
+        """Factors s after each step for which ``log (s |w|)`` grows by the powers alone, far out."""
+        power, last = 1.0, 0.0
+        for p, factor in zip(reversed(self.powers), reversed(self.factors), strict=True):
+            last += power * factor
+            power *= p
+        shift, scales = last / (power - 1), []
+        for p, factor in zip(self.powers, self.factors, strict=True):
+            shift = p * shift - factor
+            scales.append(math.exp(shift))
+        return tuple(scales)
+
+    @property
+    def scaled(self) -> bool:
+        """True if factors are not 1."""
+        return self.by_power and any(self.factors)
+
+    def form(self, steps: Round, conservative: bool) -> Form:
+        """Form of the field; a conservative one stays below twice the distance to tears.
+
+        That of a hybrid stays below twice the sure distance, too, for critical points may be outside. Without
+        majorants, neither is known: outside of a hybrid with tears it is then 0.
+        """
+        made = [code.traced(place) for place, code in enumerate(steps)]
+        bent = orbit_code.has_majorants(made)
+        torn = self.torn and conservative and bent and orbit_code.is_torn(made)
+        hybrid = len(steps) > 1 or steps[0].moved
+        blind = conservative and hybrid and not bent and any(step.is_torn for step in made)
+        sure = self.by_power and (self.connected is False or (hybrid and bent and conservative))
+        return Form(self.by_power, self.scaled, not self.connected, sure, torn, blind)
+
+    @property
+    def fits(self) -> bool:
+        """True if every step can be computed from the radius where an orbit stops."""
+        after = (*self.factors[1:], self.factors[0])
+        return all(
+            f + p * math.log(e) < LARGEST for e, p, f in zip(self.escapes, self.following, after, strict=True)
+        )
+
+
+@lru_cache(maxsize=256)
+def growth(steps: Round, values: tuple[tuple[str, Any], ...], iterations: int) -> Growth | None:
+    """Sample the growth of an orbit.
+
+    Returns None if orbits do not escape.
+    """
+    known = dict(values)
+    images = [image(steps, place, known) for place in range(len(steps))]
+    whole = compose_steps(images)
+    rays, origin = directions(), np.zeros(3)
+    if not norm(whole(rays * 1e4, origin)).min() > 1.02e4:
+        return None
+    rates = [step_power(step, rays, origin) for step in images]
+    points = (rays[:, :, None] * RADII).reshape(3, -1)
+    fixed = all(code.is_fixed(k) for k, code in enumerate(steps))
+    radius = bounded = sampled_radius(whole, points, ROUNDS, FARTHEST)
+    for _ in range(2):  # thin tips of the solid fall between samples; that of a few rounds has thicker ones
+        radius = max(sampled_escape(whole, points, 0.0 if fixed else bounded), 0.0 if fixed else bounded)
+        bounded = max(bounded, sampled_radius(whole, points, FEW, radius))
+    size = 0.0 if fixed else bounded
+    escapes = [
+        sampled_escape(compose_steps([*images[k:], *images[:k]]), points, size) for k in range(1, len(steps))
+    ]
+    powers, factors = zip(*rates, strict=True)
+    bound = Growth(powers, factors, (*escapes, radius), stretch=constant_stretch(steps, 0, known))
+    bound = _prove_growth(steps, bound, known, size)
+    if not bound.proved:
+        bound = replace(bound, escapes=widened_escapes(images, bound.escapes, size))
+        bound = _prove_growth(steps, bound, known, size)
+    reach, thick = (
+        sampled_radius(whole, points, n, bound.escape) for n in (iterations, min(iterations, THICK))
+    )
+    reach = max(1.5 * reach, thick, 1.02 * bound.surface if bound.by_power else 0.0)
+    bound = replace(bound, half=(reach, reach, reach))
+    return replace(bound, half=_half(steps, bound, known, iterations)) if bound.fits else bound
+
+
+def _prove_growth(steps: Round, bound: Growth, values: Mapping[str, Any], size: float) -> Growth:
+    """Growth with radii of escape that are proved; the same if they cannot be."""
+    tried, constants = bound, None if size and bound.by_power else size
+    for _ in range(TRIES if bound.fits else 0):
+        own = {**values, **arguments(steps, tried, 1)}
+        radii = [
+            escape_radius(
+                least_size(steps, first, own, constants),
+                tried.escapes[first - 1],
+                math.sqrt(own[f"stop{(first - 1) % len(steps)}"]),
+                None if constants is None and first == 0 else tried.surface,
+            )
+            for first in range(len(steps))
+        ]
+        if (*radii[1:], radii[0]) == tried.escapes:
+            return replace(tried, proved=True)
+        tried = replace(tried, escapes=(*radii[1:], radii[0]))
+        if any(new > LARGER * old for new, old in zip(tried.escapes, bound.escapes, strict=True)):
+            break
+    return bound
+
+
+def _half(
+    steps: Round, bound: Growth, values: Mapping[str, Any], iterations: int
+) -> tuple[float, float, float]:
+    """Half sizes of a box around the cells that the field does not prove to be empty; the search begins with
+    one half more than the samples reach.
+    """
+    function = field(steps, Form(bound.by_power, bound.scaled))
+    own = {**arguments(steps, bound, iterations), **values}
+    given = [own[name] for name in functions.parameters(function)[3:]]
+
+    def evaluate(points: np.ndarray) -> np.ndarray:
+        with np.errstate(all="ignore"):
+            return np.asarray(function(*points, *given))
+
+    centres, _, size = possible_cells(evaluate, LIPSCHITZ, Box.centred(*bound.half), CELLS)
+    x, y, z = (np.ceil((abs(centres).max(axis=1, initial=0) + size / 2) * 256) / 256).tolist()
+    return x, y, z
+
+
+def arguments(steps: Round, bound: Growth, iterations: int) -> dict[str, object]:
+    """Return the arguments of an orbit's field, besides those of its steps."""
+    own: dict[str, object] = {"iterations": iterations}
+    if not bound.by_power:
+        stops = {f"stop{k}": (STOP * max(e, bound.escape)) ** 2 for k, e in enumerate(bound.escapes)}
+        return {**own, **stops, "bailout": bound.escape}
+    scales = bound.scales if bound.scaled else (1.0,) * len(steps)
+    radius = bound.surface * scales[-1]
+    own["levels"] = levels(bound.power, iterations, radius)
+    own["reach"] = min(bound.reach, bound.surface)
+    escapes = (*bound.escapes[:-1], bound.surface)
+    for k, (escape, following, scale) in enumerate(zip(escapes, bound.following, scales, strict=True)):
+        own[f"stop{k}"] = max(escape, bound.stopped ** (1 / following) / scale) ** 2
+        own[f"surface{k}"] = escape
+        own[f"rate{k}"] = power = bound.powers[k]
+        if bound.scaled:
+            own[f"scale{k}"] = scale
+        if not bound.connected and steps[k].is_fixed(k):
+            own[f"least{k}"] = power * CORE ** ((power - 1) / 2) if power > POWER else 0.0
+    return own
+
+
+FARTHEST_BOX = 1e15
+"""Radius from which a ball is not used: intervals do not hold the squares of its points (`intervals`)."""
+
+MIDDLE = [f"m{v} = cell_middle({v})" for v in "xyz"]
+REACH = [*(f"e{v} = cell_extent({v})" for v in "xyz"), "reach = sqrt(ex * ex + ey * ey + ez * ez)"]
+
+
+def sign(steps: Round, scaled: bool) -> Callable[..., Any]:
+    """Write the function of ``|w_N|^2 - R^2`` where an orbit does not stop before, else of 1.
+
+    Of a cell, it follows a box and a ball around the image of its middle; each holds the images of all
+    points. The ball grows by the stretch over the box, where intervals of folds and turns grow with each sum.
+    """
+    return _sign(steps, scaled, tuple(functions.fingerprint(code.step) for code in steps))
+
+
+@lru_cache(maxsize=256)
+def _sign(steps: Round, scaled: bool, _: object) -> Callable[..., Any]:
+    given, setup, loop = [], [], []
+    for place, code in enumerate(steps):
+        given += [*code.arguments(place), f"stop{place}"]
+        setup += code.before(place, ("x", "y", "z"))
+        loop += [*_in_ball(code, place), *([R2] if code.traced(place).length is None else []), *_BETWEEN]
+        loop += [f"alive = alive & (r2 < stop{place})"]
+    body = [
+        *setup,
+        *[*MIDDLE, *REACH, "px, py, pz, size = mx, my, mz, reach", f"held = reach < {FARTHEST_BOX}"],
+        R2,
+        f"alive = r2 < stop{len(steps) - 1}",
+        "for _ in range(iterations):",
+        *indent_lines(["if not any_of(alive):", "    break", *loop]),
+        f"return where(alive, {'scale * scale * ' if scaled else ''}r2 - radius2, 1.0 + 0.0 * r2)",
+    ]
+    own = ["scale", "radius2"] if scaled else ["radius2"]
+    return function_of_text(steps, ["x", "y", "z", "iterations", *own, *given], body)
+
+
+_BETWEEN = [
+    "size2 = mx * mx + my * my + mz * mz",
+    "near, far = maximum(sqrt(size2) - reach, 0.0), sqrt(size2) + reach",
+    "r2 = where(held, maximum(minimum(r2, far * far), near * near), r2)",
+]
+"""Lines that bound |w|^2 by the ball."""
+
+
+def _in_ball(code: Code, place: int) -> list[str]:
+    """Lines that take a box to its image, within the image of a ball around its middle.
+
+    The ball grows by the stretch over the box. Steps that may tear space, or hold the start point in another
+    place than a sum, begin with the ball around the box again.
+    """
+    step = code.traced(place)
+    if step.is_torn or not (step.is_added or code.is_fixed(place)):
+        return [*code.boxed(place), *MIDDLE, *REACH]
+    own, spread = f"cx{place}, cy{place}, cz{place}", f"spread{place} * " if code.moved else ""
+    moves = not code.is_fixed(place)
+    there = ", ".join(mapped(f"back{place}", ("px", "py", "pz"))) if code.moved else "px, py, pz"
+    grown = (
+        f"({step.stretch[0]} * reach + {step.stretch[1]} * size)" if moves else f"({step.stretch[0]} * reach)"
+    )
+    return [
+        *([f"hx, hy, hz = {own}", f"{own} = {there}"] if moves else []),
+        *["bx, by, bz = x, y, z", "x, y, z = mx, my, mz", *code.image(place)],
+        *["mx, my, mz = x, y, z", "x, y, z = bx, by, bz"],
+        *([f"{own} = hx, hy, hz"] if moves else []),
+        *code.boxed(place, [f"reach = {spread}{grown}"]),
+        f"held = held & (reach < {FARTHEST_BOX})",
+        *(f"{v} = where(held, maximum(minimum({v}, m{v} + reach), m{v} - reach), {v})" for v in "xyz"),
+    ]
+
+
+def sign_arguments(steps: Round, grown: Growth, iterations: int) -> dict[str, object] | None:
+    """Return the arguments of the sign of an orbit's field, besides those of its steps."""
+    own = arguments(steps, grown, iterations)
+    stops = {name: value for name, value in own.items() if name.startswith("stop")}
+    scales = grown.scales if grown.scaled else (1.0,) * len(steps)
+    radius, outside = grown.surface * scales[-1], _outside(grown, iterations)
+    sizes = (scale**2 * cast("float", stop) for scale, stop in zip(scales, stops.values(), strict=True))
+    if any(size < least for size, least in zip(sizes, outside, strict=True)):
+        return None
+    scale = {"scale": scales[-1]} if grown.scaled else {}
+    return {"iterations": iterations, "radius2": radius**2, **scale, **stops}
+
+
+def _outside(grown: Growth, iterations: int) -> list[float]:
+    """Return the square of the scaled |w| after each step of the last round beyond which the field is
+    positive: ``log |w|^2`` is compared with the level, which grows by the power of each step.
+    """
+    radius = grown.surface * (grown.scales[-1] if grown.scaled else 1.0)
+    if not grown.by_power:
+        return [radius**2] * len(grown.powers)
+    first, last, _ = levels(grown.power, iterations, radius)
+    rounds = min(iterations - 1, int(30 / math.log10(grown.power)))
+    reached = accumulate(grown.powers, mul, initial=first * grown.power**rounds)
+    return [math.exp(min(level, last)) for level in islice(reached, 1, None)]
+
+
+@lru_cache(maxsize=64)
+def proved_box(steps: Round, values: tuple[tuple[str, Any], ...], grown: Growth, iterations: int) -> Box:
+    """Return a box that is proved to hold the inside of an orbit's field."""
+    known = arguments(steps, grown, iterations)
+    radius = math.sqrt(cast("float", known[f"stop{len(steps) - 1}"]))
+    if grown.proved and grown.by_power:  # for constants as long as the start point, too
+        radius = min(radius, grown.surface)
+    signed = sign_arguments(steps, grown, iterations)
+    if signed is None:
+        return Box.centred(radius)
+    enclosed, own = on_intervals(sign(steps, grown.scaled)), {**signed, **dict(values)}
+    given = [own[name] for name in functions.parameters(enclosed)[3:]]
+
+    def outside(*cells: Interval) -> Interval:
+        with np.errstate(all="ignore"):
+            return cast("Interval", enclosed(*cells, *given))
+
+    return Box.centred(*proved_half(outside, radius, grown.half))
