@@ -6,7 +6,7 @@ Arrays are C-contiguous and laid out as in `fracslice.volume.bricks.Bricks`. Lon
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from numpy import bool_, float32, float64, int16, int32, int64, uint8
+from numpy import bool_, float32, float64, int8, int16, int32, int64, uint8
 from numpy.typing import NDArray
 
 from .expr.machine import Function
@@ -549,3 +549,92 @@ def nesting(
 
 def side_of_line(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> int: ...
 def side_of_plane(a: Point, b: Point, c: Point, d: Point) -> int: ...
+def foremost(vertices: NDArray[float64], triangles: NDArray[int32], shape: tuple[int, int]) -> NDArray[int32]:
+    """Foremost triangle at the centre of each pixel, -1 if none, int32 [rows, columns].
+
+    x and y of the vertices are pixels; a larger z is nearer.
+    """
+
+class SampledField:
+    """Samples of a field, interpolated: see `fracslice.printing.samples.Samples`."""
+
+    def __init__(
+        self,
+        origin: tuple[float, float, float],
+        voxel: float,
+        ijk: NDArray[int32],
+        values: NDArray[float32],
+        index: NDArray[int32],
+    ) -> None: ...
+    def values(self, x: NDArray[float64], y: NDArray[float64], z: NDArray[float64]) -> NDArray[float64]:
+        """Values at points [n]."""
+
+    def capsule_values(
+        self, x: NDArray[float64], y: NDArray[float64], z: NDArray[float64], radius: float
+    ) -> NDArray[float64]:
+        """Values at points [n] of the samples of `fracslice.printing.bridging.Capsules`."""
+
+    def free(
+        self, start: NDArray[float64], directions: NDArray[float64], far: NDArray[float64]
+    ) -> NDArray[float64]:
+        """Distance along rays [n, 3] to the first grid cell with the surface, at most `far`, [n]."""
+
+    def through(
+        self, start: NDArray[float64], directions: NDArray[float64], limit: float, towards: float
+    ) -> NDArray[float64]:
+        """Distance along rays [n, 3] to where `towards` times the value turns positive, or 2 `limit`."""
+
+    def crossings(self, rows: NDArray[int64]) -> tuple[NDArray[float64], NDArray[float64], NDArray[float64]]:
+        """See `fracslice.printing.walls.edge_crossings`."""
+
+def solid_components(
+    ijk: NDArray[int32], values: NDArray[float32] | NDArray[int8], index: NDArray[int32]
+) -> tuple[NDArray[int32] | NDArray[int64], NDArray[int64], NDArray[bool_]]:
+    """Component of the space beyond the samples, which is 0, of each sample, and of each unsampled brick
+    in the order of the index; samples of each component; whether it is solid.
+    """
+
+def crossings_by_component(
+    ijk: NDArray[int32],
+    values: NDArray[float32] | NDArray[int8],
+    index: NDArray[int32],
+    labels: NDArray[int32] | NDArray[int64],
+    count: int,
+) -> NDArray[int64]:
+    """Grid edges between samples of different signs, counted for their inside components, int64 [count]."""
+
+def graph_components(count: int, some: NDArray[int64], others: NDArray[int64]) -> tuple[NDArray[int64], int]:
+    """Connected component of each node, numbered by first nodes, int64 [count], and their number.
+
+    `some`, `others`: ends of the edges.
+    """
+
+def ray_points(
+    start: NDArray[float64], directions: NDArray[float64], which: NDArray[int64], s: NDArray[float64]
+) -> NDArray[float64]:
+    """Points at distances `s` along the rays of these numbers, [3, n]."""
+
+def least(
+    some: NDArray[float32], rows: NDArray[int64], more: NDArray[float32], others: NDArray[int64]
+) -> NDArray[float32]:
+    """Minimum of rows of two arrays, float32 [n, 512]; the other one where a number is negative."""
+
+def bricks_near(points: NDArray[float64], reach: float, shape: tuple[int, int, int]) -> NDArray[bool_]:
+    """Bricks within `reach` voxels of points, which are in voxels from the first brick."""
+
+def capsule_squares(
+    lines: NDArray[float64],
+    points: NDArray[float64],
+    of: NDArray[int32],
+    reach: float,
+    ijk: NDArray[int32],
+    index: NDArray[int32],
+) -> NDArray[float32]:
+    """Squared distances of samples to the nearest axis, at most `reach` squared, voxels, float32 [n, 512].
+
+    `lines`: start, direction vector and inverse squared length, [k, 7]; `points`: points on the axes `of`, at
+    most a voxel apart.
+    """
+
+def steps_to(ijk: NDArray[int32], index: NDArray[int32], seeds: NDArray[bool_]) -> NDArray[uint8]:
+    """Grid steps from each sample to the nearest of the seeds, at most 255, uint8 [n, 512]."""

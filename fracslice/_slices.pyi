@@ -7,10 +7,11 @@ Long calls release the GIL.
 from collections.abc import Callable, Sequence
 from enum import Enum
 
-from numpy import float32, float64, int32, uint8
+from numpy import bool_, float32, float64, int32, int64, uint8
 from numpy.typing import NDArray
 
 from .expr.machine import Function
+from .slicing.runs import Runs
 
 class BorderError(ValueError):
     """The solid reaches the border of the lattice."""
@@ -235,3 +236,75 @@ def filtered(rows: NDArray[uint8], pixel: int) -> bytes:
     bytes
         n rows of 1 + `width` bytes: the number of the filter, and the filtered row.
     """
+
+def gaps(runs: Runs) -> tuple[NDArray[int32], NDArray[int32], NDArray[int32]]:
+    """Rows, begin and end of the runs between runs."""
+
+def components(
+    runs: Runs, reach: int
+) -> tuple[NDArray[int64], NDArray[int64], NDArray[float64], NDArray[bool_]]:
+    """Connected component of each run, of those that overlap or, at `reach` 1, touch at a corner; and area,
+    centroid and openness of each component: see `fracslice.slicing.runs.Nodes`.
+    """
+
+def overlaps(
+    below: Runs, labels_below: NDArray[int64], above: Runs, labels_above: NDArray[int64]
+) -> NDArray[int64]:
+    """Pairs of components of two layers that share a pixel, in ascending order, int64 [n, 2]."""
+
+def unsupported(
+    below: Runs, above: Runs, reach: float
+) -> tuple[NDArray[int32], NDArray[int32], NDArray[int32]]:
+    """Rows, begin and end of the runs of a layer farther than `reach` pixels from the layer below."""
+
+def count_pixels(runs: Runs, times: int) -> NDArray[int32]:
+    """Pixels of runs in each coarse pixel, which is `times` pixels across."""
+
+def narrow_pixels(runs: Runs, gaps: bool, times: int, longest: tuple[int, int]) -> NDArray[bool_]:
+    """Coarse pixels with a row or a column that is solid, or empty, for at most `longest` (x, y) pixels."""
+
+def painted(runs: Runs, at: tuple[int, int], shape: tuple[int, int]) -> NDArray[bool_]:
+    """Picture of a part of a layer, from row and column `at` on, which may lie beyond it."""
+
+def distances(region: NDArray[bool_], pixel: tuple[float, float]) -> NDArray[float64]:
+    """Distance of each pixel's centre to the nearest one outside the region; infinite if none is.
+
+    `pixel`: width and height. Exact, in time linear in the pixels (Maurer, Qi and Raghavan 2003).
+    """
+
+def dilated(image: NDArray[uint8], cone: NDArray[float64]) -> NDArray[uint8]:
+    """Grey dilation of an image with a cone, float64 [2 r + 1, 2 r + 1]."""
+
+def closed_nodes(
+    edges: NDArray[int64], later: NDArray[int64], layer: NDArray[int64], free: NDArray[bool_]
+) -> NDArray[bool_]:
+    """Nodes that are not connected to a free one once the edges up to their layer are added.
+
+    `edges`: int64 [e, 2]; `later`: layer of each edge, ascending.
+    """
+
+def held_nodes(edges: NDArray[int64], roots: NDArray[int64], count: int) -> NDArray[bool_]:
+    """Nodes that grow from some nodes. `edges`: (below, above) by layers, int64 [e, 2]."""
+
+def weakest_cut(
+    area: NDArray[float64],
+    firm: NDArray[float64],
+    edges: NDArray[int64],
+    starts: NDArray[int64],
+    foot: float,
+    least: float,
+) -> tuple[float, float, int, int]:
+    """Contact area, carried area, cut and largest node of the weakest cross-section; node -1 if none.
+
+    `area`, `firm`: of nodes, and 0 for islands; `foot`, `least`: carried areas that count on the plate, and
+    above it; `edges`: pairs (below, above), those of cut k from `starts[k]` to `starts[k + 1]`.
+    """
+
+def spans(solid: NDArray[bool_], held: NDArray[bool_], step: tuple[int, int]) -> NDArray[float32]:
+    """Steps between the held pixels on both sides of each pixel along a line of solid ones.
+
+    `step`: dy, dx.
+    """
+
+def connected_to(solid: NDArray[bool_], held: NDArray[bool_]) -> NDArray[bool_]:
+    """Solid pixels that are connected to held ones, by sides and corners."""

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .._native import foremost
 from ..common.arrays import from_linear, to_linear
-from ..common.compiled import compiled
 
 if TYPE_CHECKING:
     from .model import Mesh
@@ -48,8 +48,7 @@ def _render_small(mesh: Mesh, width: int, height: int) -> np.ndarray:
     low, high = seen.min(0), seen.max(0)
     across = np.maximum((high - low)[:2] / (width, height), 1e-30).max() / FILLED
     seen = (seen - (low + high) / 2) / across + (width / 2, height / 2, 0)
-    depth, front = np.full((height, width), -np.inf), np.full((height, width), -1, np.int32)
-    _draw(seen, mesh.triangles, depth, front)
+    front = foremost(seen, mesh.triangles, (height, width))
     rows, columns = np.nonzero(front >= 0)
     shown = np.zeros((height, width, 4), np.uint8)
     shown[rows, columns] = _shades(mesh, seen, front[rows, columns])
@@ -67,26 +66,3 @@ def _shades(mesh: Mesh, seen: np.ndarray, which: np.ndarray) -> np.ndarray:
     light = to_linear(own) * (AMBIENT + (1 - AMBIENT) * lit)[:, None]
     opaque = np.full((len(which), 1), 255, np.uint8)
     return np.hstack([np.uint8(255 * from_linear(np.minimum(light, 1)) + 0.5), opaque])
-
-
-@compiled
-def _draw(seen, triangles, depth, front):  # type: ignore[no-untyped-def]
-    """Write the depth and the number of the foremost triangle at the centre of each pixel."""
-    height, width = depth.shape
-    for t in range(len(triangles)):
-        ax, ay, az = seen[triangles[t, 0]]
-        bx, by, bz = seen[triangles[t, 1]]
-        cx, cy, cz = seen[triangles[t, 2]]
-        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-        if area == 0:
-            continue
-        for i in range(max(int(min(ay, by, cy)), 0), min(int(max(ay, by, cy)) + 1, height)):
-            for j in range(max(int(min(ax, bx, cx)), 0), min(int(max(ax, bx, cx)) + 1, width)):
-                x, y = j + 0.5 - ax, i + 0.5 - ay
-                v = (x * (cy - ay) - y * (cx - ax)) / area
-                w = ((bx - ax) * y - (by - ay) * x) / area
-                if v < 0 or w < 0 or v + w > 1:
-                    continue
-                z = az + v * (bz - az) + w * (cz - az)
-                if z > depth[i, j]:
-                    depth[i, j], front[i, j] = z, t

@@ -12,6 +12,10 @@ void bind_mesh(nanobind::module_& module);
 void bind_reduction(nanobind::module_& module);
 }  // namespace fracslice::mesh
 
+namespace fracslice::printing {
+void bind_printing(nanobind::module_& module);
+}  // namespace fracslice::printing
+
 NB_MODULE(_native, module) {
     nanobind::set_leak_warnings(false);  // the command exits without a search for garbage
     fracslice::volume::bind_extent(module);
@@ -19,4 +23,5 @@ NB_MODULE(_native, module) {
     fracslice::mesh::bind_contour(module);
     fracslice::mesh::bind_mesh(module);
     fracslice::mesh::bind_reduction(module);
+    fracslice::printing::bind_printing(module);
 }

@@ -10,15 +10,15 @@ from functools import cached_property
 
 import numpy as np
 
+from .._native import bricks_near, capsule_squares, steps_to
 from ..common.cache import key
-from ..common.compiled import compiled
 from ..fields.field import Kernel
 from ..volume import Bricks
 from ..volume.bricks import INSIDE, OUTSIDE
 from ..volume.lattice import values_at
 from ..work import Work
 from .components import SolidComponents, components_of
-from .samples import Samples, between, positions, sample_at
+from .samples import Samples, positions
 
 NONE = -1
 """Marks samples in no body and cells without an entry."""
@@ -135,9 +135,6 @@ def _meetings(owner: np.ndarray, body: np.ndarray) -> np.ndarray:
     return np.concatenate(pairs)
 
 
-FAR = 255
-"""Number of grid steps at which the search stops; unreached samples keep this value."""
-
 REACH = 8
 """Largest distance from a border, voxels. Farther off, unsampled bricks may lie between, which the search
 cannot cross.
@@ -155,7 +152,7 @@ def nearer(components: SolidComponents, these: np.ndarray, others: np.ndarray) -
     solid, (samples, tiles) = components.solid, components.masks(these)
     near, index = _around(solid, np.any(samples, axis=1), tiles)
     labels, ijk = components.labels[near], solid.ijk[near]
-    to_these, to_others = (_steps(index, ijk, np.isin(labels, those)) for those in (these, others))
+    to_these, to_others = (steps_to(ijk, index, np.isin(labels, those)) for those in (these, others))
     half = np.clip((to_these.astype(np.float32) - to_others) / 2, -REACH, REACH)
     values = half * np.float32(solid.voxel)
     return Samples(replace(solid, ijk=ijk, values=values, index=index))
@@ -175,47 +172,6 @@ def _around(solid: Bricks, rows: np.ndarray, tiles: np.ndarray) -> tuple[np.ndar
     chosen = np.sort(solid.index[near])
     index[tuple(solid.ijk[chosen].T >> 3)] = np.arange(len(chosen))
     return chosen, index
-
-
-@compiled
-def _steps(index, ijk, seeds):  # type: ignore[no-untyped-def]
-    """Grid steps from each sample to the nearest seed, at most `FAR`, by breadth-first search."""
-    steps = np.full(seeds.shape, FAR, np.uint8)
-    queue = np.empty(seeds.size, np.int32)
-    first, last = 0, 0
-    for row in range(len(seeds)):
-        for s in range(512):
-            if seeds[row, s]:
-                steps[row, s] = 0
-                queue[last] = 512 * row + s
-                last += 1
-    while first < last:
-        row, s = queue[first] >> 9, queue[first] & 511
-        first += 1
-        for axis in range(3):
-            shift = 6 - 3 * axis
-            at = (s >> shift) & 7
-            for sign in (-1, 1):
-                there, to = row, s + (sign << shift)
-                if not 0 <= at + sign < 8:
-                    there, to = adjacent_row(index, ijk, row, axis, sign), to - (sign << (shift + 3))
-                if there >= 0 and steps[there, to] == FAR and steps[row, s] + 1 < FAR:
-                    steps[there, to] = steps[row, s] + 1
-                    queue[last] = 512 * there + to
-                    last += 1
-    return steps
-
-
-@compiled
-def adjacent_row(index, ijk, row, axis, sign):  # type: ignore[no-untyped-def]
-    """Row of the adjacent brick along an axis.
-
-    `index`, `ijk`: int32 [bx, by, bz], int32 [n, 3].
-    """
-    x, y, z = ijk[row, 0] >> 3, ijk[row, 1] >> 3, ijk[row, 2] >> 3
-    x, y, z = x + sign * (axis == 0), y + sign * (axis == 1), z + sign * (axis == 2)
-    nx, ny, nz = index.shape
-    return index[x, y, z] if 0 <= x < nx and 0 <= y < ny and 0 <= z < nz else -1
 
 
 TOUCHING = 0.9
@@ -357,27 +313,8 @@ class Capsules(Samples):
         """`Field.key`."""
         return key(super().key, self._radius)
 
-    def _interpolate(self, x: np.ndarray, y: np.ndarray, z: np.ndarray, out: np.ndarray) -> None:
-        _interpolate_squares(x, y, z, self.grid, self._radius, out)
-
-
-@compiled
-def _interpolate_squares(xs, ys, zs, grid, radius, out):  # type: ignore[no-untyped-def]
-    """Write the values of `Capsules` at points."""
-    x0, y0, z0, voxel, _, index, values, bounds = grid
-    for n in range(len(xs)):
-        u, v, w = (xs[n] - x0) / voxel, (ys[n] - y0) / voxel, (zs[n] - z0) / voxel
-        out[n] = between(u, v, w, voxel, index, bounds, values)
-        if out[n] > voxel:  # a bound suffices
-            continue
-        i, j, k = int(np.floor(u)), int(np.floor(v)), int(np.floor(w))
-        u, v, w = u - i, v - j, w - k
-        square = -voxel * voxel * (u * (1 - u) + v * (1 - v) + w * (1 - w))
-        for corner in range(8):
-            a, b, c = corner >> 2, (corner >> 1) & 1, corner & 1
-            share = (u if a else 1 - u) * (v if b else 1 - v) * (w if c else 1 - w)
-            square += share * (radius + sample_at(index, bounds, values, voxel, i + a, j + b, k + c)) ** 2
-        out[n] = np.sqrt(max(square, 0.0)) - radius
+    def _interpolated(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+        return self.native.capsule_values(x, y, z, self._radius)
 
 
 def capsules(start: np.ndarray, end: np.ndarray, radius: float, like: Bricks) -> Capsules:
@@ -391,13 +328,11 @@ def capsules(start: np.ndarray, end: np.ndarray, radius: float, like: Bricks) ->
     origin = np.asarray(like.origin) + 8 * voxel * low
     lines = _lines((start - origin) / voxel, (end - start) / voxel)
     points, of = _along(lines)
-    index = np.full(high - low, OUTSIDE, np.int32)
-    _mark(points, reach, index)
-    touched = index >= 0
+    touched = bricks_near(points, reach, tuple((high - low).tolist()))
+    index = np.full(touched.shape, OUTSIDE, np.int32)
     index[touched] = np.arange(touched.sum())
     ijk = np.ascontiguousarray(8 * np.argwhere(touched), np.int32)
-    squares = np.full((len(ijk), 512), reach**2, np.float32)
-    _shorten(lines, points, of, reach, index, squares)
+    squares = capsule_squares(lines, points, of, reach, ijk, index)
     x, y, z = origin.tolist()
     values = (np.sqrt(squares, out=squares) - np.float32(reach - BAND)) * np.float32(voxel)
     return Capsules(Bricks((x, y, z), voxel, ijk, values, index), radius)
@@ -416,39 +351,3 @@ def _along(lines: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     first = np.repeat(np.cumsum(pieces + 1) - pieces - 1, pieces + 1)
     share = (np.arange(len(of)) - first) / np.maximum(pieces[of], 1)
     return lines[of, :3] + share[:, None] * lines[of, 3:6], of
-
-
-@compiled
-def _mark(points, reach, index):  # type: ignore[no-untyped-def]
-    """Mark the bricks within `reach` voxels of the points."""
-    for n in range(len(points)):
-        x, y, z = points[n]
-        for i in range(int(x - reach) >> 3, (int(x + reach) >> 3) + 1):
-            for j in range(int(y - reach) >> 3, (int(y + reach) >> 3) + 1):
-                for k in range(int(z - reach) >> 3, (int(z + reach) >> 3) + 1):
-                    index[i, j, k] = 0
-
-
-@compiled
-def _shorten(lines, points, of, reach, index, squares):  # type: ignore[no-untyped-def]
-    """Lower the squared distances of samples to those of nearer capsules.
-
-    Every sample within reach of a capsule is within reach plus half a voxel of one of its axis points.
-    """
-    far = reach + 0.5
-    for m in range(len(points)):
-        x, y, z = points[m]
-        n = of[m]
-        a, b, c, inverse = lines[n, 3], lines[n, 4], lines[n, 5], lines[n, 6]
-        for i in range(int(np.ceil(x - far)), int(x + far) + 1):
-            for j in range(int(np.ceil(y - far)), int(y + far) + 1):
-                u, v = i - lines[n, 0], j - lines[n, 1]
-                left = far * far - (i - x) ** 2 - (j - y) ** 2
-                if left < 0:
-                    continue
-                for k in range(int(np.ceil(z - np.sqrt(left))), int(z + np.sqrt(left)) + 1):
-                    w = k - lines[n, 2]
-                    t = min(max((u * a + v * b + w * c) * inverse, 0.0), 1.0)
-                    square = (u - t * a) ** 2 + (v - t * b) ** 2 + (w - t * c) ** 2
-                    row, s = index[i >> 3, j >> 3, k >> 3], ((i & 7) << 6) + ((j & 7) << 3) + (k & 7)
-                    squares[row, s] = min(squares[row, s], np.float32(square))

@@ -7,69 +7,11 @@ from functools import cached_property
 
 import numpy as np
 
-from ..common.compiled import compiled, connected_components, number_sets, unite, unite_all
+from .._native import crossings_by_component, graph_components, solid_components
 from ..formulas import Box
 from ..volume import Bricks, SignBricks
 from ..volume.bricks import INSIDE, OUTSIDE
 from .samples import positions
-
-
-@compiled
-def tally(labels, values, sizes, inside):  # type: ignore[no-untyped-def]
-    """Count the samples of each component, and record its side."""
-    for row in range(len(labels)):
-        for s in range(512):
-            sizes[labels[row, s]] += 1
-            inside[labels[row, s]] = values[row, s] < 0
-
-
-@compiled
-def count_crossings(values, index, ijk, labels, crossings):  # type: ignore[no-untyped-def]
-    """Count the grid edges between different signs, each for its inside component.
-
-    index: as padded by one outside brick behind all sides.
-    """
-    for row in range(len(values)):
-        x, y, z = ijk[row, 0] >> 3, ijk[row, 1] >> 3, ijk[row, 2] >> 3
-        for axis in range(3):
-            shift = 6 - 3 * axis
-            after = index[x + (axis == 0), y + (axis == 1), z + (axis == 2)]
-            for s in range(512):
-                if (s >> shift) & 7 < 7:
-                    other, t = row, s + (1 << shift)
-                elif after >= 0:
-                    other, t = after, s - (7 << shift)
-                else:
-                    continue
-                if (values[row, s] < 0) != (values[other, t] < 0):
-                    crossings[labels[row, s] if values[row, s] < 0 else labels[other, t]] += 1
-
-
-@compiled
-def unite_samples(values, index, ijk, tile, parent):  # type: ignore[no-untyped-def]
-    """Unite each sample with those beside it and with unsampled bricks.
-
-    index, tile: as padded by one outside brick on all sides; element of each unsampled brick.
-    """
-    for row in range(len(values)):
-        x, y, z = (ijk[row, 0] >> 3) + 1, (ijk[row, 1] >> 3) + 1, (ijk[row, 2] >> 3) + 1
-        for axis in range(3):
-            shift, a, b, c = 6 - 3 * axis, axis == 0, axis == 1, axis == 2
-            step = 1 << shift
-            before, after = index[x - a, y - b, z - c], index[x + a, y + b, z + c]
-            first, last = tile[x - a, y - b, z - c], tile[x + a, y + b, z + c]
-            for s in range(512):
-                here, element, at = values[row, s] < 0, 1 + 512 * row + s, (s >> shift) & 7
-                if at < 7:
-                    there, other = values[row, s + step] < 0, element + step
-                elif after >= 0:
-                    there, other = values[after, s - 7 * step] < 0, 1 + 512 * after + s - 7 * step
-                else:
-                    there, other = after == INSIDE, last
-                if here == there and parent[element] != parent[other]:
-                    unite(parent, element, other)
-                if at == 0 and before < 0 and here == (before == INSIDE):
-                    unite(parent, element, first)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,10 +42,8 @@ class SolidComponents:
     @property
     def crossings(self) -> np.ndarray:
         """Grid edges that cross the surface of each component, int64 [m]; zero for empty components."""
-        crossings = np.zeros(len(self.inside), np.int64)
-        index = np.pad(self.solid.index, (0, 1), constant_values=OUTSIDE)
-        count_crossings(self.solid.values, index, self.solid.ijk, self.labels, crossings)
-        return crossings
+        solid, count = self.solid, len(self.inside)
+        return crossings_by_component(solid.ijk, solid.values, solid.index, self.labels, count)
 
     @property
     def thin_share(self) -> float:
@@ -150,7 +90,7 @@ class SolidComponents:
         place = self.places(cavities)
         steps = np.vstack([np.eye(3, dtype=int), -np.eye(3, dtype=int)])
         beside = np.concatenate([self.at(place + step) for step in steps])
-        number, count = connected_components(len(self.inside), np.tile(self.at(place), 6), beside)
+        number, count = graph_components(len(self.inside), np.tile(self.at(place), 6), beside)
         inside, sizes = np.zeros(count, bool), np.zeros(count, np.int64)
         inside[number[self.inside]] = True
         np.add.at(sizes, number, self.count)
@@ -218,22 +158,8 @@ def components_of(bricks: Bricks) -> SolidComponents:
     Samples are connected along edges of the grid: solids that touch only along a line are not connected. An
     unsampled brick is connected as a whole (union-find, Tarjan 1975).
     """
+    of, sizes, inside = solid_components(bricks.ijk, bricks.values, bricks.index)
     size, empty = bricks.values.size, bricks.index < 0
-    total = 1 + size + int(np.count_nonzero(empty))  # beyond the samples, each sample, each unsampled brick
-    parent = np.arange(total, dtype=np.int32 if total < 1 << 31 else np.int64)
-    index = np.pad(bricks.index, 1, constant_values=OUTSIDE)
-    tile = np.zeros(index.shape, parent.dtype)
-    tile[1:-1, 1:-1, 1:-1][empty] = parent[1 + size :]
-    for axis in range(3):
-        side, at = np.moveaxis(index, axis, 0), np.moveaxis(tile, axis, 0)
-        same = (side[:-1] == side[1:]) & (side[1:] < 0)
-        unite_all(parent, at[:-1][same], at[1:][same])
-    unite_samples(bricks.values, index, bricks.ijk, tile, parent)
-    count = number_sets(parent)
-    labels, tiles = parent[1 : 1 + size].reshape(bricks.values.shape), np.full(empty.shape, -1, parent.dtype)
-    tiles[empty] = parent[1 + size :]
-    sizes, inside = np.zeros(count, np.int64), np.zeros(count, np.bool_)
-    tally(labels, bricks.values, sizes, inside)
-    sizes += 512 * np.bincount(tiles[empty], minlength=count)
-    inside[tiles[empty]] = bricks.index[empty] == INSIDE
+    labels, tiles = of[1 : 1 + size].reshape(bricks.values.shape), np.full(empty.shape, -1, of.dtype)
+    tiles[empty] = of[1 + size :]
     return SolidComponents(bricks, labels, tiles, inside, sizes)

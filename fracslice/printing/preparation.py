@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from .samples import Samples
     from .walls import Walls
 
-# Measuring needs Numba and SciPy, whose import takes as long as a small mesh: import where needed.
+# Measuring needs SciPy, whose import takes as long as a small mesh: import where needed.
 
 COARSE, FINE = 128, 640
 """Minimum and maximum number of samples along the longest side for measuring lengths."""
@@ -164,7 +164,7 @@ def standing(made: Plan, how: Print, scale: float, work: Work) -> Plan:
     return replace(made, root=root, box=extents, outer=outer)
 
 
-# Measuring needs Numba and SciPy, whose import takes as long as a small mesh: import where needed.
+# Measuring needs SciPy, whose import takes as long as a small mesh: import where needed.
 
 REPEATS = 4
 """Maximum number of times that fragments are joined."""
@@ -430,7 +430,7 @@ def _count_places(points: np.ndarray, near: float) -> int:
     """Number of clusters of points, of which each has another within `near`."""
     from scipy.spatial import KDTree
 
-    from ..common.compiled import connected_components
+    from .._native import graph_components
 
     pairs = KDTree(points).query_pairs(near, output_type="ndarray")
-    return connected_components(len(points), *pairs.T)[1]
+    return graph_components(len(points), *pairs.T)[1]

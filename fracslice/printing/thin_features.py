@@ -14,9 +14,9 @@ from functools import cached_property
 
 import numpy as np
 
+from .._native import graph_components, ray_points
 from ..common.arrays import Rows, weighted_quantiles
 from ..common.cache import key
-from ..common.compiled import compiled, connected_components
 from ..errors import VolumeError
 from ..fields.box import Box
 from ..fields.field import Bounds, Device, Field, Kernel, Precision
@@ -48,8 +48,7 @@ class Rays(Rows):
 
     def some_points(self, which: np.ndarray, s: np.ndarray) -> np.ndarray:
         """Points at distances `s` along the rays of these numbers, [3, n]."""
-        points: np.ndarray = _points(self.start, self.directions, which, s)
-        return points
+        return ray_points(self.start, self.directions, which, s)
 
 
 def first_negative(
@@ -82,16 +81,6 @@ def first_negative(
     share = low[negative] / (low[negative] - high[negative])
     s[negative] -= share * (s[negative] - before[negative])
     return s
-
-
-@compiled
-def _points(start, directions, which, s):  # type: ignore[no-untyped-def]
-    """Points at distances `s` along some rays, [3, n]."""
-    points = np.empty((3, len(s)))
-    for i in range(len(s)):
-        for axis in range(3):
-            points[axis, i] = start[which[i], axis] + s[i] * directions[which[i], axis]
-    return points
 
 
 @dataclass(frozen=True, eq=False)
@@ -345,7 +334,7 @@ class _Look:
         way = points[others] - points[some]
         far = np.linalg.norm(way, axis=1)
         seen = self.free(points[some], way / far[:, None], far) >= far
-        return connected_components(len(points), some[seen], others[seen])
+        return graph_components(len(points), some[seen], others[seen])
 
     def field(self, points: np.ndarray) -> np.ndarray:
         """Field values at points [3, n]."""

@@ -16,17 +16,10 @@ from typing import TypeVar
 import numpy as np
 
 from ..common.arrays import Rows
-from ..common.compiled import compiled
 from ..fields.field import Field, Kernel
 from ..volume.lattice import values_at
 from ..work import Work, chunks
-from .samples import SIDE, STRIDE, Samples, between, gather, is_beside
-
-FIRST_SIZE = 8
-"""Samples per crossing in the first allocation."""
-
-ALONG = 0.999
-"""Fraction of a normal's largest component above which another component ties with it."""
+from .samples import Samples
 
 
 def edge_crossings(solid: Samples, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -36,13 +29,7 @@ def edge_crossings(solid: Samples, rows: np.ndarray) -> tuple[np.ndarray, np.nda
 
     Returns points, normals float64 [n, 3], scene units; area float64 [n], squared scene units.
     """
-    n, size = len(rows) * 512 // FIRST_SIZE, -1
-    while n > size:
-        size = n
-        points, normals = np.empty((2, size, 3))
-        area = np.empty(size)
-        n = _cross(rows, solid.grid, points, normals, area)
-    return points[:n].copy(), normals[:n].copy(), area[:n].copy()
+    return solid.native.crossings(rows)
 
 
 def slopes(kernel: Kernel, points: np.ndarray, step: float, work: Work) -> tuple[np.ndarray, np.ndarray]:
@@ -58,64 +45,11 @@ def slopes(kernel: Kernel, points: np.ndarray, step: float, work: Work) -> tuple
     return length / (2 * step), slope / length
 
 
-@compiled
-def _cross(rows, grid, points, normals, area):  # type: ignore[no-untyped-def]
-    """Write the results of `crossed` as far as the arrays reach; return the number of crossings."""
-    n, f = 0, np.empty(SIDE**3, np.float32)
-    ijk, voxel = grid.ijk, grid.voxel
-    for row in rows:
-        gather(grid, row, f)
-        for s in range(512):
-            u, v, w = s >> 6, (s >> 3) & 7, s & 7
-            at = (u + 1) * SIDE * SIDE + (v + 1) * SIDE + w + 1
-            for axis in range(3):
-                step = (SIDE * SIDE, SIDE, 1)[axis]
-                if (f[at] < 0) == (f[at + step] < 0):
-                    continue
-                if n < len(area):
-                    share = float(f[at]) / (float(f[at]) - float(f[at + step]))
-                    points[n, 0] = grid.x0 + voxel * (ijk[row, 0] + u)
-                    points[n, 1] = grid.y0 + voxel * (ijk[row, 1] + v)
-                    points[n, 2] = grid.z0 + voxel * (ijk[row, 2] + w)
-                    points[n, axis] += voxel * share
-                    _across(f, at, axis, share, normals[n])
-                    along = abs(normals[n, axis])
-                    if along < ALONG * np.abs(normals[n]).max():
-                        continue
-                    area[n] = voxel * voxel / along
-                n += 1
-    return n
-
-
-@compiled
-def _across(f, at, axis, share, normal):  # type: ignore[no-untyped-def]
-    """Write the unit normal at `share` along an edge, by interpolated central differences over a voxel."""
-    along = (SIDE * SIDE, SIDE, 1)[axis]
-    total = 0.0
-    for k in range(3):
-        step = (SIDE * SIDE, SIDE, 1)[k]
-        if k != axis:
-            here, there = f[at + step] - f[at - step], f[at + along + step] - f[at + along - step]
-            slope = ((1 - share) * here + share * there) / 2
-        elif share < 0.5:
-            middle = f[at] + (share + 0.5) * (f[at + along] - f[at])
-            slope = middle - f[at - along] - (share + 0.5) * (f[at] - f[at - along])
-        else:
-            middle = f[at] + (share - 0.5) * (f[at + along] - f[at])
-            slope = f[at + along] + (share - 0.5) * (f[at + 2 * along] - f[at + along]) - middle
-        normal[k] = slope
-        total += slope * slope
-    normal /= max(np.sqrt(total), 1e-30)
-
-
 OPPOSITE = -0.5
 """Maximum cosine between the normals of the two faces of a wall: wedges up to 60 degrees count."""
 
 AT_ONCE = 512
 """Bricks processed at a time by one thread."""
-
-FIRST = 0.1
-"""First step along a ray, voxels, away from the surface that it starts on."""
 
 Direction = tuple[float, float, float]
 R = TypeVar("R", bound=Rows)
@@ -207,8 +141,7 @@ def _measure_walls(
     if how.direction is not None:
         upright = np.copysign(1, (directions * how.direction).sum(1))
         directions = upright[:, None] * np.array(how.direction)
-    width = np.empty(len(points))
-    _through(points, directions, limit, towards, solid.grid, solid.beside, width)
+    width = solid.native.through(points, directions, limit, towards)
     thin = (width < limit) & (np.abs((normals * directions).sum(1)) > -OPPOSITE)
     points, normals, directions, width = points[thin], normals[thin], directions[thin], width[thin]
     ends = points + width[:, None] * directions
@@ -222,25 +155,6 @@ def in_blocks(look: Callable[[slice], R], count: int, size: int, work: Work) -> 
     """Process rows in blocks on all threads and join the results in order."""
     result = work.collect(look, chunks(count, size) or [slice(0, 0)])
     return type(result[0]).joined(result)
-
-
-@compiled
-def _through(points, directions, limit, towards, grid, beside, width):  # type: ignore[no-untyped-def]
-    """Write the distance along each ray to the opposite surface; twice the limit if it is farther."""
-    x0, y0, z0, voxel, _, index, values, bounds = grid
-    for n in range(len(points)):
-        x, y, z = (points[n, 0] - x0) / voxel, (points[n, 1] - y0) / voxel, (points[n, 2] - z0) / voxel
-        s, before = FIRST, 0.0
-        width[n] = 2 * limit
-        while s < limit / voxel + 1:
-            u, v, w = x + s * directions[n, 0], y + s * directions[n, 1], z + s * directions[n, 2]
-            f = -1.0
-            if is_beside(u, v, w, index, beside):
-                f = towards * between(u, v, w, voxel, index, bounds, values)
-            if f >= 0:
-                width[n] = voxel * (s - (STRIDE * f / (f - before) if before < 0 else 0.0))
-                break
-            before, s = f, s + STRIDE
 
 
 STEP = 0.05

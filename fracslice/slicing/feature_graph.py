@@ -19,9 +19,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ..common.compiled import compiled, connected_components, find, unite
+from .. import _slices
+from .._native import graph_components
 from .runs import LayerComponents, Nodes, Runs, overlaps
-from .thickness import count_pixels
 
 
 @dataclass(frozen=True)
@@ -88,14 +88,14 @@ class Graph:
         free = self.nodes.open | (backwards & (self.layer == self.layer.max(initial=0)))
         later = np.max(sign * self.layer[self.edges], axis=1)
         order = np.argsort(later, kind="stable")
-        return np.asarray(_closed_nodes(self.edges[order], later[order], sign * self.layer, free))
+        return _slices.closed_nodes(self.edges[order], later[order], sign * self.layer, free)
 
     def sealed(self) -> np.ndarray:
         """Empty nodes without any way out, not even to the plate.
 
         Returns bool [n].
         """
-        body, count = connected_components(self.count, *self.edges.T)
+        body, count = graph_components(self.count, *self.edges.T)
         free = np.zeros(count, bool)
         free[body[self.nodes.open | (self.layer == 0) | (self.layer == self.layer.max(initial=0))]] = True
         return np.asarray(~free[body])
@@ -107,7 +107,7 @@ class Graph:
 
         `chosen`: bool [n]; `heights`: float64 [l], mm; `pixel`: width and height of a pixel, mm.
         """
-        number, _ = connected_components(self.count, *self.edges[chosen[self.edges].all(1)].T)
+        number, _ = graph_components(self.count, *self.edges[chosen[self.edges].all(1)].T)
         nodes = np.flatnonzero(chosen)
         names, lowest, group = np.unique(number[nodes], return_index=True, return_inverse=True)
         square = pixel[0] * pixel[1]
@@ -127,29 +127,6 @@ class Graph:
             )
             for i in order
         ]
-
-
-@compiled
-def _closed_nodes(edges, later, layer, free):  # type: ignore[no-untyped-def]
-    """True for nodes that are not connected to an open one once the edges up to their layer are added."""
-    count = len(layer)
-    root = np.arange(count + 1)
-    order = np.argsort(layer, kind="mergesort")
-    shut = np.zeros(count, np.bool_)
-    for i in range(count):
-        if free[i]:
-            unite(root, i, count)
-    e, i = 0, 0
-    while i < count:
-        now = layer[order[i]]
-        while e < len(edges) and later[e] <= now:
-            unite(root, edges[e, 0], edges[e, 1])
-            e += 1
-        outside = find(root, count)
-        while i < count and layer[order[i]] == now:
-            shut[order[i]] = find(root, order[i]) != outside
-            i += 1
-    return shut
 
 
 FOOT = 1.0
@@ -194,62 +171,14 @@ def weakest(
     below = np.concatenate([np.zeros(feet, np.int64), 1 + graph.layer[graph.edges[:, 0]]])
     starts = np.searchsorted(below, np.arange(len(graph.layers) + 1))
     tips = feet + np.flatnonzero(graph.islands() & (size * square < speck))
-    firm = np.where(_held_nodes(edges, np.append(np.arange(feet), tips), len(area)), area, 0)
-    contact, carried, cut, node = _weakest(
+    firm = np.where(_slices.held_nodes(edges, np.append(np.arange(feet), tips), len(area)), area, 0)
+    contact, carried, cut, node = _slices.weakest_cut(
         area, firm, edges, starts, min(FOOT, least) / square, least / square
     )
     if node < 0:
         return None
     x, y = (nodes.middle[max(node - feet, 0) if cut else node] - np.array(shape[::-1]) / 2) * pixel
     return Neck(max(int(cut) - 1, 0), float(contact) * square, float(carried) * square, (float(x), float(y)))
-
-
-@compiled
-def _held_nodes(edges, roots, count):  # type: ignore[no-untyped-def]
-    """True for nodes that grow from some nodes."""
-    held = np.zeros(count, np.bool_)
-    held[roots] = True
-    for below, above in edges:
-        held[above] |= held[below]
-    return held
-
-
-@compiled
-def _weakest(area, firm, edges, starts, foot, least):  # type: ignore[no-untyped-def]
-    """Contact area, carried area, cut and largest node of the weakest cross-section; node -1 if none.
-
-    area, firm: of nodes, and 0 for islands. foot, least: carried areas that count on the plate, and above it.
-    edges: pairs (below, above), those of cut k from `starts[k]` to `starts[k + 1]`.
-    """
-    parent, largest = np.arange(len(area)), area.copy()
-    contact, widest = np.zeros(len(area)), np.full(len(area), -1)
-    ratio, result = 0.0, (0.0, 0.0, 0, -1)
-    for cut in range(len(starts) - 2, -1, -1):
-        cut_edges, seen = edges[starts[cut] : starts[cut + 1]], {(-1, -1)}
-        for node, above in cut_edges:
-            root = find(parent, above)
-            if (node, root) not in seen:  # a node may touch a component several times
-                seen.add((node, root))
-                contact[root] += firm[node]
-                if widest[root] < 0 or firm[node] > firm[widest[root]]:
-                    widest[root] = node
-        for _, above in cut_edges:
-            root = find(parent, above)
-            if (
-                contact[root]
-                and largest[root] >= (least if cut else foot)
-                and largest[root] >= ratio * contact[root]
-            ):
-                ratio = largest[root] / contact[root]
-                result = (contact[root], largest[root], cut, widest[root])
-        for _, above in cut_edges:
-            contact[find(parent, above)], widest[find(parent, above)] = 0, -1
-        for node, above in cut_edges:
-            a, b = find(parent, node), find(parent, above)
-            low, high = min(a, b), max(a, b)
-            largest[low] = max(largest[low], largest[high])
-            parent[high] = low
-    return result
 
 
 COARSE = 8
@@ -278,13 +207,7 @@ def unsupported_pixels(below: Runs, above: Runs, reach: float) -> Runs:
     `below`, `above`: solid pixels of the layers; `reach`: pixels within this distance of a solid pixel of
     the layer below are supported, pixels.
     """
-    rows, count, size = np.zeros(len(above.rows), np.int32), len(above.begin), -1
-    while count > size:  # most layers have fewer unsupported runs than runs
-        size = count
-        begin, end = np.empty((2, size), np.int32)
-        solid = below.rows, below.begin, below.end, above.rows, above.begin, above.end
-        count = _write_unsupported(*solid, reach, above.width, rows, begin, end)
-    return Runs(rows, begin[:count], end[:count], above.width)
+    return Runs(*_slices.unsupported(below, above, reach), above.width)
 
 
 def farthest(
@@ -315,87 +238,13 @@ def _too_far(
     solid: Runs, bare: Runs, times: int, pixel: tuple[float, float], overhang: float, span: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Mask of pixels `times` as large that reach too far, and the distance of all from support, mm."""
-    from scipy.ndimage import distance_transform_edt, label
-
-    shape = -(-solid.height // times), -(-solid.width // times)
-    counts = np.zeros((2, *shape), np.int32)
-    for runs, count in zip((solid, bare), counts, strict=True):
-        count_pixels(runs.rows, runs.begin, runs.end, times, count)
+    counts = [_slices.count_pixels(runs, times) for runs in (solid, bare)]
     full, held = counts[0] > 0, counts[0] > counts[1]
     step = times * pixel[0], times * pixel[1]
-    away = distance_transform_edt(~held, sampling=step[::-1])
+    away = _slices.distances(~held, step)
     far = full & (away > overhang)
     if far.any():
-        components, count = label(full, np.ones((3, 3)))
-        has_support = np.zeros(count + 1, bool)
-        has_support[components[held]] = True
-        far &= has_support[components]
+        far &= _slices.connected_to(full, held)
     for dy, dx in DIRECTIONS if far.any() else ():
-        far &= ~(np.hypot(dy * step[1], dx * step[0]) * _span(full, held, dy, dx) <= span)
+        far &= ~(np.hypot(dy * step[1], dx * step[0]) * _slices.spans(full, held, (dy, dx)) <= span)
     return far, away
-
-
-@compiled
-def _span(solid, held, dy, dx):  # type: ignore[no-untyped-def]
-    """Steps between the supported pixels on both sides of each pixel along a line of solid ones."""
-    ny, nx = solid.shape
-    span = np.zeros((ny, nx), np.float32)
-    for sign in (1, -1):
-        steps = np.full((ny, nx), np.inf, np.float32)
-        for j in range(ny):
-            y = j if sign > 0 else ny - 1 - j
-            for i in range(nx):
-                x = i if sign * (dx if dx else dy) > 0 else nx - 1 - i
-                v, u = y - sign * dy, x - sign * dx
-                if held[y, x]:
-                    steps[y, x] = 0
-                elif solid[y, x] and 0 <= v < ny and 0 <= u < nx:
-                    steps[y, x] = steps[v, u] + 1
-                span[y, x] += steps[y, x]
-    return span
-
-
-@compiled
-def _write_unsupported(rows_a, begin_a, end_a, rows_b, begin_b, end_b, reach, width, rows, begin, end):  # type: ignore[no-untyped-def]
-    """Write the runs of pixels farther than `reach` from all runs of the layer below; return their number,
-    which may exceed the length of the arrays.
-    """
-    held = np.zeros(width + 1, np.int32)
-    count, far = 0, int(np.floor(reach))
-    for y in range(len(rows_b) - 1):
-        if not _lies_on(rows_a, begin_a, end_a, rows_b, begin_b, end_b, y):
-            held[:] = 0
-            for v in range(max(y - far, 0), min(y + far, len(rows_a) - 2) + 1):
-                side = int(np.floor(np.sqrt(reach * reach - (v - y) ** 2)))
-                for r in range(rows_a[v], rows_a[v + 1]):
-                    held[max(begin_a[r] - side, 0)] += 1
-                    held[min(end_a[r] + side, width)] -= 1
-            level, x = 0, 0
-            for r in range(rows_b[y], rows_b[y + 1]):
-                while x < begin_b[r]:
-                    level += held[x]
-                    x += 1
-                since = -1
-                while x < end_b[r]:
-                    level += held[x]
-                    if level == 0 and since < 0:
-                        since = x
-                    if since >= 0 and (level or x == end_b[r] - 1):
-                        if count < len(begin):
-                            begin[count], end[count] = since, x + (level == 0)
-                        count, since = count + 1, -1
-                    x += 1
-        rows[y + 1] = count
-    return count
-
-
-@compiled
-def _lies_on(rows_a, begin_a, end_a, rows_b, begin_b, end_b, y):  # type: ignore[no-untyped-def]
-    """True if every run of a row lies on a run of the row below."""
-    a = rows_a[y]
-    for b in range(rows_b[y], rows_b[y + 1]):
-        while a < rows_a[y + 1] and end_a[a] < end_b[b]:
-            a += 1
-        if a == rows_a[y + 1] or begin_a[a] > begin_b[b]:
-            return False
-    return True

@@ -211,7 +211,7 @@ class Layer:
     @cached_property
     def runs(self) -> Runs:
         """Solid pixels, at least half covered."""
-        from .runs import Runs  # needs Numba, which a job does without
+        from .runs import Runs  # for checks alone
 
         rows, runs, area, cut = self.slab.runs(self.place, self.stack.shape)
         self._painted = area, cut

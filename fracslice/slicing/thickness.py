@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..common.compiled import compiled
+from .._slices import count_pixels, distances, narrow_pixels, painted
 from ..printing.widths import BINS
 from .runs import Runs
 
@@ -41,8 +41,7 @@ def widths(solid: Runs, pixel: Pair) -> tuple[np.ndarray, np.ndarray]:
     if not len(solid.begin):
         return np.empty((0, 2)), np.empty((0, 2))
     times = max(int(min(WIDE / COARSE / max(pixel), max(solid.height, solid.width) / LAYER)), 1)
-    count = np.zeros((-(-solid.height // times), -(-solid.width // times)), np.int32)
-    count_pixels(solid.rows, solid.begin, solid.end, times, count)
+    count = count_pixels(solid, times)
     return _measure_widths(solid, count, times, pixel, False), _measure_widths(
         solid, count, times, pixel, True
     )
@@ -53,17 +52,16 @@ def _measure_widths(solid: Runs, count: np.ndarray, times: int, pixel: Pair, gap
     coarse, narrow = (pixel[0] * times, pixel[1] * times), np.zeros(count.shape, np.bool_)
     if times > 1:
         # Whatever the tilt of a wall, a row or a column through it is at most this long.
-        longest = np.ceil(2**0.5 * WIDE / np.array(pixel)).astype(np.int64)
-        _narrow(solid.rows, solid.begin, solid.end, solid.width, gaps, times, longest, narrow)
+        x, y = np.ceil(2**0.5 * WIDE / np.array(pixel)).astype(np.int64).tolist()
+        narrow = narrow_pixels(solid, gaps, times, (x, y))
     width, middle = _across((2 * np.pad(count, 2) >= times**2) != gaps, coarse)
     far = width[2:-2, 2:-2][middle[2:-2, 2:-2] & ~narrow]
     result = [np.column_stack([far, np.full(len(far), times)])]
     halo = int(np.ceil(WIDE / 2 / min(pixel))) + AROUND
     for rows, columns in _windows(narrow, max(WINDOW // times, 1)):
         chosen = narrow[rows, columns].repeat(times, 0).repeat(times, 1)
-        image = np.zeros((chosen.shape[0] + 2 * halo, chosen.shape[1] + 2 * halo), np.bool_)
-        top, left = times * rows.start - halo, times * columns.start - halo
-        _paint(solid.rows, solid.begin, solid.end, top, left, image)
+        at = times * rows.start - halo, times * columns.start - halo
+        image = painted(solid, at, (chosen.shape[0] + 2 * halo, chosen.shape[1] + 2 * halo))
         width, middle = _across(image != gaps, pixel)
         near = width[halo:-halo, halo:-halo][middle[halo:-halo, halo:-halo] & chosen]
         result.append(np.column_stack([near, np.ones(len(near))]))
@@ -82,69 +80,19 @@ def _windows(chosen: np.ndarray, side: int) -> Iterator[Window]:
 
 def _across(region: np.ndarray, pixel: Pair) -> tuple[np.ndarray, np.ndarray]:
     """Width of a region at each pixel of its medial axis, and a mask of these pixels."""
-    from scipy.ndimage import distance_transform_edt, maximum_filter
-
     if region.all():
         return np.zeros(region.shape), np.zeros(region.shape, bool)
     unit = min(pixel)
     # The centre of the nearest pixel is half a pixel beyond the outline.
-    distance = np.maximum(distance_transform_edt(region, sampling=pixel[::-1]) - unit / 2, 0)
+    distance = np.maximum(distances(region, pixel) - unit / 2, 0)
     slope = np.hypot(*np.gradient(distance, *pixel[::-1]))
-    middle = (slope < 0.6) & region & (distance > maximum_filter(distance, 3) - 0.4 * unit)
+    middle = (slope < 0.6) & region & (distance > _largest_near(distance) - 0.4 * unit)
     # Where two pixels are next to the axis, the axis lies between them.
     return 2 * distance + unit * (slope > 0.25), middle
 
 
-@compiled
-def count_pixels(rows, begin, end, times, count):  # type: ignore[no-untyped-def]
-    """Count the pixels of runs in each coarse pixel.
-
-    `times`: pixels along each side of a coarse pixel; `count`: int32 [-(-height // times), -(-width //
-    times)].
-    """
-    for y in range(len(rows) - 1):
-        line = count[y // times]
-        for r in range(rows[y], rows[y + 1]):
-            first, last = begin[r] // times, (end[r] - 1) // times
-            line[first : last + 1] += times
-            line[first] -= begin[r] - first * times
-            line[last] -= (last + 1) * times - end[r]
-
-
-@compiled
-def _narrow(rows, begin, end, width, gaps, times, longest, narrow):  # type: ignore[no-untyped-def]
-    """Mark coarse pixels with a row or a column that is solid, or empty, for at most `longest` pixels."""
-    since = np.full(width, -longest[1] - 1)  # row of the last change in each column
-    for y in range(len(rows) - 1):
-        first, last = rows[y], rows[y + 1]
-        for r in range(first, last - gaps):
-            low, high = (end[r], begin[r + 1]) if gaps else (begin[r], end[r])
-            if high - low <= longest[0]:
-                narrow[y // times, low // times : (high - 1) // times + 1] = True
-        # Columns that change between the row below and this one, by the ends of the runs of both.
-        a, b, x, changed = rows[y - 1] if y else first, first, 0, False
-        at_a, at_b = False, False
-        while True:
-            to_a = width if a == first or y == 0 else (end[a] if at_a else begin[a])
-            to_b = width if b == last else (end[b] if at_b else begin[b])
-            to = min(to_a, to_b)
-            if changed:
-                for column in range(x, to):
-                    if at_b == gaps and y - since[column] <= longest[1]:
-                        narrow[since[column] // times : (y - 1) // times + 1, column // times] = True
-                    since[column] = y
-            if to == width:
-                break
-            if to_a == to:
-                a, at_a = a + at_a, not at_a
-            if to_b == to:
-                b, at_b = b + at_b, not at_b
-            x, changed = to, at_a != at_b
-
-
-@compiled
-def _paint(rows, begin, end, top, left, image):  # type: ignore[no-untyped-def]
-    """Paint the runs of a layer that an image shows, from row `top` and column `left` on."""
-    for y in range(max(-top, 0), min(image.shape[0], len(rows) - 1 - top)):
-        for r in range(rows[top + y], rows[top + y + 1]):
-            image[y, max(begin[r] - left, 0) : max(end[r] - left, 0)] = True
+def _largest_near(image: np.ndarray) -> np.ndarray:
+    """Maximum of each pixel and the eight around it."""
+    padded = np.pad(image, 1, mode="edge")
+    rows = np.maximum(np.maximum(padded[:-2], padded[1:-1]), padded[2:])
+    return np.asarray(np.maximum(np.maximum(rows[:, :-2], rows[:, 1:-1]), rows[:, 2:]))

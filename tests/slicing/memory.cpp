@@ -2,7 +2,7 @@
 #include <cstdlib>
 #include <new>
 
-#include "tiles.h"
+#include "slab.h"
 
 static bool full = false;
 

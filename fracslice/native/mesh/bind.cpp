@@ -13,6 +13,7 @@
 #include "selection.h"
 #include "self_intersections.h"
 #include "stl.h"
+#include "thumbnail.h"
 #include "tree.h"
 
 namespace fracslice::mesh {
@@ -205,6 +206,13 @@ nb::tuple bind_nesting(const Rows<double>& vertices, const Rows<int32_t>& triang
     return nb::make_tuple(to_numpy(std::move(result.winding), {shells}), to_numpy(std::move(result.parent), {shells}));
 }
 
+nb::object bind_foremost(const Rows<double>& vertices, const Rows<int32_t>& triangles, std::array<int, 2> shape) {
+    const std::vector<int32_t> front = unlocked(1, [&] { return foremost(mesh_of(vertices, triangles), shape[0], shape[1]); });
+    Array<int32_t> pixels(front.size(), 1);
+    std::copy(front.begin(), front.end(), pixels.data.get());
+    return to_numpy(std::move(pixels), {size_t(shape[0]), size_t(shape[1])});
+}
+
 int bind_side_of_plane(const Point& a, const Point& b, const Point& c, const Point& d) {
     return side_of_plane(a.data(), b.data(), c.data(), d.data());
 }
@@ -237,6 +245,7 @@ void bind_mesh(nb::module_& module) {
     module.def("self_intersecting_triangles", &bind_crossings, "vertices"_a, "triangles"_a, "order"_a, "low"_a, "high"_a,
                "threads"_a = 0, "among"_a = nb::none());
     module.def("nesting", &bind_nesting, "vertices"_a, "triangles"_a, "labels"_a, "sizes"_a, "first"_a, "threads"_a = 0);
+    module.def("foremost", &bind_foremost, "vertices"_a, "triangles"_a, "shape"_a);
     module.def("side_of_line", &side_of_line, "ax"_a, "ay"_a, "bx"_a, "by"_a, "cx"_a, "cy"_a);
     module.def("side_of_plane", &bind_side_of_plane, "a"_a, "b"_a, "c"_a, "d"_a);
 }

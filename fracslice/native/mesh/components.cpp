@@ -8,43 +8,13 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <utility>
 
+#include "../disjoint_sets.h"
 #include "blocks.h"
 #include "predicates.h"
 #include "vec3.h"
 
 namespace fracslice::mesh {
 namespace {
-
-int32_t get(const std::atomic<int32_t>& number) { return number.load(std::memory_order_relaxed); }
-
-// Sets that any number of threads unite. A root is the lowest of its set, and a parent is lower than its children: whoever loses
-// a race looks again (Anderson and Woll, "Wait-free Parallel Algorithms for the Union-Find Problem", 1991).
-class Forest {
-  public:
-    explicit Forest(size_t count) : parent_(count) {
-        for_each_number(count, [&](size_t v) { parent_[v].store(int32_t(v), std::memory_order_relaxed); });
-    }
-
-    // Halves the path (Tarjan and van Leeuwen, 1984): what another thread has put there is an ancestor, too.
-    int32_t root(int32_t v) {
-        for (int32_t up; (up = get(parent_[v])) != v; v = up) {
-            int32_t above = get(parent_[up]);
-            assert(up < v && above <= up);
-            if (above != up) parent_[v].store(above, std::memory_order_relaxed);
-        }
-        return v;
-    }
-
-    void unite(int32_t a, int32_t b) {
-        while ((a = root(a)) != (b = root(b))) {
-            int32_t &high = a > b ? a : b, low = std::min(a, b), expected = high;
-            if (parent_[high].compare_exchange_strong(expected, low, std::memory_order_relaxed)) return;
-        }
-    }
-
-  private:
-    std::vector<std::atomic<int32_t>> parent_;
-};
 
 Vec3 at(const double* p) { return {p[0], p[1], p[2]}; }
 
@@ -126,7 +96,9 @@ std::vector<Reach> reaches(const MeshView& mesh, std::span<const int32_t> labels
 }  // namespace
 
 Components connected_components(const Triangles& triangles) {
-    Forest forest(triangles.vertices);
+    Array<int32_t> parent(triangles.vertices, 1);
+    for_each_number(triangles.vertices, [&](size_t v) { parent.data[v] = int32_t(v); });
+    const DisjointSets<int32_t> forest({parent.data.get(), triangles.vertices});
     for_each_number(triangles.count, [&](size_t t) {
         forest.unite(triangles[t][0], triangles[t][1]);
         forest.unite(triangles[t][0], triangles[t][2]);

@@ -7,6 +7,8 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_reduce.h>
 
+#include "../disjoint_sets.h"
+
 namespace fracslice::mesh {
 namespace {
 
@@ -66,15 +68,6 @@ Stars::Stars(const Triangles& triangles) : triangles_(triangles), shift_(kLeastS
 
 namespace {
 
-// Joins two sets of a forest of lowest indices, halving paths (Tarjan and van Leeuwen 1984); returns true if they were disjoint.
-bool unite(std::vector<int32_t>& parent, int32_t a, int32_t b) {
-    while (parent[a] != a) a = parent[a] = parent[parent[a]];
-    while (parent[b] != b) b = parent[b] = parent[parent[b]];
-    if (a == b) return false;
-    parent[std::max(a, b)] = std::min(a, b);
-    return true;
-}
-
 // Counts at one vertex after the other.
 class Fans {
   public:
@@ -99,7 +92,7 @@ class Fans {
             size_t outward = 0;
             for (j = i; j < spokes_.size() && spokes_[j] >> 32 == spokes_[i] >> 32; ++j) {
                 outward += !(spokes_[j] & 1);
-                fans -= j > i && unite(fan_, corner(spokes_[i]), corner(spokes_[j]));
+                fans -= j > i && DisjointSets<int32_t>(fan_).unite(corner(spokes_[i]), corner(spokes_[j]));
             }
             ++counts.edges;
             counts.open += j - i == 1;

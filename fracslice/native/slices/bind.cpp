@@ -16,6 +16,9 @@
 namespace nb = nanobind;
 
 namespace fracslice::slices {
+
+void bind_checks(nb::module_& module);
+
 namespace {
 
 // Machine code of a scene, `fracslice.expr.loops.points` on float.
@@ -213,4 +216,5 @@ NB_MODULE(_slices, module) {
              "encoding"_a)
         .def("crossings", &bind_crossings, "layer"_a)
         .def("signs", &bind_signs);
+    bind_checks(module);
 }

@@ -1,0 +1,268 @@
+#include "sampled_field.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace fracslice::printing {
+namespace {
+
+constexpr double kStep = 0.5;    // along a ray, voxels
+constexpr double kFirst = 0.1;   // the first step of one that starts on the surface
+constexpr double kNear = 1.5;    // minimum distance of unsampled points from the surface, voxels
+constexpr double kAlong = 0.999;  // fraction of a normal's largest component above which another component ties with it
+constexpr int kBrick = volume::kSide;
+
+int64_t floor_of(double x) { return int64_t(std::floor(x)); }
+
+double largest(const Point& p) { return std::max({std::abs(p[0]), std::abs(p[1]), std::abs(p[2])}); }
+
+Point along(const Point& start, double s, const Point& direction) {
+    return {start[0] + s * direction[0], start[1] + s * direction[1], start[2] + s * direction[2]};
+}
+
+// Chessboard distance, in bricks, of each brick to the nearest sampled one: two passes over the neighbours that come before, and
+// those that come after (Rosenfeld and Pfaltz 1968, "Distance functions on digital pictures").
+std::vector<int32_t> steps_to_samples(const volume::Layout& bricks) {
+    const auto [nx, ny, nz] = bricks.size;
+    const size_t count = size_t(nx) * size_t(ny) * size_t(nz);
+    std::vector<int32_t> steps(count, bricks.count ? nx + ny + nz : 0);
+    auto visit = [&](int x, int y, int z, int sign) {
+        int32_t& here = steps[(size_t(x) * size_t(ny) + size_t(y)) * size_t(nz) + size_t(z)];
+        for (int n = 0; n < 13; ++n) {
+            const int u = x + sign * (n / 9 - 1), v = y + sign * (n / 3 % 3 - 1), w = z + sign * (n % 3 - 1);
+            if (u < 0 || v < 0 || w < 0 || u >= nx || v >= ny || w >= nz) continue;
+            here = std::min(here, steps[(size_t(u) * size_t(ny) + size_t(v)) * size_t(nz) + size_t(w)] + 1);
+        }
+    };
+    for (size_t b = 0; b < count; ++b) {
+        if (bricks.index[b] >= 0) steps[b] = 0;
+    }
+    for (int x = 0; x < nx; ++x)
+        for (int y = 0; y < ny; ++y)
+            for (int z = 0; z < nz; ++z) visit(x, y, z, 1);
+    for (int x = nx; x-- > 0;)
+        for (int y = ny; y-- > 0;)
+            for (int z = nz; z-- > 0;) visit(x, y, z, -1);
+    return steps;
+}
+
+}  // namespace
+
+SampledField::SampledField(const volume::Bricks& bricks, const Point& origin, double voxel)
+    : bricks_(bricks), origin_(origin), voxel_(voxel), bounds_(brick_bounds()) {}
+
+std::vector<float> SampledField::brick_bounds() const {
+    const std::vector<int32_t> steps = steps_to_samples(bricks_);
+    std::vector<float> bounds(steps.size());
+    for (size_t b = 0; b < bounds.size(); ++b) {
+        const double far = std::max(double((steps[b] - 1) * kBrick), kNear) * voxel_;
+        bounds[b] = float(bricks_.index[b] == volume::kInside ? -far : far);
+    }
+    return bounds;
+}
+
+Point SampledField::in_voxels(const Point& p) const {
+    return {(p[0] - origin_[0]) / voxel_, (p[1] - origin_[1]) / voxel_, (p[2] - origin_[2]) / voxel_};
+}
+
+double SampledField::between(const Point& place) const {
+    auto [u, v, w] = place;
+    const int64_t i = floor_of(u), j = floor_of(v), k = floor_of(w);
+    u -= double(i), v -= double(j), w -= double(k);
+    const int64_t p = i & 7, q = j & 7, r = k & 7, x = i >> 3, y = j >> 3, z = k >> 3;
+    const bool known = within(x, y, z), is_inner = std::max({p, q, r}) < 7;
+    const int32_t row = known ? bricks_.index[brick(x, y, z)] : 0;
+    if (row < 0 && (is_inner || std::abs(bound(x, y, z)) > kBrick / 2 * voxel_)) return bound(x, y, z);
+    if (known && is_inner) {
+        const float* f = bricks_.values + size_t(row) * volume::kSamples + 64 * p + 8 * q + r;
+        const double a = (1 - w) * f[0] + w * f[1], b = (1 - w) * f[8] + w * f[9];
+        const double c = (1 - w) * f[64] + w * f[65], d = (1 - w) * f[72] + w * f[73];
+        return (1 - u) * ((1 - v) * a + v * b) + u * ((1 - v) * c + v * d);
+    }
+    double total = 0;
+    for (int n = 0; n < 8; ++n) {
+        const int a = n >> 2, b = n >> 1 & 1, c = n & 1;
+        const double share = (a ? u : 1 - u) * (b ? v : 1 - v) * (c ? w : 1 - w);
+        total += share * sample(i + a, j + b, k + c);
+    }
+    return total;
+}
+
+// At a grid point, or a bound if it has no sample.
+double SampledField::sample(int64_t i, int64_t j, int64_t k) const {
+    const int64_t x = i >> 3, y = j >> 3, z = k >> 3;
+    if (!within(x, y, z)) {
+        const auto [nx, ny, nz] = bricks_.size;
+        const int64_t beyond = std::max({-i, i - 8 * nx + 1, -j, j - 8 * ny + 1, -k, k - 8 * nz + 1});
+        return voxel_ * (kNear + double(beyond) - 1);
+    }
+    const int32_t row = bricks_.index[brick(x, y, z)];
+    if (row < 0) return bound(x, y, z);
+    return bricks_.values[size_t(row) * volume::kSamples + size_t((i & 7) * 64 + (j & 7) * 8 + (k & 7))];
+}
+
+double SampledField::capsule_value(const Point& point, double radius) const {
+    const Point place = in_voxels(point);
+    const double value = between(place);
+    if (value > voxel_) return value;  // a bound suffices
+    auto [u, v, w] = place;
+    const int64_t i = floor_of(u), j = floor_of(v), k = floor_of(w);
+    u -= double(i), v -= double(j), w -= double(k);
+    double square = -voxel_ * voxel_ * (u * (1 - u) + v * (1 - v) + w * (1 - w));
+    for (int n = 0; n < 8; ++n) {
+        const int a = n >> 2, b = n >> 1 & 1, c = n & 1;
+        const double share = (a ? u : 1 - u) * (b ? v : 1 - v) * (c ? w : 1 - w);
+        const double distance = radius + sample(i + a, j + b, k + c);
+        square += share * (distance * distance);
+    }
+    return std::sqrt(std::max(square, 0.0)) - radius;
+}
+
+void SampledField::gather(size_t row, Neighbourhood& f) const {
+    constexpr std::array<int, 4> first{0, 1, 9, 11};  // of the brick before, this one, and the one behind; and the end
+    const int32_t* ijk = bricks_.ijk + 3 * row;
+    const int64_t x = ijk[0] >> 3, y = ijk[1] >> 3, z = ijk[2] >> 3;
+    for (int n = 0; n < 27; ++n) {
+        const int a = n / 9, b = n / 3 % 3, c = n % 3;
+        const int64_t u = x + a - 1, v = y + b - 1, w = z + c - 1;
+        const bool known = within(u, v, w);
+        const int32_t there = known ? bricks_.index[brick(u, v, w)] : -1;
+        const float flat = known ? bounds_[brick(u, v, w)] : bounds_[brick(x, y, z)];
+        for (int i = first[a]; i < first[a + 1]; ++i)
+            for (int j = first[b]; j < first[b + 1]; ++j)
+                for (int k = first[c]; k < first[c + 1]; ++k) {
+                    const size_t at = size_t(((i + 7) & 7) << 6 | ((j + 7) & 7) << 3 | ((k + 7) & 7));
+                    f[size_t((i * kAround + j) * kAround + k)] =
+                        there >= 0 ? bricks_.values[size_t(there) * volume::kSamples + at] : flat;
+                }
+    }
+}
+
+void SampledField::find_beside() const {
+    beside_.resize(bricks_.count * volume::kSamples);
+    Neighbourhood f;
+    std::array<uint8_t, std::tuple_size_v<Neighbourhood>> one, two{};  // signs among the samples near each
+    for (size_t row = 0; row < bricks_.count; ++row) {
+        gather(row, f);
+        for (size_t s = 0; s < f.size(); ++s) one[s] = f[s] < 0 ? 1 : 2;
+        for (size_t step : {1, kAround, kAround * kAround}) {
+            for (size_t s = step; s < f.size() - step; ++s) two[s] = one[s - step] | one[s] | one[s + step];
+            std::swap(one, two);
+        }
+        for (int s = 0; s < volume::kSamples; ++s) {
+            const int at = ((s >> 6) + 1) * kAround * kAround + ((s >> 3 & 7) + 1) * kAround + (s & 7) + 1;
+            beside_[row * volume::kSamples + size_t(s)] = one[size_t(at)] == 3;
+        }
+    }
+}
+
+// Whether the cell around a place has corners on both sides.
+bool SampledField::is_mixed(const Point& place) const {
+    const int64_t i = floor_of(place[0]), j = floor_of(place[1]), k = floor_of(place[2]);
+    int inside = 0;
+    for (int n = 0; n < 8; ++n) inside += sample(i + (n >> 2), j + (n >> 1 & 1), k + (n & 1)) < 0;
+    return 0 < inside && inside < 8;
+}
+
+// Whether the nearest sample of a place has the opposite sign beside it.
+bool SampledField::is_beside(const Point& place) const {
+    const int64_t i = floor_of(place[0] + 0.5), j = floor_of(place[1] + 0.5), k = floor_of(place[2] + 0.5);
+    if (!within(i >> 3, j >> 3, k >> 3)) return false;
+    const int32_t row = bricks_.index[brick(i >> 3, j >> 3, k >> 3)];
+    return row >= 0 && beside_[size_t(row) * volume::kSamples + size_t((i & 7) << 6 | (j & 7) << 3 | (k & 7))];
+}
+
+std::vector<double> SampledField::free(const Rays& rays, std::span<const double> far) const {
+    std::call_once(once_, [&] { find_beside(); });
+    std::vector<double> result(far.size());
+    for (size_t n = 0; n < far.size(); ++n) {
+        const Point from = in_voxels(rays.start[n]);
+        double s = 0;
+        for (; s < far[n] / voxel_; s += kStep) {
+            const Point place = along(from, s, rays.directions[n]);
+            if (is_beside(place) && is_mixed(place)) break;
+        }
+        result[n] = std::min(voxel_ * s, far[n]);
+    }
+    return result;
+}
+
+std::vector<double> SampledField::through(const Rays& rays, double limit, double towards) const {
+    std::call_once(once_, [&] { find_beside(); });
+    std::vector<double> result(rays.start.size(), 2 * limit);
+    for (size_t n = 0; n < result.size(); ++n) {
+        const Point from = in_voxels(rays.start[n]);
+        double before = 0;
+        for (double s = kFirst; s < limit / voxel_ + 1; s += kStep) {
+            const Point place = along(from, s, rays.directions[n]);
+            const double f = is_beside(place) ? towards * between(place) : -1.0;
+            if (f >= 0) {
+                result[n] = voxel_ * (s - (before < 0 ? kStep * f / (f - before) : 0.0));
+                break;
+            }
+            before = f;
+        }
+    }
+    return result;
+}
+
+namespace {
+
+// The unit normal at `share` along an edge from *f, by interpolated central differences over a voxel.
+Point normal_at(const float* f, int axis, float share, const std::array<int, 3>& steps) {
+    const int next = steps[size_t(axis)];
+    Point normal;
+    double total = 0;
+    for (int k = 0; k < 3; ++k) {
+        const int step = steps[size_t(k)];
+        double slope;
+        if (k != axis) {
+            const float here = f[step] - f[-step], there = f[next + step] - f[next - step];
+            slope = ((1.0 - share) * here + share * there) / 2;
+        } else if (share < 0.5) {
+            const double middle = f[0] + (share + 0.5) * (f[next] - f[0]);
+            slope = middle - f[-next] - (share + 0.5) * (f[0] - f[-next]);
+        } else {
+            const double middle = f[0] + (share - 0.5) * (f[next] - f[0]);
+            slope = f[next] + (share - 0.5) * (f[2 * next] - f[next]) - middle;
+        }
+        normal[size_t(k)] = slope;
+        total += slope * slope;
+    }
+    const double length = std::max(std::sqrt(total), 1e-30);
+    for (double& component : normal) component /= length;
+    return normal;
+}
+
+}  // namespace
+
+Crossings SampledField::crossings(std::span<const int64_t> rows) const {
+    constexpr std::array<int, 3> steps{kAround * kAround, kAround, 1};
+    Crossings result;
+    Neighbourhood f;
+    for (int64_t row : rows) {
+        gather(size_t(row), f);
+        const int32_t* ijk = bricks_.ijk + 3 * row;
+        for (int s = 0; s < volume::kSamples; ++s) {
+            const std::array<int, 3> at{s >> 6, s >> 3 & 7, s & 7};
+            const float* here = &f[size_t((at[0] + 1) * steps[0] + (at[1] + 1) * steps[1] + at[2] + 1)];
+            for (int axis = 0; axis < 3; ++axis) {
+                const float there = here[steps[size_t(axis)]];
+                if ((here[0] < 0) == (there < 0)) continue;
+                const float share = here[0] / (here[0] - there);
+                const Point normal = normal_at(here, axis, share, steps);
+                const double steep = std::abs(normal[size_t(axis)]);
+                if (steep < kAlong * largest(normal)) continue;
+                Point point;
+                for (size_t k = 0; k < 3; ++k) point[k] = origin_[k] + voxel_ * (ijk[k] + at[k]);
+                point[size_t(axis)] += voxel_ * share;
+                result.points.push_back(point);
+                result.normals.push_back(normal);
+                result.area.push_back(voxel_ * voxel_ / steep);
+            }
+        }
+    }
+    return result;
+}
+
+}  // namespace fracslice::printing
