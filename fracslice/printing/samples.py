@@ -9,7 +9,7 @@ import numpy as np
 from .._native import SampledField, least
 from ..common.cache import key
 from ..fields.box import Box
-from ..fields.field import Bounds, Device, Precision
+from ..fields.field import Bounds, Device, Kernel, Precision
 from ..fields.tree import ArrayField
 from ..volume import Bricks
 from ..volume.bricks import INSIDE, OUTSIDE

@@ -11,8 +11,8 @@ from scipy import ndimage
 from scipy.sparse import coo_array, csgraph
 
 from fracslice import _native
-from fracslice.formulas import Node, box, mandelbulb, shell, sphere, transform, union
 from fracslice.fields.cpu import compile_scene
+from fracslice.formulas import Node, box, mandelbulb, shell, sphere, transform, union
 from fracslice.printing.bridging import capsules, nearer
 from fracslice.printing.components import components_of, thin_share
 from fracslice.printing.samples import Samples, together
