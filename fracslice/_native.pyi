@@ -462,7 +462,7 @@ def weld(points: NDArray[float32]) -> tuple[NDArray[int64], NDArray[int32]]:
     """
 
 def tree(
-    vertices: NDArray[float64], triangles: NDArray[int32], threads: int = 0
+    vertices: NDArray[float64], triangles: NDArray[int32], threads: int = 0, halved: bool = False
 ) -> tuple[NDArray[int64], NDArray[float64], NDArray[float64]]:
     """See `fracslice.mesh.spatial.Tree`."""
 
@@ -549,3 +549,18 @@ def nesting(
 
 def side_of_line(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> int: ...
 def side_of_plane(a: Point, b: Point, c: Point, d: Point) -> int: ...
+
+class Solid:
+    """See `fracslice.mesh.models.Solid`. Refers to the arrays during its lifetime."""
+
+    def __init__(
+        self,
+        vertices: NDArray[float64],
+        triangles: NDArray[int32],
+        order: NDArray[int64],
+        low: NDArray[float64],
+        high: NDArray[float64],
+    ) -> None: ...
+    def distances(self, points: NDArray[float64]) -> NDArray[float64]: ...
+    @property
+    def address(self) -> int: ...

@@ -7,6 +7,10 @@
 
 namespace fracslice::mesh {
 
+// The other corners of a triangle.
+inline int32_t after(int32_t c) { return c % 3 == 2 ? c - 2 : c + 1; }
+inline int32_t before(int32_t c) { return c % 3 == 0 ? c + 2 : c - 1; }
+
 // Of each corner of a closed, oriented 2-manifold the one opposite, on the other side of the edge that it faces. Throws
 // std::invalid_argument if one has none.
 std::vector<int32_t> opposite_corners(const Triangles& triangles);
