@@ -24,7 +24,7 @@ import numpy as np
 
 from ..common.parameters import AUTO
 from ..errors import KernelError
-from ..formulas.registry import Fixed, Node
+from ..formulas.registry import Fixed, InMemory, Node
 from . import functions, source
 from .language import CHILD, parse, parse_expression
 from .source import Arguments, append_numbers, arguments
@@ -115,7 +115,9 @@ class _Tree:
         stack = [root]
         while stack:
             node = stack.pop()
-            self.linker.parameters += self.given[id(node)].numbers
+            given, start = self.given[id(node)], len(self.linker.parameters)
+            self.linker.held += [(start + place, memory) for place, memory in given.held]
+            self.linker.parameters += given.numbers
             stack += reversed(self.inside[id(node)])
         return self.parts[id(root)]
 
@@ -285,10 +287,13 @@ class Linked:
         Source text with the signed field ``field(x, y, z, P)``.
     parameters
         Parameters P, float64 [n].
+    held
+        Arguments in memory, each with the index in P of its first word.
     """
 
     source: str
     parameters: np.ndarray
+    held: tuple[tuple[int, InMemory], ...] = ()
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Linked) and self._contents == other._contents
@@ -326,7 +331,7 @@ def link(root: Node) -> Linked:
     """
     linker = Linker()
     linker.field(root)
-    return Linked(linker.text(), linker.numbers())
+    return linker.linked()
 
 
 @dataclass
@@ -339,6 +344,7 @@ class Linker:
     called: set[str] = field(default_factory=set)  # names of the functions that are called, not inlined
     # arrays that stand behind the numbers in P, each with the index of the number that is its offset
     tables: list[tuple[int, np.ndarray]] = field(default_factory=list)
+    held: list[tuple[int, InMemory]] = field(default_factory=list)  # see `Linked`
     _parts: dict[Any, Subroutine] = field(default_factory=dict)
     _shared: dict[Any, str] = field(default_factory=dict)
 
@@ -422,6 +428,10 @@ class Linker:
         self.functions[name] = (
             f"def {name}({', '.join([*rest, 'P'])}):\n    return {called}({', '.join(passed)})"
         )
+
+    def linked(self) -> Linked:
+        """Return what is written and collected."""
+        return Linked(self.text(), self.numbers(), tuple(self.held))
 
     def text(self) -> str:
         """Return the text of all functions."""

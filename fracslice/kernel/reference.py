@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ..formulas import vocabulary
-from ..formulas.registry import Node
-from .intervals import Interval, on_cells
+from ..formulas.registry import Node, words
+from .intervals import Interval, enclosed, on_cells
 from .linker import CALLED, FIELD, link
 
 _NAMES = vocabulary.NAMES | vocabulary.OF_CELLS
@@ -52,7 +53,13 @@ def enclosure(root: Node) -> Callable[[Interval, Interval, Interval], Interval]:
 def _field(root: Node, scope: dict[str, Any]) -> Callable[..., Any]:
     """Field of a tree with given functions of the vocabulary."""
     linked = link(root)
-    scope[CALLED] = lambda function: function
+    memory = {words(memory.digest): memory for _, memory in linked.held}
+
+    def solid_distance(x: Any, y: Any, z: Any, solid: tuple[float, ...]) -> Any:
+        distance = partial(vocabulary.solid_distance, solid=memory[tuple(solid)])
+        return enclosed(distance, x, y, z) if isinstance(x, Interval) else distance(x, y, z)
+
+    scope |= {CALLED: lambda function: function, "solid_distance": solid_distance}
     exec(compile(linked.source, "<linked scene>", "exec"), scope)
 
     def evaluate(*points: Any) -> Any:

@@ -12,7 +12,7 @@ from types import FunctionType, ModuleType
 from typing import Any
 
 from ..errors import KernelError
-from ..formulas.registry import Fixed, Node
+from ..formulas.registry import Fixed, InMemory, Node, words
 from . import functions, language
 from .host import kept_text
 from .language import Folding, parse, stored_names
@@ -195,6 +195,7 @@ class Arguments:
     fixed: tuple[tuple[str, Any], ...]  # arguments substituted in a copy of the function
     passed: tuple[str, ...]  # expressions that read the other arguments from P, in the function's order
     numbers: tuple[float, ...]  # numbers in P
+    held: tuple[tuple[int, InMemory], ...] = ()  # arguments in memory, by the index of their first word
 
 
 def arguments(node: Node, leading: int) -> Arguments:
@@ -210,14 +211,18 @@ def arguments(node: Node, leading: int) -> Arguments:
         )
     fixed = tuple((name, values[name].value) for name in names if isinstance(values[name], Fixed))
     numbers: list[float] = []
-    passed = [
-        append_numbers(values[name], numbers, "P0") for name in names if not isinstance(values[name], Fixed)
-    ]
-    return Arguments(function, fixed, tuple(passed), tuple(numbers))
+    passed, held = [], []
+    for value in (values[name] for name in names if not isinstance(values[name], Fixed)):
+        if isinstance(value, InMemory):
+            held.append((len(numbers), value))
+        passed.append(append_numbers(value, numbers, "P0"))
+    return Arguments(function, fixed, tuple(passed), tuple(numbers), tuple(held))
 
 
 def append_numbers(value: Any, numbers: list[float], origin: str = "") -> str:
-    """Append a number or a tuple of numbers to a list."""
+    """Append a number or a tuple of numbers to a list; of an argument in memory its hash."""
+    if isinstance(value, InMemory):
+        value = words(value.digest)
     if isinstance(value, tuple):
         return f"({', '.join(append_numbers(v, numbers, origin) for v in value)},)"
     place = f"{origin} + {len(numbers)}" if origin else str(len(numbers))
