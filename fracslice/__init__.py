@@ -102,6 +102,7 @@ register(
     parsing="fracslice.kernel.language",
     reference="fracslice.kernel.reference",
     files="fracslice.export",
+    models="fracslice.mesh.models",
 )
 
 

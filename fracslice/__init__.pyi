@@ -45,6 +45,7 @@ from .formulas import mandelbulb as mandelbulb
 from .formulas import material as material
 from .formulas import menger as menger
 from .formulas import mirror as mirror
+from .formulas import model as model
 from .formulas import neovius as neovius
 from .formulas import noise as noise
 from .formulas import octahedron as octahedron

@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, cast
 
 from ..common.messages import hint
-from ..common.parameters import REQUIRED, Choice, Count, Vector, parameter_lines, python_name
+from ..common.parameters import REQUIRED, Choice, Count, Digest, File, Vector, parameter_lines, python_name
 from ..errors import SceneError
 from ..providers import provider
 from .box import Axis, Box, direction, three
@@ -359,6 +359,8 @@ def annotation(parameter: Any) -> Any:
             type_ = float | several if 1 in sizes else several
         case Choice(choices=choices):
             type_ = Literal[*choices]
+        case File() | Digest():
+            type_ = str
         case _:
             type_ = float
     return type_ | None if parameter.default is None else type_
@@ -480,8 +482,11 @@ class Node(Operators, Field):
         SceneError
             For an invalid value or number of children.
         """
-        kept = self.children if children is None else children
-        return self.formula(*kept, place=self.place, **{**_given_values(self), **values})
+        kept, given = self.children if children is None else children, _given_values(self)
+        if values:
+            kinds = self.formula.parameters
+            given = {name: value for name, value in given.items() if not kinds[name].implied}
+        return self.formula(*kept, source=self.place, **{**given, **values})
 
     def conservative(self) -> Node:
         """Conservative tree, for skipping empty space where the node's own field exceeds its bound.

@@ -13,6 +13,7 @@ from ..common.cache import key as hashed
 from ..formulas.field import Cells, Device, Field, Kernel, Loops, Precision
 from ..formulas.registry import Node
 from . import cpu
+from .devices import for_field
 from .intervals import TINY
 from .linker import link
 from .loops import Loop, enclosures
@@ -48,7 +49,7 @@ class Enclosures:
 
 def kernel(root: Node, device: Device, precision: Precision) -> Kernel:
     """Compile the kernel of a tree with resolved depths; see `Field.kernel`."""
-    if device == "cpu":
+    if for_field(root, device) == "cpu":
         return cpu.compile_scene(root, precision)
     from . import cuda
 
@@ -57,7 +58,7 @@ def kernel(root: Node, device: Device, precision: Precision) -> Kernel:
 
 def loops(root: Node, loops: Sequence[Loop], precision: Precision, device: Device = "cpu") -> Loops:
     """Compile loops over a tree with resolved depths; see `Field.loops`."""
-    if device == "cpu":
+    if for_field(root, device) == "cpu":
         return cpu.compile_loops(link(root), tuple(loops), precision)
     from . import cuda_launching
 

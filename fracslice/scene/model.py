@@ -86,11 +86,11 @@ class Scene:
     def hash(self) -> str:
         """First 12 hexadecimal digits of the SHA-256 of the canonical XML.
 
-        Equal scenes have equal hashes on every platform.
+        Equal scenes have equal hashes on every platform, and in every folder.
         """
-        from .writer import to_xml
+        from .writer import identity
 
-        return hashlib.sha256(to_xml(self).encode()).hexdigest()[:12]
+        return hashlib.sha256(identity(self).encode()).hexdigest()[:12]
 
     def with_values(self, settings: Iterable[str]) -> Scene:
         """Return a copy with changed values.

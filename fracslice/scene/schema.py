@@ -12,7 +12,18 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as Tree
 
-from ..common.parameters import MILLIMETRES, REQUIRED, Axis, Choice, Count, File, Length, Number, Vector
+from ..common.parameters import (
+    MILLIMETRES,
+    REQUIRED,
+    Axis,
+    Choice,
+    Count,
+    Digest,
+    File,
+    Length,
+    Number,
+    Vector,
+)
 from .animation import AttributePath, Keys, Seconds
 from .layout import DEFINE, PARAMETER, SCENE, SECTIONS, Element, Identifier, formulas
 
@@ -141,6 +152,10 @@ def _text(parent: Tree.Element, _: File | Seconds | AttributePath | Keys) -> Non
     Tree.SubElement(parent, "data", type="string")
 
 
+def _digest(parent: Tree.Element, _: Digest) -> None:
+    _param(Tree.SubElement(parent, "data", type="string"), "pattern", "[0-9a-f]{64}")
+
+
 def _length(parent: Tree.Element, kind: Length) -> None:
     _param(Tree.SubElement(parent, "data", type="string"), "pattern", _LENGTH)
 
@@ -152,6 +167,7 @@ _PATTERNS: dict[type, Any] = {
     Axis: _choices,
     Choice: _choices,
     Length: _length,
+    Digest: _digest,
     File: _text,
     Identifier: _identifier,
     Seconds: _text,

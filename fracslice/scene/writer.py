@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ..common.parameters import short_repr
+from ..common.parameters import File, short_repr
 from ..errors import SceneError
 from ..formulas import Node
 from ..formulas.definitions import definitions
@@ -37,7 +38,20 @@ def to_xml(scene: Scene) -> str:
     """
     if isinstance(scene, Node):
         raise SceneError(f"{short_repr(scene)}: expected a scene, such as Scene(sphere(), 40)")
-    return "\n".join(_lines(scene)) + "\n"
+    return "\n".join(_lines(scene, scene.root)) + "\n"
+
+
+def identity(scene: Scene) -> str:
+    """Return the canonical scene file with the hashes of models, and without the names of their files."""
+    return "\n".join(_lines(scene, _unnamed(scene.root))) + "\n"
+
+
+def _unnamed(node: Node) -> Node:
+    """The tree without the names of files whose hash it holds."""
+    kinds, values = node.formula.parameters, node.values
+    if any(kind.implied for kind in kinds.values()):
+        values = {name: value for name, value in values.items() if not isinstance(kinds[name], File)}
+    return replace(node, values=values, children=tuple(map(_unnamed, node.children)))
 
 
 def part_to_xml(part: Part | Print) -> str:
@@ -47,12 +61,12 @@ def part_to_xml(part: Part | Print) -> str:
     return f"<{section.name}{attributes(section, values)}/>"
 
 
-def _lines(scene: Scene) -> Iterator[str]:
+def _lines(scene: Scene, root: Node) -> Iterator[str]:
     yield f"<{SCENE.name}{attributes(SCENE, {'version': VERSION})}>"
-    for definition in definitions(scene.root):
+    for definition in definitions(root):
         yield from write_definition(definition)
     yield f"  <{SOLID.name}{attributes(SOLID, {'size': scene.size_mm, 'unit': scene.unit_mm})}>"
-    yield from _element(scene.root, "    ")
+    yield from _element(root, "    ")
     yield f"  </{SOLID.name}>"
     printing = () if scene.printing == Print() else (scene.printing,)
     film = () if scene.animation is None else (scene.animation, *scene.tracks)
