@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from fracslice.common.files import MODELS
 from fracslice.errors import MeshError, SceneError
 
 from .execution import stopped_at_once
@@ -16,10 +17,6 @@ from .execution import stopped_at_once
 if TYPE_CHECKING:
     from fracslice.mesh import Mesh
     from fracslice.scene import Scene
-
-
-MODELS = frozenset({".stl", ".3mf", ".ply", ".obj", ".glb"})
-"""Extensions of `fracslice.mesh.reading.READERS`, which commands of scenes need not import."""
 
 
 class BadInput(click.ClickException):

@@ -75,6 +75,7 @@ from .formulas import voronoi as voronoi
 from .jobs.report import Report as Report
 from .jobs.report import Result as Result
 from .mesh import Mesh as Mesh
+from .mesh.models import from_trimesh as from_trimesh
 from .records import MeshJob as MeshJob
 from .records import RenderJob as RenderJob
 from .scene import Print as Print

@@ -849,7 +849,7 @@ def model(file: str, size: float | None = None, place: Literal['as is', 'centre'
     size : a number > 0
         the longest side; without it, a scene unit is a millimetre of the model
     place : as is, centre or bed, default 'as is'
-        where it is: where the file has it, with the centre of its box at the origin, or with that above the origin and its lowest point at z = 0
+        where the file has it, with its box centred at the origin, or there with its lowest point at z = 0
     units : um, µm, mm, cm, in or m, default 'mm'
         unit of an STL, OBJ or PLY file; GLB and 3MF state their own
     sha256 : the SHA-256 of the file, 64 hexadecimal digits

@@ -17,8 +17,7 @@ from .vocabulary import solid_distance
     size=Number(None, "the longest side; without it, a scene unit is a millimetre of the model", above=0),
     place=Choice(
         "as is",
-        "where it is: where the file has it, with the centre of its box at the origin, or with that above "
-        "the origin and its lowest point at z = 0",
+        "where the file has it, with its box centred at the origin, or there with its lowest point at z = 0",
         ("as is", "centre", "bed"),
     ),
     units=Choice("mm", "unit of an STL, OBJ or PLY file; GLB and 3MF state their own", tuple(MILLIMETRES)),

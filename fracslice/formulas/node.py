@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from inspect import Parameter, Signature
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal, Protocol, cast, runtime_checkable
 
 from ..common.messages import hint
 from ..common.parameters import REQUIRED, Choice, Count, Digest, File, Vector, parameter_lines, python_name
@@ -27,6 +27,19 @@ FORMULAS: dict[str, Formula] = {}
 """Every registered formula by the name of its element."""
 
 
+@runtime_checkable
+class TriangleMesh(Protocol):
+    """Mesh of this or another library."""
+
+    @property
+    def vertices(self) -> Any:
+        """Positions, [n, 3]."""
+
+    @property
+    def faces(self) -> Any:
+        """Vertex indices, [m, 3], counter-clockwise seen from outside."""
+
+
 class Operators:
     """CSG operators and domain operators as methods of shapes.
 
@@ -43,18 +56,39 @@ class Operators:
 
     __array_ufunc__ = None  # makes NumPy defer to the operators of the shape
 
-    def __or__(self, other: Node) -> Node:
-        """Union of two shapes."""
-        return _fold_operator("union", self, other) if isinstance(other, Operators) else NotImplemented
+    def __or__(self, other: Node | TriangleMesh) -> Node:
+        """Union of two shapes; of a shape and a mesh, too."""
+        shape = _shape(other)
+        return NotImplemented if shape is None else _fold_operator("union", self, shape)
 
-    def __and__(self, other: Node) -> Node:
-        """Intersection of two shapes."""
-        return _fold_operator("intersection", self, other) if isinstance(other, Operators) else NotImplemented
+    def __and__(self, other: Node | TriangleMesh) -> Node:
+        """Intersection of two shapes; of a shape and a mesh, too."""
+        shape = _shape(other)
+        return NotImplemented if shape is None else _fold_operator("intersection", self, shape)
 
-    def __sub__(self, other: Node) -> Node:
-        """Difference of two shapes."""
-        pieces = _elements("difference", self)
-        return _make_node("difference", *pieces, other) if isinstance(other, Operators) else NotImplemented
+    def __sub__(self, other: Node | TriangleMesh) -> Node:
+        """Difference of two shapes; of a shape and a mesh, too."""
+        shape = _shape(other)
+        return (
+            NotImplemented
+            if shape is None
+            else _make_node("difference", *_elements("difference", self), shape)
+        )
+
+    def __ror__(self, mesh: TriangleMesh) -> Node:
+        """Union of a mesh and this shape."""
+        shape = _shape(mesh)
+        return NotImplemented if shape is None else shape | cast("Node", self)
+
+    def __rand__(self, mesh: TriangleMesh) -> Node:
+        """Intersection of a mesh and this shape."""
+        shape = _shape(mesh)
+        return NotImplemented if shape is None else shape & cast("Node", self)
+
+    def __rsub__(self, mesh: TriangleMesh) -> Node:
+        """Difference of a mesh and this shape."""
+        shape = _shape(mesh)
+        return NotImplemented if shape is None else shape - cast("Node", self)
 
     def __add__(self, offset: Sequence[float] | NDArray[Any]) -> Node:
         """Translation by an offset (x, y, z)."""
@@ -286,6 +320,14 @@ class Operators:
         """
         values: NDArray[np.floating] = provider("distances").distance(self, points)
         return values
+
+
+def _shape(given: Any) -> Node | None:
+    """A shape itself, or the solid of a mesh; None for anything else."""
+    if isinstance(given, Operators):
+        return cast("Node", given)
+    shape: Node | None = provider("models").from_trimesh(given) if isinstance(given, TriangleMesh) else None
+    return shape
 
 
 def _make_node(name: str, *elements: Operators, **values: Any) -> Node:

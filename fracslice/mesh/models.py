@@ -6,17 +6,19 @@ import hashlib
 import os
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import _native
-from ..common.cache import key
+from ..common.cache import Kept, cache_folder, key
 from ..common.files import open_regular
 from ..common.parameters import MILLIMETRES
-from ..errors import MeshError
+from ..errors import MeshError, SceneError
 from ..formulas.box import Box
-from ..formulas.registry import InMemory
+from ..formulas.node import TriangleMesh
+from ..formulas.registry import InMemory, Node, get
 from .checks import check_mesh
 from .model import Mesh
 from .reading import READERS, read_mesh
@@ -86,6 +88,58 @@ def _digest(path: str) -> str:
         raise MeshError("no such file") from None
     except OSError as error:
         raise MeshError(error.strerror or str(error)) from None
+
+
+def from_trimesh(
+    mesh: TriangleMesh, *, size: float | None = None, place: Literal["as is", "centre", "bed"] = "as is"
+) -> Node:
+    """Make a shape of a triangle mesh.
+
+    Its triangles, with coordinates rounded to float32, are kept in a file of the cache, which the formula
+    `model` reads. For a scene file that lasts, export the mesh beside it.
+
+    Parameters
+    ----------
+    mesh : trimesh.Trimesh or Mesh
+        A closed mesh without self-intersections; any object with `vertices` [n, 3] and `faces` [m, 3].
+    size : float, optional
+        Longest side, scene units; that of the mesh by default.
+    place : {"as is", "centre", "bed"}
+        Where it is: as given, with the centre of its box at the origin, or with that above the origin and its
+        lowest point at z = 0.
+
+    Returns
+    -------
+    Node
+
+    Raises
+    ------
+    MeshError
+        If the mesh encloses no solid, or the cache cannot be written.
+
+    Examples
+    --------
+    >>> import trimesh
+    >>> from fracslice import from_trimesh, gyroid
+    >>> block = from_trimesh(trimesh.creation.box((10, 10, 10)))
+    >>> float(block.distance([0, 0, 8]))
+    3.0
+    >>> (block & gyroid(period=4)).bounds.box.size
+    (10.0, 10.0, 10.0)
+    """
+    given = Mesh(np.array(mesh.vertices, np.float64), np.array(mesh.faces, np.int32))
+    folder = Kept(cache_folder() / "models").place()
+    if folder is None:
+        raise MeshError(f"{cache_folder()}: expected a folder that others cannot write in, for the triangles")
+    path = folder / f"{key(given.vertices, given.triangles)}.ply"
+    if not path.exists():
+        given.export(path)
+    made = get("model")(str(path), size=size, place=place)
+    try:
+        made.bounds  # noqa: B018
+    except SceneError as error:
+        raise MeshError(str(error.__cause__).partition(";")[0]) from None
+    return made
 
 
 @lru_cache(maxsize=8)

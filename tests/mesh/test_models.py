@@ -12,9 +12,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
-from fracslice import make_mesh
-from fracslice.errors import FracsliceWarning, SceneError
+from fracslice import from_trimesh, make_mesh
+from fracslice.errors import FracsliceWarning, MeshError, SceneError
 from fracslice.formulas import Node, box, model, shell, sphere, transform, twist, union
 from fracslice.kernel import cpu
 from fracslice.kernel.devices import for_field
@@ -314,3 +315,24 @@ def test_a_model_is_computed_on_the_cpu_and_that_is_said() -> None:
         warnings.simplefilter("error")
         assert for_field(box(), "cuda") == "cuda" and for_field(root, "cpu") == "cpu"
     assert not root.loops((), "float32", "cuda").on_gpu
+
+
+def test_meshes_of_python_are_shapes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FRACSLICE_CACHE", str(tmp_path))
+    block = trimesh.creation.box((2, 4, 6))
+    cut = block & sphere(1.5)
+    assert cut == from_trimesh(block) & sphere(1.5) == shapes_mesh(block) & sphere(1.5)
+    assert float(cut.distance([0, 0, 0])) == -1 and float((block - sphere(0.5)).distance([0, 0, 0])) == 0.5
+    assert (sphere() | block) == union(sphere(), from_trimesh(block))
+    assert (sphere() - block).children == (sphere(), from_trimesh(block))
+    assert make_mesh(block, resolution=12).volume == pytest.approx(48)
+    assert make_mesh(BRACKET, resolution=24).volume == pytest.approx(0.576, rel=1e-3)
+    assert from_trimesh(block, place="bed", size=3).bounds.box.hi == (0.5, 1, 3)
+    with pytest.raises(MeshError, match="3 open edges"):
+        from_trimesh(shapes.without(shapes.cube(), 3))
+    with pytest.raises(TypeError):
+        np.ones(3) & sphere()
+
+
+def shapes_mesh(mesh: trimesh.Trimesh) -> Mesh:
+    return Mesh(np.array(mesh.vertices), np.array(mesh.faces, np.int32))
