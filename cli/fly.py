@@ -31,6 +31,7 @@ def fly(given: FlyOptions) -> None:
     from fracslice.scene.model import part_to_xml
 
     with given.working() as work:
-        camera = viewer.fly(scene_path(given.source), given.settings, given.size, work, given.device)
+        path, outside = scene_path(given.source), given.allow_files_outside
+        camera = viewer.fly(path, given.settings, given.size, work, given.device, outside)
     if not given.quiet:
         click.echo(part_to_xml(camera))

@@ -9,17 +9,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fracslice.errors import MeshError
+from fracslice.common.files import MODELS
+from fracslice.errors import MeshError, SceneError
 
 from .execution import stopped_at_once
 
 if TYPE_CHECKING:
     from fracslice.mesh import Mesh
     from fracslice.scene import Scene
-
-
-MODELS = frozenset({".stl", ".3mf", ".ply", ".obj", ".glb"})
-"""Extensions of `fracslice.mesh.reading.READERS`, which commands of scenes need not import."""
 
 
 class BadInput(click.ClickException):
@@ -36,17 +33,31 @@ def scene_path(source: str) -> Path:
     from fracslice.scene import library
 
     if is_model(source) and Path(source).is_file():
-        raise BadInput(f"{source}: expected a scene, found a model; only check and show take models")
+        raise BadInput(f"{source}: expected a scene, found a model")
     bare = Path(source).name == source and not Path(source).suffix
     return Path(source) if Path(source).exists() or not bare else library.path(source)
 
 
 def load_scene(source: str, settings: Iterable[str] = ()) -> Scene:
-    """Read the scene of a command and apply the values of --set."""
+    """Read the scene of a command, or that of a model file, and apply the values of --set."""
+    with stopped_at_once():
+        return _scene(source).with_values(settings)
+
+
+def _scene(source: str) -> Scene:
+    """Scene of a file or a name; of a model the scene of that alone, in mm."""
     from fracslice.scene import read
 
-    with stopped_at_once():
-        return read(scene_path(source)).with_values(settings)
+    if is_model(source):
+        from fracslice.formulas import model
+        from fracslice.scene import scene
+
+        try:
+            return scene(model(source, place="as is", units="mm"), unit=1.0, name=Path(source).stem)
+        except SceneError as error:
+            raise BadInput(f"{source}: {error.__cause__ or error}") from error
+    outside = click.get_current_context().params.get("allow_files_outside", False)
+    return read(scene_path(source), files_outside=outside)
 
 
 def refuse_moved(scene: Scene, settings: Iterable[str]) -> None:

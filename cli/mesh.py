@@ -43,7 +43,7 @@ class MeshFileOptions(ClusterOptions, MeshOptions):
 
     without = frozenset()
 
-    source: str = argument("SCENE")
+    source: str = argument("SCENE|MODEL")
     output: str = output(
         "FILE", "An .stl, .3mf, .ply, .obj or .glb file; or .vdb, for the samples of the field."
     )

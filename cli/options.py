@@ -346,6 +346,7 @@ class SceneOptions(RunOptions):
         metavar="NAME.ATTRIBUTE=VALUE",
         multiple=True,
     )
+    allow_files_outside: bool = flag("Read models that lie outside of the scene's folder, too.")
 
 
 class PreparationOptions(SceneOptions):

@@ -24,7 +24,7 @@ MOST = 1_000_000
 class SlicerOptions(MeshOptions):
     """Options of `print`."""
 
-    source: str = argument("SCENE")
+    source: str = argument("SCENE|MODEL")
     output: str = output("OUT", "A .gcode file; .3mf for orca and bambu.")
     slicer: str = option(
         click.Choice(["prusa", "orca", "bambu", "cura"]),

@@ -34,7 +34,7 @@ class RenderOptions(ClusterOptions, SceneOptions):
     """Options of `render`."""
 
     records: ClassVar[Records] = (RenderJob,)
-    source: str = argument("SCENE")
+    source: str = argument("SCENE|MODEL")
     output: str = output("FILE", "A .png, .jpg or .webp file, or .exr or .tif for linear floats.")
     device: str = DEVICE
     pass_images: str | None = option(Name("DIR"), "Write the picture of every pass there.")

@@ -65,7 +65,7 @@ class SliceOptions(ClusterOptions, LayerOptions):
 
     without = frozenset()
 
-    source: str = argument("SCENE")
+    source: str = argument("SCENE|MODEL")
     output: str = output(
         "OUT",
         "A printer's file (.sl1, .goo, .ctb, .cbddlp, .pwmx, .nanodlp, ...), an .svg, .3mf, .cli or .json "

@@ -80,6 +80,7 @@ _WHERE = {
     "Slices": "api.slices",
     "Work": "work",
     "__version__": "version",
+    "from_trimesh": "mesh.models",
     "make_mesh": "api.meshing",
     "read": "scene",
     "reads": "scene",

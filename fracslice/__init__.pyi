@@ -45,6 +45,7 @@ from .formulas import mandelbulb as mandelbulb
 from .formulas import material as material
 from .formulas import menger as menger
 from .formulas import mirror as mirror
+from .formulas import model as model
 from .formulas import neovius as neovius
 from .formulas import noise as noise
 from .formulas import octahedron as octahedron
@@ -74,6 +75,7 @@ from .formulas import voronoi as voronoi
 from .jobs.report import Report as Report
 from .jobs.report import Result as Result
 from .mesh import Mesh as Mesh
+from .mesh.models import from_trimesh as from_trimesh
 from .records import MeshJob as MeshJob
 from .records import RenderJob as RenderJob
 from .scene import Print as Print

@@ -462,7 +462,7 @@ def weld(points: NDArray[float32]) -> tuple[NDArray[int64], NDArray[int32]]:
     """
 
 def tree(
-    vertices: NDArray[float64], triangles: NDArray[int32], threads: int = 0
+    vertices: NDArray[float64], triangles: NDArray[int32], threads: int = 0, halved: bool = False
 ) -> tuple[NDArray[int64], NDArray[float64], NDArray[float64]]:
     """See `fracslice.mesh.spatial.Tree`."""
 
@@ -638,3 +638,18 @@ def capsule_squares(
 
 def steps_to(ijk: NDArray[int32], index: NDArray[int32], seeds: NDArray[bool_]) -> NDArray[uint8]:
     """Grid steps from each sample to the nearest of the seeds, at most 255, uint8 [n, 512]."""
+
+class Solid:
+    """See `fracslice.mesh.models.Solid`. Refers to the arrays during its lifetime."""
+
+    def __init__(
+        self,
+        vertices: NDArray[float64],
+        triangles: NDArray[int32],
+        order: NDArray[int64],
+        low: NDArray[float64],
+        high: NDArray[float64],
+    ) -> None: ...
+    def distances(self, points: NDArray[float64]) -> NDArray[float64]: ...
+    @property
+    def address(self) -> int: ...

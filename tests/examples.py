@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 from functools import reduce
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -51,6 +52,7 @@ from fracslice.formulas import (
     material,
     menger,
     mirror,
+    model,
     neovius,
     noise,
     octahedron,
@@ -100,6 +102,9 @@ WALLS: tuple[Formula, ...] = (
 
 BAR = box(size=(1.6, 0.3, 0.4))
 
+BRACKET = str(Path(__file__).parent / "models" / "bracket.stl")
+"""A prism over an L, turned, of 0.576 cubic units and 20 triangles."""
+
 EXAMPLES: dict[str, Node] = {
     "sphere": sphere(radius=0.8),
     "box": box(size=(1.2, 0.8, 1.5)),
@@ -146,6 +151,7 @@ EXAMPLES: dict[str, Node] = {
     "gear": gear(teeth=12),
     "thread": thread(radius=0.6, pitch=0.3),
     "apollonian": apollonian(level=3),
+    "model": model(BRACKET),
     "honeycomb": honeycomb(thickness=0.3, reach=0.9),
     "pseudo kleinian": cut(pseudo_kleinian(steps=5)),
     "tetrabrot": tetrabrot(iterations=7),
@@ -232,7 +238,7 @@ REPRESENTATIVES = {
     "cone", "cosine bulb", "deep", "difference", "foam of walls", "gear", "gyroid wall", "honeycomb",
     "hybrid transformed", "julia 4d", "kaleidoscopic octahedron", "kelvin struts", "koch",
     "lambda bulb", "mandelbox -1.5", "mandelbulb", "mandelbulb 7.5", "many", "material", "menger",
-    "mirror", "octahedron flake", "perlin noise", "prism", "pseudo kleinian", "quaternion julia 4",
+    "mirror", "model", "octahedron flake", "perlin noise", "prism", "pseudo kleinian", "quaternion julia 4",
     "repeat overlapping", "rounded box", "schwarz_d wall", "shell", "smooth intersection",
     "smooth union", "snowflake", "sphere", "superquadric", "thread", "transform", "tree", "twist x",
 }  # fmt: skip

@@ -64,7 +64,7 @@ class FrameTask:
 @lru_cache(maxsize=1)
 def _timeline(scene: str, title: str) -> Timeline:
     """Timeline of a scene, read once in a process."""
-    return Timeline(reads(scene, title))
+    return Timeline(reads(scene, title, files_outside=True))
 
 
 def write_frames(job: FilmJob, numbers: Sequence[int], folder: Path, resume: bool, work: Work) -> list[Path]:

@@ -11,10 +11,12 @@ from inspect import Parameter, cleandoc, signature
 from pathlib import Path
 from typing import Any, Literal, ParamSpec, TypeAlias, TypedDict, TypeVar, get_type_hints
 
+from ..common.files import MODELS
 from ..common.messages import hint
 from ..common.parameters import REQUIRED, AnyLength, AnyScale, Record, parameter_lines, short_repr
 from ..errors import SceneError
 from ..fields.devices import choose_device
+from ..fields.node import TriangleMesh
 from ..formulas import Formula, Node, get
 from ..formulas import names as formula_names
 from ..records import Colour, MeshJob, RenderJob, SliceJob
@@ -210,7 +212,7 @@ def _option_lines(records: Iterable[type[Record]], known: Container[str]) -> Ite
     yield ""
 
 
-Source: TypeAlias = Node | Scene | str | os.PathLike[str]
+Source: TypeAlias = Node | Scene | TriangleMesh | str | os.PathLike[str]
 
 
 def resolve(source: Source) -> Node | Scene:
@@ -218,8 +220,8 @@ def resolve(source: Source) -> Node | Scene:
 
     Parameters
     ----------
-    source : Node, Scene, path or name
-        A shape, a scene, a scene file, or the name of a shipped scene or formula.
+    source : Node, Scene, mesh, path or name
+        A shape, a scene, a mesh, a scene file, a model file, or the name of a shipped scene or formula.
 
     Raises
     ------
@@ -228,13 +230,19 @@ def resolve(source: Source) -> Node | Scene:
     """
     if isinstance(source, (Node, Scene)):
         return source
+    if isinstance(source, TriangleMesh):
+        from ..mesh.models import from_trimesh
+
+        return from_trimesh(source)
     if isinstance(source, Formula):
         raise SceneError(f"{source.name}: expected a shape, {source.name}(...), found the formula itself")
     if not isinstance(source, (str, os.PathLike)):
         wanted = "expected a shape such as sphere(), a scene, a file or a name"
-        made = "; formulas.shape makes a formula of a function" if callable(source) else ""
-        raise SceneError(f"{short_repr(source)}: {wanted}{made}")
+        how = "; formulas.shape makes a formula of a function" if callable(source) else ""
+        raise SceneError(f"{short_repr(source)}: {wanted}{how}")
     path = Path(source)
+    if path.suffix.lower() in MODELS:
+        return get("model")(os.fspath(source))
     if path.exists() or path.name != os.fspath(source) or path.suffix:
         return read(path)
     name = os.fspath(source)

@@ -90,6 +90,7 @@ class Parameter(ABC):
 
     default: Any
     doc: str
+    implied: ClassVar[bool] = False  # true if the other values of an element determine it
 
     @property
     @abstractmethod
@@ -353,7 +354,15 @@ class Label(Parameter):
 
 @dataclass(frozen=True)
 class File(Parameter):
-    """Name of a file; in a scene file, relative to its folder."""
+    """Name of a file; in a scene file, relative to its folder.
+
+    Attributes
+    ----------
+    inside : bool
+        True if it must lie in that folder, unless the reader is told that it need not.
+    """
+
+    inside: bool = False
 
     @property
     def expects(self) -> str:
@@ -363,6 +372,22 @@ class File(Parameter):
         if not isinstance(value, str) or not value.isprintable():
             raise ValueError(self.expects)
         return value.strip()
+
+
+@dataclass(frozen=True)
+class Digest(Parameter):
+    """SHA-256 of a file; without it, that of the file as it is."""
+
+    implied = True
+
+    @property
+    def expects(self) -> str:
+        return "the SHA-256 of the file, 64 hexadecimal digits"
+
+    def check(self, value: Any) -> Any:
+        if not isinstance(value, str) or not re.fullmatch("[0-9a-f]{64}", value):
+            raise ValueError(self.expects)
+        return value
 
 
 R = TypeVar("R")

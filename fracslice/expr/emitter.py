@@ -21,7 +21,7 @@ from llvmlite import ir
 
 from ..errors import KernelError
 from . import lanes_math
-from .intervals import Interval, Possible
+from .intervals import Interval, Possible, enclosed
 from .language import assigned_names, parse_expression
 from .registers import Vec
 from .values import (
@@ -150,6 +150,7 @@ SPECIAL = {
     "lower": 1,
     "upper": 1,
     "gather": 2,
+    "solid_distance": 4,
 }
 """Special intrinsics and their numbers of arguments."""
 
@@ -253,6 +254,30 @@ class SpecialIntrinsics:
                 loaded = self.builder.insert_element(loaded, self.builder.load(address), lane)
             parts.append(loaded)
         return Vec(self.builder, tuple(parts))
+
+    def intrinsic_solid_distance(self, x: Value, y: Value, z: Value, solid: Value) -> Value:
+        """Emit a question to the native code at an address, given as words, about all lanes."""
+        words = [number(self.builder, word, WHOLE) for word in solid]
+        shifted = (self.builder.shl(word, ir.Constant(WHOLE, 16 * k)) for k, word in enumerate(words))
+        address, point = reduce(self.builder.or_, shifted), self.numbers(x, y, z)
+        if isinstance(point[0], Interval):
+            return enclosed(lambda *middle: self.asked(address, middle), *point)
+        return self.asked(address, point)
+
+    def asked(self, address: Any, point: Sequence[Vec]) -> Vec:
+        """Emit the call of a function of `native/mesh/solid.h`: values at the points of all lanes."""
+        real, size, builder = self.lanes.scalar, self.lanes.width, self.builder
+        # In the first block of its function: in a loop, the stack would grow.
+        rows = builder.alloca(real, 4 * size)
+        rows.align = 64
+        for k, coordinate in enumerate(point):
+            self.intrinsic_store(rows, ir.Constant(WHOLE, k * size), coordinate)
+        result, place = builder.gep(rows, [ir.Constant(WHOLE, 3 * size)]), ir.IntType(8).as_pointer()
+        kind = ir.FunctionType(ir.VoidType(), [place, rows.type, rows.type, WHOLE]).as_pointer()
+        entries = builder.inttoptr(address, kind.as_pointer())
+        function = builder.load(builder.gep(entries, [ir.Constant(WHOLE, self.lanes.bits // 64)]))
+        builder.call(function, [builder.inttoptr(address, place), rows, result, ir.Constant(WHOLE, size)])
+        return self.intrinsic_load(result, ir.Constant(WHOLE, 0))
 
     def registers(self, place: Any, index: Value) -> list[Any]:
         """Addresses of the registers of lanes, starting at an array element."""

@@ -78,6 +78,32 @@ class Fixed:
     value: Any
 
 
+WORDS = 4
+"""Numbers of P that an address takes, of 16 bits each: every float holds them."""
+
+
+@dataclass(frozen=True, eq=False)
+class InMemory:
+    """An argument that lies in memory, where native code reads it. In P stands the hash of its contents, and
+    in its place, in a loaded kernel, its address.
+
+    Attributes
+    ----------
+    digest : int
+        64 bits of a hash of the contents.
+    address : int
+        Where they are, while this object exists.
+    """
+
+    digest: int
+    address: int
+
+
+def words(number: int) -> tuple[float, ...]:
+    """Words of a number of 64 bits, the lowest first."""
+    return tuple(float(number >> 16 * k & 0xFFFF) for k in range(WORDS))
+
+
 def evaluated(function: Callable[..., Any]) -> Callable[..., Any]:
     """Decorate a function that is evaluated where a step is read."""
     EVALUATED.add(function)

@@ -307,6 +307,16 @@ class Interval:
         return Interval(low, high, self.of)
 
 
+def enclosed(distance: Callable[..., Bound], x: Interval, y: Interval, z: Interval) -> Interval:
+    """Values on cells of a function of points that is a distance: its L is 1."""
+    middle = [side.cell_middle() for side in (x, y, z)]
+    a, b, c = (side.cell_extent() for side in (x, y, z))
+    reach = (a * a + b * b + c * c).sqrt()
+    value = distance(*(side.lo for side in middle))
+    around = Interval(value, value, x.of).outward()
+    return Interval((around - reach).lo, (around + reach).hi, x.of)
+
+
 def on_cells(name: str) -> Callable[..., Any]:
     """Return a function of the vocabulary for NumPy that takes intervals, too."""
     plain = getattr(vocabulary, name)

@@ -27,7 +27,7 @@ import numpy as np
 from ..common.messages import hint
 from ..errors import KernelError
 from . import vocabulary
-from .functions import fingerprint, is_number, parameters, scope
+from .functions import InMemory, fingerprint, is_number, parameters, scope
 
 CHILD = "child"
 """Name of a domain operator's child function."""
@@ -212,10 +212,10 @@ def intrinsic_name(value: Any) -> str | None:
     return _INTRINSICS.get(id(value))
 
 
-INTRINSICS = frozenset({*vocabulary.NAMES, *vocabulary.OF_CELLS, *_PLAIN})
+INTRINSICS = frozenset({*vocabulary.NAMES, *vocabulary.OF_CELLS, *vocabulary.OF_MODELS, *_PLAIN})
 """Names that a text in the language may use without a definition."""
 
-_OWN = (*vocabulary.NAMES, *vocabulary.OF_CELLS, "orbit")
+_OWN = (*vocabulary.NAMES, *vocabulary.OF_CELLS, *vocabulary.OF_MODELS, "orbit")
 _INTRINSICS = {id(getattr(vocabulary, name)): name for name in _OWN} | {
     id(getattr(module, name)): _PYTHON.get(name, name)
     for module in (builtins, math)
@@ -433,10 +433,13 @@ class Linked:
         Source text with the signed field ``field(x, y, z, P)``.
     parameters
         Parameters P, float64 [n].
+    held
+        Arguments in memory, each with the index in P of its first word.
     """
 
     source: str
     parameters: np.ndarray
+    held: tuple[tuple[int, InMemory], ...] = ()
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Linked) and self._contents == other._contents

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .functions import WORDS, InMemory, words
 from .loops import Loop
 
 MAGIC, KIND = b"\x7fELF\x02\x01\x01", struct.pack("<HH", 1, 62)
@@ -214,8 +215,24 @@ def _by_llvm(code: bytes) -> Any:
     return engine
 
 
-def constant(values: np.ndarray, dtype: np.dtype | str) -> np.ndarray:
-    """Return a read-only, C-contiguous copy, which threads may share."""
-    kept = np.array(values, dtype, order="C")
+class Owner(np.ndarray):
+    """Array with addresses, and what lies there."""
+
+    held: Sequence[tuple[int, InMemory]] = ()
+
+
+def constant(
+    values: np.ndarray, dtype: np.dtype | str, held: Sequence[tuple[int, InMemory]] = ()
+) -> np.ndarray:
+    """Return a read-only, C-contiguous copy, which threads may share.
+
+    `held`: what lies in memory, each with the index of the numbers that become its address. The copy keeps it
+    alive.
+    """
+    kept = np.array(values, dtype, order="C").view(Owner if held else np.ndarray)
+    for place, memory in held:
+        kept[place : place + WORDS] = words(memory.address)
+    if isinstance(kept, Owner):
+        kept.held = held
     kept.setflags(write=False)
     return kept

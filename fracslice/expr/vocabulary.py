@@ -10,6 +10,8 @@ are written as floats (``2.0 * x``), so that each target can set the width of li
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 where = np.where
@@ -122,8 +124,28 @@ def cell_extent(a: np.ndarray) -> np.ndarray:
     return 0.0 * a
 
 
+def solid_distance(x: np.ndarray, y: np.ndarray, z: np.ndarray, solid: Any) -> np.ndarray:
+    """Signed distance to a triangle model, by native code. For the formula of models alone.
+
+    Parameters
+    ----------
+    x, y, z
+        Coordinates, of one shape.
+    solid
+        The model, a `registry.InMemory` with a method `distances`.
+
+    Returns
+    -------
+    ndarray
+    """
+    distances: np.ndarray = solid.distances(*np.broadcast_arrays(x, y, z))
+    return distances
+
+
 _FUNCTIONS = ("where", "sqrt", "rsqrt", "ratio", "log", "exp", "sin", "cos", "atan2", "floor")
 NAMES = frozenset((*_FUNCTIONS, "minimum", "maximum", "absolute", "any_of"))
 OF_CELLS = frozenset(("cell_middle", "cell_extent"))
 """Functions that only code of the kernel calls."""
+OF_MODELS = frozenset(("solid_distance",))
+"""Functions that only the formula of models calls."""
 __all__ = sorted(NAMES)

@@ -68,7 +68,7 @@ class CpuKernel(Kernel):
         self.width = lane_count(self.dtype.itemsize * 8)
         functions = load_functions(linked, self.dtype.itemsize * 8, self.width, (points, bricks))
         self._points, self._bricks = functions["points"], functions["bricks"]
-        self._parameters = constant(linked.parameters, self.dtype)
+        self._parameters = constant(linked.parameters, self.dtype, linked.held)
         self._offsets = constant(np.indices((8, 8, 8)).reshape(3, 512), self.dtype)
 
     @property
@@ -142,7 +142,7 @@ def compile_loops(linked: Linked, loops: tuple[Loop, ...], precision: Precision)
 
     `precision`: "float32" or "float64".
     """
-    parameters = constant(linked.parameters, precision)
+    parameters = constant(linked.parameters, precision, linked.held)
     bits = parameters.dtype.itemsize * 8
     width = lane_count(bits)
     functions = load_functions(linked, bits, width, loops)

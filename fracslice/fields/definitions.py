@@ -281,7 +281,7 @@ def _make_definition(definition: Definition, arguments: list[str], body: list[as
 
 
 def _check_names(definition: Definition) -> None:
-    taken = {*POINTS[definition.kind], *OWN, "place"}
+    taken = {*POINTS[definition.kind], *OWN, "source"}
     for name in dict(definition.parameters):
         if not is_name(name) or name in taken:
             raise definition.fail(1, f"parameter {name!r}: expected another name of lower-case letters")

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from ..common.cache import warn
 from ..common.parameters import Choice, validate_value
 from ..errors import DeviceError
 from .field import Device
+from .node import Node
 
 DEVICES = Choice("auto", "what computes", ("cpu", "cuda", "auto"))
 """Parameter of the device to compute on."""
@@ -23,6 +25,14 @@ def choose_device(device: str) -> Device:
     if reason and device == "cuda":
         raise DeviceError(f"device cuda: {reason}")
     return "cpu" if reason else "cuda"
+
+
+def for_field(root: Node, device: Device) -> Device:
+    """Select the CPU for a field with a triangle model, which lies in its memory, with one warning."""
+    if device == "cpu" or all(node.formula.name != "model" for node in root.solids()):
+        return device
+    warn("a scene with a <model> is computed on the CPU, in whose memory its triangles are")
+    return "cpu"
 
 
 def for_picture(device: str, size: tuple[int, int], samples: int) -> str:

@@ -49,6 +49,9 @@ def graph(
 
     `scale`: length of a scene unit.
     """
+    for node in root.solids():
+        if node.formula.name == "model":
+            raise node.fail("is made of triangles: expected formulas alone, or a mesh of them")
     linked, made = link(root), _Graph()
     scope: dict[str, Any] = {name: made.function(name) for name in FUNCTIONS}
     scope |= {"where": made.where, "any_of": made.any_of, CALLED: lambda function: function}

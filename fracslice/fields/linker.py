@@ -24,7 +24,7 @@ import numpy as np
 from ..common.parameters import AUTO
 from ..errors import KernelError
 from ..expr import functions
-from ..expr.functions import Fixed
+from ..expr.functions import Fixed, InMemory
 from ..expr.language import CALLED, CHILD, FIELD, Linked, parse, parse_expression
 from . import source
 from .source import Arguments, append_numbers, arguments
@@ -118,7 +118,9 @@ class _Tree:
         stack = [root]
         while stack:
             node = stack.pop()
-            self.linker.parameters += self.given[id(node)].numbers
+            given, start = self.given[id(node)], len(self.linker.parameters)
+            self.linker.held += [(start + place, memory) for place, memory in given.held]
+            self.linker.parameters += given.numbers
             stack += reversed(self.inside[id(node)])
         return self.parts[id(root)]
 
@@ -292,7 +294,7 @@ def link(root: Node) -> Linked:
     """
     linker = Linker()
     linker.field(root)
-    return Linked(linker.text(), linker.numbers())
+    return linker.linked()
 
 
 @dataclass
@@ -305,6 +307,7 @@ class Linker:
     called: set[str] = field(default_factory=set)  # names of the functions that are called, not inlined
     # arrays that stand behind the numbers in P, each with the index of the number that is its offset
     tables: list[tuple[int, np.ndarray]] = field(default_factory=list)
+    held: list[tuple[int, InMemory]] = field(default_factory=list)  # see `Linked`
     _parts: dict[Any, Subroutine] = field(default_factory=dict)
     _shared: dict[Any, str] = field(default_factory=dict)
 
@@ -388,6 +391,10 @@ class Linker:
         self.functions[name] = (
             f"def {name}({', '.join([*rest, 'P'])}):\n    return {called}({', '.join(passed)})"
         )
+
+    def linked(self) -> Linked:
+        """Return what is written and collected."""
+        return Linked(self.text(), self.numbers(), tuple(self.held))
 
     def text(self) -> str:
         """Return the text of all functions."""

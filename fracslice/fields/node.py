@@ -8,10 +8,10 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from inspect import Parameter, Signature
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal, Protocol, cast, runtime_checkable
 
 from ..common.messages import hint
-from ..common.parameters import REQUIRED, Choice, Count, Vector, parameter_lines, python_name
+from ..common.parameters import REQUIRED, Choice, Count, Digest, File, Vector, parameter_lines, python_name
 from ..errors import SceneError
 from .box import Axis, Box, direction, three
 from .field import Bounds, Cells, Device, Field, Kernel, Loops, Precision
@@ -24,6 +24,19 @@ if TYPE_CHECKING:
 
 FORMULAS: dict[str, Formula] = {}
 """Every registered formula by the name of its element."""
+
+
+@runtime_checkable
+class TriangleMesh(Protocol):
+    """Mesh of this or another library."""
+
+    @property
+    def vertices(self) -> Any:
+        """Positions, [n, 3]."""
+
+    @property
+    def faces(self) -> Any:
+        """Vertex indices, [m, 3], counter-clockwise seen from outside."""
 
 
 class Operators:
@@ -42,18 +55,39 @@ class Operators:
 
     __array_ufunc__ = None  # makes NumPy defer to the operators of the shape
 
-    def __or__(self, other: Node) -> Node:
-        """Union of two shapes."""
-        return _fold_operator("union", self, other) if isinstance(other, Operators) else NotImplemented
+    def __or__(self, other: Node | TriangleMesh) -> Node:
+        """Union of two shapes; of a shape and a mesh, too."""
+        shape = _shape(other)
+        return NotImplemented if shape is None else _fold_operator("union", self, shape)
 
-    def __and__(self, other: Node) -> Node:
-        """Intersection of two shapes."""
-        return _fold_operator("intersection", self, other) if isinstance(other, Operators) else NotImplemented
+    def __and__(self, other: Node | TriangleMesh) -> Node:
+        """Intersection of two shapes; of a shape and a mesh, too."""
+        shape = _shape(other)
+        return NotImplemented if shape is None else _fold_operator("intersection", self, shape)
 
-    def __sub__(self, other: Node) -> Node:
-        """Difference of two shapes."""
-        pieces = _elements("difference", self)
-        return _make_node("difference", *pieces, other) if isinstance(other, Operators) else NotImplemented
+    def __sub__(self, other: Node | TriangleMesh) -> Node:
+        """Difference of two shapes; of a shape and a mesh, too."""
+        shape = _shape(other)
+        return (
+            NotImplemented
+            if shape is None
+            else _make_node("difference", *_elements("difference", self), shape)
+        )
+
+    def __ror__(self, mesh: TriangleMesh) -> Node:
+        """Union of a mesh and this shape."""
+        shape = _shape(mesh)
+        return NotImplemented if shape is None else shape | cast("Node", self)
+
+    def __rand__(self, mesh: TriangleMesh) -> Node:
+        """Intersection of a mesh and this shape."""
+        shape = _shape(mesh)
+        return NotImplemented if shape is None else shape & cast("Node", self)
+
+    def __rsub__(self, mesh: TriangleMesh) -> Node:
+        """Difference of a mesh and this shape."""
+        shape = _shape(mesh)
+        return NotImplemented if shape is None else shape - cast("Node", self)
 
     def __add__(self, offset: Sequence[float] | NDArray[Any]) -> Node:
         """Translation by an offset (x, y, z)."""
@@ -288,6 +322,17 @@ class Operators:
         return distance(cast("Node", self), points)
 
 
+def _shape(given: Any) -> Node | None:
+    """A shape itself, or the solid of a mesh; None for anything else."""
+    if isinstance(given, Operators):
+        return cast("Node", given)
+    if not isinstance(given, TriangleMesh):
+        return None
+    from ..mesh.models import from_trimesh
+
+    return from_trimesh(given)
+
+
 def _make_node(name: str, *elements: Operators, **values: Any) -> Node:
     """Node of the formula with this name."""
     node: Node = FORMULAS[name](*cast("tuple[Node, ...]", elements), **values)
@@ -359,6 +404,8 @@ def annotation(parameter: Any) -> Any:
             type_ = float | several if 1 in sizes else several
         case Choice(choices=choices):
             type_ = Literal[*choices]
+        case File() | Digest():
+            type_ = str
         case _:
             type_ = float
     return type_ | None if parameter.default is None else type_
@@ -480,8 +527,11 @@ class Node(Operators, Field):
         SceneError
             For an invalid value or number of children.
         """
-        kept = self.children if children is None else children
-        return self.formula(*kept, place=self.place, **{**_given_values(self), **values})
+        kept, given = self.children if children is None else children, _given_values(self)
+        if values:
+            kinds = self.formula.parameters
+            given = {name: value for name, value in given.items() if not kinds[name].implied}
+        return self.formula(*kept, source=self.place, **{**given, **values})
 
     def conservative(self) -> Node:
         """Conservative tree, for skipping empty space where the node's own field exceeds its bound.

@@ -92,7 +92,7 @@ LIPSCHITZ = 2.0
 class _Orbit(Formula):
     """Formula of hybrids, and the decorator of steps."""
 
-    def __call__(self, *steps: Any, place: str | None = None, **values: Any) -> Any:
+    def __call__(self, *steps: Any, source: str | None = None, **values: Any) -> Any:
         """Make a hybrid of some steps, or register the escape-time fractal of a step ``f(w, c, ...)``.
 
         A step returns the next point from the last one, w, and a constant c: the start point, or that of a
@@ -101,8 +101,8 @@ class _Orbit(Formula):
         if the one derived from the text is not good enough. Everything else follows from the step: its
         derivative, the radius of escape, the box, the field, and the kernels.
         """
-        if steps or place or not all(isinstance(kind, Parameter) for kind in values.values()):
-            return super().__call__(*steps, place=place, **values)
+        if steps or source or not all(isinstance(kind, Parameter) for kind in values.values()):
+            return super().__call__(*steps, source=source, **values)
         return _registered(values)
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..expr import vocabulary
-from ..expr.intervals import Interval, on_cells
+from ..expr.functions import words
+from ..expr.intervals import Interval, enclosed, on_cells
 from ..expr.language import CALLED, FIELD
 from .linker import link
 
@@ -55,7 +57,13 @@ def enclosure(root: Node) -> Callable[[Interval, Interval, Interval], Interval]:
 def _field(root: Node, scope: dict[str, Any]) -> Callable[..., Any]:
     """Field of a tree with given functions of the vocabulary."""
     linked = link(root)
-    scope[CALLED] = lambda function: function
+    memory = {words(memory.digest): memory for _, memory in linked.held}
+
+    def solid_distance(x: Any, y: Any, z: Any, solid: tuple[float, ...]) -> Any:
+        distance = partial(vocabulary.solid_distance, solid=memory[tuple(solid)])
+        return enclosed(distance, x, y, z) if isinstance(x, Interval) else distance(x, y, z)
+
+    scope |= {CALLED: lambda function: function, "solid_distance": solid_distance}
     exec(compile(linked.source, "<linked scene>", "exec"), scope)
 
     def evaluate(*points: Any) -> Any:

@@ -120,6 +120,10 @@ class Hooks:
         """Set the hook that returns the node without detail finer than a voxel size in its own units."""
         return self._hook("visible", hook)
 
+    def completed(self, hook: Callable[[dict[str, Any]], dict[str, Any]]) -> Hook:
+        """Set the hook that returns the values with those that they imply."""
+        return self._hook("completed", hook)
+
     def check(self, hook: Callable[[Node], None]) -> Callable[[Node], None]:
         """Set the hook that raises `SceneError` for values that are valid alone but not together."""
         return self._hook("check", hook)
@@ -195,14 +199,14 @@ class Formula(Hooks):
         """Signature of the formula as a Python function."""
         return signature(self, Node)
 
-    def __call__(self, *arguments: Any, place: str | None = None, **keywords: Any) -> Node:
+    def __call__(self, *arguments: Any, source: str | None = None, **keywords: Any) -> Node:
         """Make a scene node.
 
         Parameters
         ----------
         *arguments
             Values of a shape in order; for other formulas, the elements inside.
-        place : str, optional
+        source : str, optional
             "file:line" of the element.
         **keywords
             Parameter values by name.
@@ -218,7 +222,8 @@ class Formula(Hooks):
         """
         elements, values = bind_arguments(self, arguments, keywords)
         checked = {name: self._value(name, values.get(name)) for name in self.parameters}
-        node = Node(self, MappingProxyType(checked), self._grouped(elements), place)
+        checked = self.hooks.get("completed", lambda given: given)(checked)
+        node = Node(self, MappingProxyType(checked), self._grouped(elements), source)
         if node.depth > DEEPEST:
             raise node.fail(TOO_DEEP)
         self.hooks.get("check", lambda _: None)(node)

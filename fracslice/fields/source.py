@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import KernelError
 from ..expr import functions, language
-from ..expr.functions import Fixed
+from ..expr.functions import Fixed, InMemory, words
 from ..expr.host import kept_text
 from ..expr.language import Folding, parse, stored_names
 
@@ -198,6 +198,7 @@ class Arguments:
     fixed: tuple[tuple[str, Any], ...]  # arguments substituted in a copy of the function
     passed: tuple[str, ...]  # expressions that read the other arguments from P, in the function's order
     numbers: tuple[float, ...]  # numbers in P
+    held: tuple[tuple[int, InMemory], ...] = ()  # arguments in memory, by the index of their first word
 
 
 def arguments(node: Node, leading: int) -> Arguments:
@@ -213,14 +214,18 @@ def arguments(node: Node, leading: int) -> Arguments:
         )
     fixed = tuple((name, values[name].value) for name in names if isinstance(values[name], Fixed))
     numbers: list[float] = []
-    passed = [
-        append_numbers(values[name], numbers, "P0") for name in names if not isinstance(values[name], Fixed)
-    ]
-    return Arguments(function, fixed, tuple(passed), tuple(numbers))
+    passed, held = [], []
+    for value in (values[name] for name in names if not isinstance(values[name], Fixed)):
+        if isinstance(value, InMemory):
+            held.append((len(numbers), value))
+        passed.append(append_numbers(value, numbers, "P0"))
+    return Arguments(function, fixed, tuple(passed), tuple(numbers), tuple(held))
 
 
 def append_numbers(value: Any, numbers: list[float], origin: str = "") -> str:
-    """Append a number or a tuple of numbers to a list."""
+    """Append a number or a tuple of numbers to a list; of an argument in memory its hash."""
+    if isinstance(value, InMemory):
+        value = words(value.digest)
     if isinstance(value, tuple):
         return f"({', '.join(append_numbers(v, numbers, origin) for v in value)},)"
     place = f"{origin} + {len(numbers)}" if origin else str(len(numbers))

@@ -13,6 +13,7 @@ from ..common.cache import key as hashed
 from ..expr.intervals import TINY
 from ..expr.loops import Loop, enclosures
 from . import cpu
+from .devices import for_field
 from .field import Cells, Device, Field, Kernel, Loops, Precision
 from .linker import link
 
@@ -50,7 +51,7 @@ class Enclosures:
 
 def kernel(root: Node, device: Device, precision: Precision) -> Kernel:
     """Compile the kernel of a tree with resolved depths; see `Field.kernel`."""
-    if device == "cpu":
+    if for_field(root, device) == "cpu":
         return cpu.compile_scene(root, precision)
     from . import cuda
 
@@ -59,7 +60,7 @@ def kernel(root: Node, device: Device, precision: Precision) -> Kernel:
 
 def linked_loops(root: Node, loops: Sequence[Loop], precision: Precision, device: Device = "cpu") -> Loops:
     """Compile loops over a tree with resolved depths; see `Field.loops`."""
-    if device == "cpu":
+    if for_field(root, device) == "cpu":
         return cpu.compile_loops(link(root), tuple(loops), precision)
     from . import cuda_launching
 

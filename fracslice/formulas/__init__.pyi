@@ -745,7 +745,7 @@ def mandelbulb(power: float = 8.0, iterations: Union[int, Literal['auto']] = 'au
     Node
     """
 
-def material(*elements: Node, colour: Sequence[float] = (0.8, 0.8, 0.8), palette: Literal['colours', 'viridis', 'plasma', 'inferno', 'magma', 'cividis', 'twilight'] = 'colours', trap: Literal['point', 'axes', 'planes', 'sphere', 'steps', 'direction'] = 'point', texture: float | None = None, tile: float = 1.0, repeats: float = 1.0, shift: float = 0.0, specular: float = 0.2, shininess: float = 32.0, glow: float = 0.0, reflect: float = 0.0, roughness: float = 0.0, vary: float = 0.0, coat: float = 0.0, metallic: float = 0.0, clear: float = 0.0, index: float = 1.5, absorb: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
+def material(*elements: Node, colour: Sequence[float] = (0.8, 0.8, 0.8), palette: Literal['colours', 'viridis', 'plasma', 'inferno', 'magma', 'cividis', 'twilight'] = 'colours', trap: Literal['point', 'axes', 'planes', 'sphere', 'steps', 'direction'] = 'point', texture: str | None = None, tile: float = 1.0, repeats: float = 1.0, shift: float = 0.0, specular: float = 0.2, shininess: float = 32.0, glow: float = 0.0, reflect: float = 0.0, roughness: float = 0.0, vary: float = 0.0, coat: float = 0.0, metallic: float = 0.0, clear: float = 0.0, index: float = 1.5, absorb: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
     """The appearance of the element in pictures. A material nested deeper takes precedence.
 
     A palette shows the smallest distance of the orbit to the origin (point), to the axes or to the coordinate
@@ -831,6 +831,29 @@ def mirror(*elements: Node, axis: Literal['x', 'y', 'z']) -> Node:
         What it is applied to; several are a union.
     axis : x, y or z
         normal of the mirror plane: the half on its positive side is mirrored to the other side
+
+    Returns
+    -------
+    Node
+    """
+
+def model(file: str, size: float | None = None, place: Literal['as is', 'centre', 'bed'] = 'as is', units: Literal['um', 'µm', 'mm', 'cm', 'in', 'm'] = 'mm', sha256: str | None = None) -> Node:
+    """A triangle model, closed and without self-intersections. L = 1: the exact distance to its triangles, on
+    the side that Baerentzen and Aanaes 2005, "Signed Distance Computation Using the Angle Weighted
+    Pseudonormal", have.
+
+    Parameters
+    ----------
+    file : the name of a file
+        an STL, OBJ, PLY, GLB or 3MF file, in the folder of the scene
+    size : a number > 0
+        the longest side; without it, a scene unit is a millimetre of the model
+    place : as is, centre or bed, default 'as is'
+        where the file has it, with its box centred at the origin, or there with its lowest point at z = 0
+    units : um, µm, mm, cm, in or m, default 'mm'
+        unit of an STL, OBJ or PLY file; GLB and 3MF state their own
+    sha256 : the SHA-256 of the file, 64 hexadecimal digits
+        hash of the file, by which a file that has changed is noticed
 
     Returns
     -------

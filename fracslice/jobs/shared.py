@@ -47,7 +47,7 @@ class MeshRecipe:
 
     def plan(self) -> Plan:
         """Plan the field."""
-        scene, clock = reads(self.scene, self.name), Clock(Work(threads=1))
+        scene, clock = reads(self.scene, self.name, files_outside=True), Clock(Work(threads=1))
         size = sizing(scene, self.what.size, self.what.scale, clock.work)
         sized = plan_mesh(scene, self.what, size, clock)
         return (apply_edits(sized.planned, scene, self.what, size, clock) if self.edited else sized).planned

@@ -92,7 +92,7 @@ class SliceRecipe:
 
     def run(self, work: Work, scene: Scene | None = None) -> SliceRun:
         """Plan the layers; see `Recipe.run`."""
-        scene, job = scene or reads(self.scene, self.name), self.job
+        scene, job = scene or reads(self.scene, self.name, files_outside=True), self.job
         size = sizing(scene, job.size, job.scale, work)
         stack = plan_layers(scene.root, job, work, size)
         about = {"Title": self.name, "scene_hash": scene.hash}

@@ -34,9 +34,9 @@ class Tree(NamedTuple):
     high: NDArray[np.float64]
 
 
-def build(mesh: Mesh, threads: int = 0) -> Tree:
-    """Build the tree of a mesh, in O(m)."""
-    return Tree(*_tree(mesh.vertices, mesh.triangles, threads))
+def build(mesh: Mesh, threads: int = 0, halved: bool = False) -> Tree:
+    """Build the tree of a mesh, in O(m); in O(m log m) in halves of boxes, which makes searches faster."""
+    return Tree(*_tree(mesh.vertices, mesh.triangles, threads, halved))
 
 
 CHUNK = 1 << 17

@@ -57,7 +57,7 @@ class CpuTracer:
     def aim(self, frame: Frame) -> None:
         """Load the parameters of another frame of the same source, such as another camera or depth."""
         self.frame = frame
-        self._parameters = constant(frame.linked.parameters, self.dtype)
+        self._parameters = constant(frame.linked.parameters, self.dtype, frame.linked.held)
         self._shift, self._blocks, self._starts = WHOLE, 1, np.zeros(1, self.dtype)
 
     def look_ahead(self, work: Work) -> None:

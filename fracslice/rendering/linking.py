@@ -178,7 +178,7 @@ class _Frame:
         self.bounces = self.view.shading.bounces if look.bounces and self.lit else 0
         linker.functions["background"] = self.lighting.background()
         linker.functions["surface"] = self.surface(look)
-        linked = Linked(linker.text(), linker.numbers())
+        linked = linker.linked()
         samples = camera_samples, self.drawn.count
         kind = self.sharp, self.lit, self.view.film.transparent, self.lighting.weighted
         faintest = 0.0 if self.paths else FAINTEST

@@ -179,7 +179,9 @@ class Live:
         size: tuple[int, int] = (960, 540),
         work: Work | None = None,
         device: str = "auto",
+        files_outside: bool = False,
     ) -> None:
+        self._files_outside = files_outside
         self._path, self._settings, self._size, self._device = Path(path), settings, size, device
         self._refining = replace(work or Work(), cancel=threading.Event())
         self._drafting = replace(self._refining, cancel=threading.Event())  # input must not stop a draft
@@ -198,7 +200,7 @@ class Live:
         self._thread.start()
 
     def _read(self) -> Scene:
-        return read(self._path).with_values(self._settings)
+        return read(self._path, files_outside=self._files_outside).with_values(self._settings)
 
     @property
     def camera(self) -> Camera:

@@ -18,7 +18,7 @@ from ..common.cache import key, program
 from ..common.memory import available_bytes
 from ..common.parameters import Number, picture_size, validate_value
 from ..errors import ClusterError, RenderError
-from ..fields.devices import choose_device
+from ..fields.devices import choose_device, for_field
 from ..fields.registry import Node
 from ..scene import Scene, reads, to_xml
 from ..scene.view import Camera, Film, View
@@ -168,7 +168,7 @@ def _renderer(
 
     of = scene, film, crop, samples
     if getattr(_OWN, "of", None) != of:
-        read = reads(scene)
+        read = reads(scene, files_outside=True)
         _OWN.renderer = Renderer(read.root, read.view, film, Work(threads=1), "cpu", samples, crop)
         _OWN.of = of
     renderer: Renderer = _OWN.renderer
@@ -347,7 +347,7 @@ class Renderer:
         _check_memory(self.crop)
         self.width, self.height = self.crop.width, self.crop.height
         self.work = work or Work()
-        self.device = choose_device(device if self.work.cluster is None else "cpu")
+        self.device = for_field(root, choose_device(device if self.work.cluster is None else "cpu"))
         setup = prepare(root, view, film)
         self.setup = replace(setup, optics=replace(setup.optics, origin=self.crop.origin))
         self.dtype = np.dtype(self.setup.precision)

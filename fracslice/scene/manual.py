@@ -19,7 +19,18 @@ from xml.etree import ElementTree as Tree
 
 from .. import formulas as formula_package
 from ..common.messages import hint
-from ..common.parameters import MILLIMETRES, REQUIRED, Axis, Choice, Count, File, Length, Number, Vector
+from ..common.parameters import (
+    MILLIMETRES,
+    REQUIRED,
+    Axis,
+    Choice,
+    Count,
+    Digest,
+    File,
+    Length,
+    Number,
+    Vector,
+)
 from ..errors import SceneError
 from ..expr import vocabulary
 from ..fields.node import docstring, signature
@@ -291,6 +302,10 @@ def _text(parent: Tree.Element, _: File | Seconds | AttributePath | Keys) -> Non
     Tree.SubElement(parent, "data", type="string")
 
 
+def _digest(parent: Tree.Element, _: Digest) -> None:
+    _param(Tree.SubElement(parent, "data", type="string"), "pattern", "[0-9a-f]{64}")
+
+
 def _length(parent: Tree.Element, kind: Length) -> None:
     _param(Tree.SubElement(parent, "data", type="string"), "pattern", _LENGTH)
 
@@ -302,6 +317,7 @@ _PATTERNS: dict[type, Any] = {
     Axis: _choices,
     Choice: _choices,
     Length: _length,
+    Digest: _digest,
     File: _text,
     Identifier: _identifier,
     Seconds: _text,

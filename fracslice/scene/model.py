@@ -5,12 +5,12 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
-from ..common.parameters import AUTO, AnyLength, Vector, parse_length, short_repr
+from ..common.parameters import AUTO, AnyLength, File, Vector, parse_length, short_repr
 from ..errors import SceneError
 from ..fields.definitions import Definition, definitions
 from ..formulas import Node, get
@@ -88,9 +88,9 @@ class Scene:
     def hash(self) -> str:
         """First 12 hexadecimal digits of the SHA-256 of the canonical XML.
 
-        Equal scenes have equal hashes on every platform.
+        Equal scenes have equal hashes on every platform, and in every folder.
         """
-        return hashlib.sha256(to_xml(self).encode()).hexdigest()[:12]
+        return hashlib.sha256(identity(self).encode()).hexdigest()[:12]
 
     def with_values(self, settings: Iterable[str]) -> Scene:
         """Return a copy with changed values.
@@ -208,7 +208,20 @@ def to_xml(scene: Scene) -> str:
     """
     if isinstance(scene, Node):
         raise SceneError(f"{short_repr(scene)}: expected a scene, such as Scene(sphere(), 40)")
-    return "\n".join(_lines(scene)) + "\n"
+    return "\n".join(_lines(scene, scene.root)) + "\n"
+
+
+def identity(scene: Scene) -> str:
+    """Return the canonical scene file with the hashes of models, and without the names of their files."""
+    return "\n".join(_lines(scene, _unnamed(scene.root))) + "\n"
+
+
+def _unnamed(node: Node) -> Node:
+    """The tree without the names of files whose hash it holds."""
+    kinds, values = node.formula.parameters, node.values
+    if any(kind.implied for kind in kinds.values()):
+        values = {name: value for name, value in values.items() if not isinstance(kinds[name], File)}
+    return replace(node, values=values, children=tuple(map(_unnamed, node.children)))
 
 
 def part_to_xml(part: Part | Print) -> str:
@@ -218,12 +231,12 @@ def part_to_xml(part: Part | Print) -> str:
     return f"<{section.name}{_attributes(section, values)}/>"
 
 
-def _lines(scene: Scene) -> Iterator[str]:
+def _lines(scene: Scene, root: Node) -> Iterator[str]:
     yield f"<{SCENE.name}{_attributes(SCENE, {'version': VERSION})}>"
-    for definition in definitions(scene.root):
+    for definition in definitions(root):
         yield from _definition(definition)
     yield f"  <{SOLID.name}{_attributes(SOLID, {'size': scene.size_mm, 'unit': scene.unit_mm})}>"
-    yield from _element(scene.root, "    ")
+    yield from _element(root, "    ")
     yield f"  </{SOLID.name}>"
     printing = () if scene.printing == Print() else (scene.printing,)
     film = () if scene.animation is None else (scene.animation, *scene.tracks)

@@ -52,13 +52,15 @@ BEFORE = b"\0\xff\xfe\xef\xbb\xbf \t\r\n"
 """Bytes allowed before the first tag, or within it in UTF-16: byte order marks and white space."""
 
 
-def read(path: str | os.PathLike[str]) -> Scene:
+def read(path: str | os.PathLike[str], *, files_outside: bool = False) -> Scene:
     """Read a scene file.
 
     Parameters
     ----------
     path : str or path
         The file; the scene is named after it.
+    files_outside : bool
+        Whether models may lie outside of the scene's folder.
 
     Returns
     -------
@@ -76,10 +78,10 @@ def read(path: str | os.PathLike[str]) -> Scene:
             data = file.read(LARGEST_FILE + 1)
     except OSError as error:
         raise SceneError(f"{source}: {error.strerror or error}") from None
-    return _scene(data, source, printable(Path(source).stem))
+    return _scene(data, source, printable(Path(source).stem), files_outside)
 
 
-def reads(text: str | bytes, name: str = "scene") -> Scene:
+def reads(text: str | bytes, name: str = "scene", *, files_outside: bool = False) -> Scene:
     """Parse a scene.
 
     Parameters
@@ -88,6 +90,8 @@ def reads(text: str | bytes, name: str = "scene") -> Scene:
         XML.
     name : str
         Name of the scene, and of the file in error messages.
+    files_outside : bool
+        Whether models may lie outside of the current folder.
 
     Returns
     -------
@@ -99,10 +103,10 @@ def reads(text: str | bytes, name: str = "scene") -> Scene:
     SceneError
         If the text is invalid.
     """
-    return _scene(text.encode() if isinstance(text, str) else text, name, name)
+    return _scene(text.encode() if isinstance(text, str) else text, name, name, files_outside)
 
 
-def _scene(data: bytes, source: str, name: str) -> Scene:
+def _scene(data: bytes, source: str, name: str, files_outside: bool) -> Scene:
     if data[:64].translate(None, BEFORE)[:1] not in (b"", b"<"):
         raise SceneError(f'{source}: not a scene: expected XML that begins with <scene version="1">')
     if len(data) > LARGEST_FILE:
@@ -112,7 +116,7 @@ def _scene(data: bytes, source: str, name: str) -> Scene:
     tags = data.replace(b"\0", b"")  # of UTF-16
     if tags.count(b"<") - tags.count(b"</") > MOST_ELEMENTS:
         raise SceneError(f"{source}: expected a scene of at most {MOST_ELEMENTS} elements")
-    builder = _Builder(source)
+    builder = _Builder(source, files_outside)
     solid = builder.sections(data)[SOLID.name]
     others = (Print, Animation, Track)
     printing = next((part for part in builder.parts if isinstance(part, Print)), Print())
@@ -147,8 +151,8 @@ class _Open:
 class _Builder:
     """Builds nodes from the leaves up during parsing, without recursion at any depth."""
 
-    def __init__(self, source: str) -> None:
-        self.source = source
+    def __init__(self, source: str, files_outside: bool) -> None:
+        self.source, self.files_outside = source, files_outside
         self.open: list[_Open] = []
         self.done: dict[str, _Open] = {}
         self.parts: list[Part] = []
@@ -195,9 +199,15 @@ class _Builder:
 
     def located(self, value: Any, opened: _Open, attribute: str) -> Any:
         """The value of an attribute; the name of a file is relative to the scene's folder."""
-        if isinstance(opened.element.parameters[attribute], File) and value:
-            return str(Path(self.source).absolute().parent / value)
-        return value
+        kind = opened.element.parameters[attribute]
+        if not isinstance(kind, File) or not value:
+            return value
+        folder = Path(self.source).absolute().parent
+        path = folder / value
+        if kind.inside and not self.files_outside and not path.resolve().is_relative_to(folder.resolve()):
+            expected = "expected a file in the folder of the scene, or --allow-files-outside"
+            raise opened.fail(f"{attribute}={_quote(value)}: {expected}")
+        return str(path)
 
     def element(self, name: str) -> Element:
         """The element of this name, if it is allowed here."""
@@ -233,7 +243,7 @@ class _Builder:
             return
         try:
             with computing(closed.fail):
-                node = closed.element(*closed.children, place=closed.place, **closed.values)
+                node = closed.element(*closed.children, source=closed.place, **closed.values)
         except SceneError as error:
             placed = str(error).startswith(f"{self.source}:")
             raise error if placed else SceneError(f"{closed.place}: {error}") from None

@@ -120,6 +120,7 @@ def fly(
     size: tuple[int, int] = (960, 540),
     work: Work | None = None,
     device: str = "auto",
+    files_outside: bool = False,
 ) -> Camera:
     """Open a window on a scene file.
 
@@ -140,6 +141,8 @@ def fly(
         Threads, progress and cancellation.
     device : {"cpu", "cuda", "auto"}
         Device that traces the rays.
+    files_outside : bool
+        Whether models may lie outside of the scene's folder.
 
     Returns
     -------
@@ -157,7 +160,7 @@ def fly(
     """
     need_screen()
     work = work or Work()
-    live = Live(path, settings, size, work, device)
+    live = Live(path, settings, size, work, device, files_outside)
     try:
         Viewer(live, size, work.cancel.is_set).open()
     finally:

@@ -15,6 +15,7 @@ from fracslice.common.parameters import REQUIRED, python_name
 from fracslice.errors import SceneError
 from fracslice.formulas import get, names
 from fracslice.scene.manual import package_stub, stub
+from tests.examples import BRACKET
 
 SHIPPED = [name for name in names() if get(name).function.__module__.startswith("fracslice.")]
 
@@ -48,9 +49,9 @@ def test_the_signature_is_the_registrys(name: str) -> None:
 
 @pytest.mark.parametrize("name", [n for n in SHIPPED if get(n).kind == "shape" and n != "orbit"])
 def test_positions_fill_parameters_in_the_order_of_the_signature(name: str) -> None:
-    bound = inspect.signature(get(name)).bind()
+    bound = inspect.signature(get(name)).bind(*([BRACKET] if name == "model" else []))
     bound.apply_defaults()
-    assert get(name)(*bound.args) == get(name)()
+    assert get(name)(*bound.args) == get(name)(*bound.args[: name == "model"])
     first = next(iter(bound.arguments))
     assert get(name)(bound.arguments[first]) == get(name)(**{first: bound.arguments[first]})
 

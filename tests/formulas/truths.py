@@ -13,6 +13,7 @@ from fracslice.fields.orbits import growth_of
 from fracslice.fields.reference import reference
 from fracslice.formulas import Node
 from fracslice.formulas.bulbs import DIAGONAL, DIAGONAL_AXIS
+from tests.examples import EXAMPLES
 
 Field = Callable[..., np.ndarray]
 Matrix = np.ndarray
@@ -181,7 +182,15 @@ GROUPS = {
 FRAME = rotation(DIAGONAL_AXIS, DIAGONAL)
 """The frame in which a step of `benesi` folds space."""
 
+BRACKET = f.model(EXAMPLES["model"]["file"])
+"""A prism over an L, of two boxes."""
+L_SHAPE = f.union(
+    f.transform(f.box((1.2, 0.5, 0.6)), translate=(0.1, -0.35, 0)),
+    f.transform(f.box((0.4, 1.4, 0.6)), translate=(-0.3, 0.1, 0)),
+)
+
 TRUTHS: dict[str, list[Truth]] = {
+    "model": [Volume(BRACKET, 0.576), Equal(BRACKET, L_SHAPE, rotation(X, 20) @ rotation(Z, 35), sign=True)],
     "sphere": [Equal(BALL, lambda *p: np.linalg.norm(p, axis=0) - 0.7), Volume(BALL, 4 / 3 * pi * 0.343)],
     "box": [
         Volume(CUBOID, 0.192),

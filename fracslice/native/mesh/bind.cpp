@@ -175,8 +175,8 @@ nb::tuple bind_weld(const Rows<float>& points) {
     return nb::make_tuple(to_numpy(std::move(result.first), {sets}), to_numpy(std::move(result.labels), {count}));
 }
 
-nb::tuple bind_tree(const Rows<double>& vertices, const Rows<int32_t>& triangles, int threads) {
-    Tree tree = unlocked(threads, [&] { return build_tree(mesh_of(vertices, triangles)); });
+nb::tuple bind_tree(const Rows<double>& vertices, const Rows<int32_t>& triangles, int threads, bool halved) {
+    Tree tree = unlocked(threads, [&] { return build_tree(mesh_of(vertices, triangles), halved); });
     size_t nodes = tree.low.rows;
     return nb::make_tuple(to_numpy(std::move(tree.order), {triangles.shape(0)}), to_numpy(std::move(tree.low), {nodes, 3}),
                           to_numpy(std::move(tree.high), {nodes, 3}));
@@ -241,7 +241,7 @@ void bind_mesh(nb::module_& module) {
     module.def("text_rows", &bind_text_rows<int64_t>, "before"_a, "end"_a, "values"_a);
     module.def("stl", &bind_stl, "vertices"_a, "triangles"_a, "threads"_a = 0);
     module.def("weld", &bind_weld, "points"_a);
-    module.def("tree", &bind_tree, "vertices"_a, "triangles"_a, "threads"_a = 0);
+    module.def("tree", &bind_tree, "vertices"_a, "triangles"_a, "threads"_a = 0, "halved"_a = false);
     module.def("self_intersecting_triangles", &bind_crossings, "vertices"_a, "triangles"_a, "order"_a, "low"_a, "high"_a,
                "threads"_a = 0, "among"_a = nb::none());
     module.def("nesting", &bind_nesting, "vertices"_a, "triangles"_a, "labels"_a, "sizes"_a, "first"_a, "threads"_a = 0);

@@ -3,6 +3,7 @@
 #include "input.h"
 #include "mesh_field.h"
 #include "reduction.h"
+#include "solid.h"
 
 namespace fracslice::mesh {
 namespace {
@@ -109,6 +110,37 @@ class BoundMeshField {
     MeshField field_;
 };
 
+class BoundSolid {
+  public:
+    BoundSolid(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<int64_t>& order, const Rows<double>& low,
+               const Rows<double>& high)
+        : vertices_(vertices), low_(low), high_(high), triangles_(triangles), order_(order) {
+        unlocked(0, [&] {
+            MeshView mesh = mesh_of(vertices, triangles);
+            if (!mesh.count) throw std::invalid_argument("an empty mesh is no solid");
+            solid_.emplace(mesh, tree_of(mesh, order, low, high));
+        });
+    }
+
+    uintptr_t address() const { return reinterpret_cast<uintptr_t>(solid_->entry()); }
+
+    nb::object distances(const Rows<double>& points) const {
+        Array<double> values(points.shape(0), 1);
+        {
+            nb::gil_scoped_release released;
+            size_t guess = 0;
+            for (size_t i = 0; i < points.shape(0); ++i) values.data[i] = (*solid_)(points.data() + 3 * i, guess);
+        }
+        return to_numpy(std::move(values), {points.shape(0)});
+    }
+
+  private:
+    Rows<double> vertices_, low_, high_;
+    Rows<int32_t> triangles_;
+    Vector<int64_t> order_;
+    std::optional<Solid> solid_;
+};
+
 }  // namespace
 
 void bind_reduction(nb::module_& module) {
@@ -130,6 +162,11 @@ void bind_reduction(nb::module_& module) {
         .def(nb::init<const Rows<double>&, const Rows<int32_t>&, const Vector<int64_t>&, const Rows<double>&, const Rows<double>&>(),
              "vertices"_a, "triangles"_a, "order"_a, "low"_a, "high"_a)
         .def("points", &BoundMeshField::points, "points"_a, "measured"_a);
+    nb::class_<BoundSolid>(module, "Solid")
+        .def(nb::init<const Rows<double>&, const Rows<int32_t>&, const Vector<int64_t>&, const Rows<double>&, const Rows<double>&>(),
+             "vertices"_a, "triangles"_a, "order"_a, "low"_a, "high"_a)
+        .def("distances", &BoundSolid::distances, "points"_a)
+        .def_prop_ro("address", &BoundSolid::address);
 }
 
 }  // namespace fracslice::mesh

@@ -18,30 +18,40 @@ class TriangleDistance {
     }
     TriangleDistance(const MeshView& mesh, size_t t) : TriangleDistance(mesh.corner(t, 0), mesh.corner(t, 1), mesh.corner(t, 2)) {}
 
+    // Parts of a triangle: its inside, its corners, and the side opposite to each corner.
+    enum Part { kInside, kCorner, kSide = kCorner + 3 };
+
     // The square of the distance of the nearest point; where a needle of a triangle leaves no digits to find it, of another of
     // its points, never of one outside.
     double square(const double* p) const {
-        double x[3] = {p[0] - a_[0], p[1] - a_[1], p[2] - a_[2]};
+        double x[3];
+        away(p, x);
+        return dot(x, x);
+    }
+    // The vector from the nearest point, and the part that this point is on: kCorner + k is corner k.
+    int away(const double* p, double* x) const {
+        for (int k = 0; k < 3; ++k) x[k] = p[k] - a_[k];
         double d1 = dot(u_, x), d2 = dot(v_, x);
-        if (d1 <= 0 && d2 <= 0) return dot(x, x);
+        if (d1 <= 0 && d2 <= 0) return kCorner;
         double d3 = d1 - uu_, d4 = d2 - uv_, d5 = d1 - uv_, d6 = d2 - vv_, s = 0, t = 0;
+        int part = kInside;
         if (d3 >= 0 && d4 <= d3) {
-            s = 1;
+            s = 1, part = kCorner + 1;
         } else if (d6 >= 0 && d5 <= d6) {
-            t = 1;
+            t = 1, part = kCorner + 2;
         } else if (d1 * d4 - d3 * d2 <= 0 && d1 >= 0 && d3 <= 0) {
-            s = d1 / (d1 - d3);
+            s = d1 / (d1 - d3), part = kSide + 2;
         } else if (d5 * d2 - d1 * d6 <= 0 && d2 >= 0 && d6 <= 0) {
-            t = d2 / (d2 - d6);
+            t = d2 / (d2 - d6), part = kSide + 1;
         } else if (d3 * d6 - d5 * d4 <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
             t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-            s = 1 - t;
+            s = 1 - t, part = kSide;
         } else if (double area = square_area(); area > 0) {
             s = std::clamp((vv_ * d1 - uv_ * d2) / area, 0.0, 1.0);
             t = std::clamp((uu_ * d2 - uv_ * d1) / area, 0.0, 1 - s);
         }
         for (int k = 0; k < 3; ++k) x[k] -= s * u_[k] + t * v_[k];
-        return dot(x, x);
+        return part;
     }
 
     // The normal, as long as twice the area; the square of its length, and the sum of the squares of the sides.

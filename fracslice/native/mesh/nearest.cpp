@@ -199,6 +199,22 @@ Nearest::Nearest(const MeshView& mesh, const TreeView& tree, bool closed) : mesh
     tbb::parallel_for(size_t(0), tree.leaves, [&](size_t leaf) {
         for (size_t i = 0; i < kLeaf; ++i) circles_[leaf].set(i, mesh, size_t(tree.order[std::min(tree.first(leaf) + i, tree.count - 1)]), larger_);
     });
+    widen();
+}
+
+// Three levels of the tree become one. Of node i those are the nodes from 8 i on.
+void Nearest::widen() {
+    size_t inner = 0;
+    for (roots_ = tree_.leaves; roots_ >= kLeaf; roots_ /= kLeaf) inner += roots_ / kLeaf;
+    wide_.resize(inner);
+    for (size_t first = roots_, from = 0; from < inner; from += first, first *= kLeaf) {
+        tbb::parallel_for(size_t(0), first, [&](size_t i) {
+            for (size_t child = 0; child < kLeaf; ++child) {
+                const size_t node = 3 * (kLeaf * (first + i) + child);
+                wide_[from + i].set(child, tree_.low + node, tree_.high + node, larger_);
+            }
+        });
+    }
 }
 
 double Nearest::to_box(const double* p, size_t node) const {
@@ -211,21 +227,27 @@ double Nearest::to_box(const double* p, size_t node) const {
 Neighbour Nearest::operator()(const double* p, size_t guess) const {
     struct Open {
         size_t node;
-        double square;
+        float square;
     } open[128];
     const Rounded rounded(p);
     Neighbour best{guess, distance(guess).square(p)};
-    open[0] = {1, 0};
-    for (int height = 1; height > 0;) {
+    int height = 0;
+    for (size_t root = 0; root < roots_; ++root) open[height++] = {root, 0};
+    while (height > 0) {
         auto [node, square] = open[--height];
-        if (square >= best.square) continue;
-        if (node >= tree_.leaves) {
-            search(node - tree_.leaves, p, rounded.x, best);
+        if (square > best.square) continue;
+        if (node >= wide_.size()) {
+            search(node - wide_.size(), p, rounded.x, best);
             continue;
         }
-        Open one{2 * node, to_box(p, 2 * node)}, two{2 * node + 1, to_box(p, 2 * node + 1)};
-        if (one.square < two.square) std::swap(one, two);
-        open[height++] = one, open[height++] = two;
+        float squares[kLeaf];
+        wide_[node].squares(rounded.x, kLeaf, squares);
+        for (size_t child = 0, first = size_t(height); child < kLeaf; ++child) {  // the nearest last
+            if (!(squares[child] < best.square)) continue;
+            size_t at = size_t(height++);
+            for (; at > first && open[at - 1].square < squares[child]; --at) open[at] = open[at - 1];
+            open[at] = {roots_ + kLeaf * node + child, squares[child]};
+        }
     }
     return best;
 }
@@ -236,7 +258,7 @@ void Nearest::search(size_t leaf, const double* p, const float* rounded, Neighbo
     for (size_t first = tree_.first(leaf), i = first; i < tree_.last(leaf); ++i) {
         if (squares[i - first] >= best.square) continue;
         size_t t = size_t(tree_.order[i]);
-        if (double d = distance(t).square(p); d < best.square) best = {t, d};
+        if (double d = distance(t).square(p); d < best.square || (d == best.square && t < best.triangle)) best = {t, d};
     }
 }
 

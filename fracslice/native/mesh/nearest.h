@@ -13,7 +13,7 @@ class Nearest {
     Nearest(const MeshView& mesh, const TreeView& tree, bool closed);
 
     TriangleDistance distance(size_t t) const { return {mesh_, t}; }
-    // The triangle nearest to a point; the search begins with a guess.
+    // The triangle nearest to a point, of several the first; the search begins with a guess.
     Neighbour operator()(const double* p, size_t guess) const;
     // The same, or something whose distance has a square within a limit.
     Neighbour within(double limit, const double* p, size_t guess) const;
@@ -49,6 +49,7 @@ class Nearest {
     struct Found;
     class Run;
 
+    void widen();
     // The square of the distance to the box of a node.
     double to_box(const double* p, size_t node) const;
     // Looks for a nearer triangle in a leaf.
@@ -61,6 +62,9 @@ class Nearest {
     TreeView tree_;
     std::vector<Circles> circles_;  // of the triangles of each leaf
     double larger_;                 // by what boxes and circles are larger
+    // The tree with eight children of a node: those of node i are roots_ + 8 i and on. Leaves follow the inner nodes.
+    std::vector<Boxes<kLeaf>> wide_;
+    size_t roots_;
     std::vector<int32_t> across_;
 };
 

@@ -181,13 +181,6 @@ EdgeCounts edge_counts(const Triangles& triangles, const bool* counted) {
         [](const EdgeCounts& a, const EdgeCounts& b) { return a + b; });
 }
 
-namespace {
-
-int32_t after(int32_t c) { return c % 3 == 2 ? c - 2 : c + 1; }
-int32_t before(int32_t c) { return c % 3 == 0 ? c + 2 : c - 1; }
-
-}  // namespace
-
 std::vector<int32_t> opposite_corners(const Triangles& triangles) {
     if (triangles.count > INT32_MAX / 3) throw std::invalid_argument("more than 2^31 corners");
     CornersByVertex by_vertex = corners_by_vertex(triangles);

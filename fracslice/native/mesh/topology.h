@@ -81,6 +81,10 @@ EdgeCounts edge_counts(const Triangles& triangles, const bool* counted);
 // --- A closed surface whose vertices can be taken out and put back: a corner table (Rossignac, "3D compression made simple:
 // Edgebreaker on a corner-table", 2001) with a history. Corner k of triangle t is 3 t + k.
 
+// The other corners of a triangle.
+inline int32_t after(int32_t c) { return c % 3 == 2 ? c - 2 : c + 1; }
+inline int32_t before(int32_t c) { return c % 3 == 0 ? c + 2 : c - 1; }
+
 // Of each corner of a closed, oriented 2-manifold the one opposite, on the other side of the edge that it faces. Throws
 // std::invalid_argument if one has none.
 std::vector<int32_t> opposite_corners(const Triangles& triangles);

@@ -1,6 +1,7 @@
 #include "tree.h"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 
 #include <array>
 #include <limits>
@@ -76,6 +77,46 @@ Array<uint64_t> sorted(Array<uint64_t> keys) {
     return keys;
 }
 
+using Middle = std::array<float, 3>;
+
+// Cuts a run of triangles in two across the longest side of the box of their middles, and each part again, down to leaves.
+void halve(const std::vector<Middle>& middles, int64_t* first, int64_t* last, size_t leaves) {
+    if (size_t(last - first) <= kLeaf) return;
+    leaves /= 2;
+    int64_t* half = std::min(first + leaves * kLeaf, last);  // whole leaves, and empty ones at the end
+    if (half < last) {
+        Middle low = middles[size_t(*first)], high = low;
+        for (const int64_t* t = first; t < last; ++t) {
+            const Middle& middle = middles[size_t(*t)];
+            for (size_t k = 0; k < 3; ++k) low[k] = std::min(low[k], middle[k]), high[k] = std::max(high[k], middle[k]);
+        }
+        size_t axis = 0;
+        for (size_t k = 1; k < 3; ++k) axis = high[k] - low[k] > high[axis] - low[axis] ? k : axis;
+        std::nth_element(first, half, last, [&](int64_t a, int64_t b) {
+            return std::pair(middles[size_t(a)][axis], a) < std::pair(middles[size_t(b)][axis], b);
+        });
+    }
+    tbb::parallel_invoke([&] { halve(middles, first, half, leaves); }, [&] { halve(middles, half, last, leaves); });
+}
+
+Array<int64_t> in_morton_order(const MeshView& mesh) {
+    Array<uint64_t> order = sorted(keys(mesh));
+    Array<int64_t> result(mesh.count, 1);
+    for_each_number(mesh.count, [&](size_t i) { result.data[i] = int64_t(order.data[i] & ((uint64_t(1) << kNumberBits) - 1)); });
+    return result;
+}
+
+Array<int64_t> in_halves(const MeshView& mesh, size_t leaves) {
+    std::vector<Middle> middles(mesh.count);
+    Array<int64_t> result(mesh.count, 1);
+    for_each_number(mesh.count, [&](size_t t) {
+        result.data[t] = int64_t(t);
+        for (size_t k = 0; k < 3; ++k) middles[t][k] = float((mesh.corner(t, 0)[k] + mesh.corner(t, 1)[k] + mesh.corner(t, 2)[k]) / 3);
+    });
+    halve(middles, result.data.get(), result.data.get() + mesh.count, leaves);
+    return result;
+}
+
 void set_leaf(const MeshView& mesh, const int64_t* first, const int64_t* last, double* low, double* high) {
     std::fill_n(low, 3, kInfinity);
     std::fill_n(high, 3, -kInfinity);
@@ -89,16 +130,12 @@ void set_leaf(const MeshView& mesh, const int64_t* first, const int64_t* last, d
 
 }  // namespace
 
-Tree build_tree(const MeshView& mesh) {
+Tree build_tree(const MeshView& mesh, bool halved) {
     Tree tree;
     if (mesh.count >> kNumberBits) throw std::invalid_argument("more than 2^31 triangles");
-    Array<uint64_t> order = sorted(keys(mesh));
-    tree.order = {mesh.count, 1};
-    for_each_number(mesh.count, [&](size_t i) {
-        tree.order.data[i] = int64_t(order.data[i] & ((uint64_t(1) << kNumberBits) - 1));
-    });
     size_t leaves = 1;
     while (leaves * kLeaf < mesh.count) leaves *= 2;
+    tree.order = halved ? in_halves(mesh, leaves) : in_morton_order(mesh);
     tree.low = {2 * leaves, 3}, tree.high = {2 * leaves, 3};
     double *low = tree.low.data.get(), *high = tree.high.data.get();
     set_leaf(mesh, nullptr, nullptr, low, high);  // node 0, which is none

@@ -11,7 +11,8 @@ struct Tree {
     Array<double> low, high;
 };
 
-// For a mesh with at least one triangle, fewer than 2^32.
-Tree build_tree(const MeshView& mesh);
+// For a mesh with at least one triangle, fewer than 2^32. halved: triangles are cut in halves of a side again and again in place
+// of Morton order. That takes three times as long, and searches for the nearest one a fifth.
+Tree build_tree(const MeshView& mesh, bool halved = false);
 
 }  // namespace fracslice::mesh

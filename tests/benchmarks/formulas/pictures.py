@@ -14,7 +14,7 @@ from tests.examples import EXAMPLES
 
 SIZE, COLUMNS, SAMPLES = (150, 128), 8, 8
 SHEET = Path(__file__).parents[3] / "docs/figures/elements.webp"
-SHOWN = [name for name, root in EXAMPLES.items() if root.bounds.box.finite]
+SHOWN = [name for name, root in EXAMPLES.items() if root.bounds.box.finite and name != "model"]
 
 
 def picture(root: Node) -> Image.Image:

@@ -1,0 +1,174 @@
+"""Triangle models as solids of scenes: files and their hashes, checks, placement, and signed distances."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _native
+from ..common.cache import Kept, cache_folder, key
+from ..common.files import open_regular
+from ..common.parameters import MILLIMETRES
+from ..errors import MeshError, SceneError
+from ..expr.functions import InMemory
+from ..fields.box import Box
+from ..fields.node import TriangleMesh
+from ..fields.registry import Node, get
+from .checks import check_mesh
+from .model import Mesh
+from .reading import READERS, read_mesh
+from .spatial import build
+
+CHUNK = 1 << 20
+"""Bytes that are hashed at once."""
+WITH_UNITS = frozenset({".3mf", ".glb"})
+"""Formats that state a unit, to which `read_mesh` scales."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solid(InMemory):
+    """Closed mesh whose signed distances machine code asks for; see `native/mesh/solid.h`."""
+
+    box: Box  # bounds
+    native: _native.Solid  # what lies at the address
+
+    @classmethod
+    def of(cls, mesh: Mesh) -> Solid:
+        """Solid of a checked mesh, in scene units."""
+        vertices, triangles = mesh.vertices, mesh.triangles
+        # Triangles that are near each other lie together in memory.
+        mesh = Mesh(vertices, triangles[build(mesh, halved=True).order]).in_order()
+        native = _native.Solid(mesh.vertices, mesh.triangles, *build(mesh, halved=True))
+        low, high = mesh.bounds.tolist()
+        digest = int(key("solid", vertices, triangles)[:16], 16)
+        return cls(digest, native.address, Box(tuple(low), tuple(high)), native)
+
+    def distances(
+        self, x: NDArray[np.float64], y: NDArray[np.float64], z: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Signed distances of points; see `vocabulary.solid_distance`."""
+        points = np.stack([np.asarray(a, np.float64).ravel() for a in (x, y, z)], 1)
+        return self.native.distances(points).reshape(np.shape(x))
+
+
+def identify(file: str, digest: str | None) -> tuple[str, str]:
+    """Return the whole path of a model file and the SHA-256 of its contents.
+
+    A file whose model is in memory is not looked at once more.
+    """
+    path = os.path.abspath(file)
+    if os.path.splitext(path)[1].lower() not in READERS:
+        raise MeshError(f"not a model file that can be read; known are {', '.join(sorted(READERS))}")
+    if digest is None or (path, digest) not in _SEEN:
+        found = _digest(path)
+        if digest not in (None, found):
+            raise MeshError(f"the file is another now: expected one with the hash {digest}")
+        _SEEN.add((path, found))
+        return path, found
+    return path, digest
+
+
+_SEEN = set[tuple[str, str]]()
+"""Files that had these hashes."""
+
+
+def _digest(path: str) -> str:
+    try:
+        with open_regular(path) as file:
+            digest = hashlib.sha256()
+            while data := file.read(CHUNK):
+                digest.update(data)
+            return digest.hexdigest()
+    except FileNotFoundError:
+        raise MeshError("no such file") from None
+    except OSError as error:
+        raise MeshError(error.strerror or str(error)) from None
+
+
+def from_trimesh(
+    mesh: TriangleMesh, *, size: float | None = None, place: Literal["as is", "centre", "bed"] = "as is"
+) -> Node:
+    """Make a shape of a triangle mesh.
+
+    Its triangles, with coordinates rounded to float32, are kept in a file of the cache, which the formula
+    `model` reads. For a scene file that lasts, export the mesh beside it.
+
+    Parameters
+    ----------
+    mesh : trimesh.Trimesh or Mesh
+        A closed mesh without self-intersections; any object with `vertices` [n, 3] and `faces` [m, 3].
+    size : float, optional
+        Longest side, scene units; that of the mesh by default.
+    place : {"as is", "centre", "bed"}
+        Where it is: as given, with the centre of its box at the origin, or with that above the origin and its
+        lowest point at z = 0.
+
+    Returns
+    -------
+    Node
+
+    Raises
+    ------
+    MeshError
+        If the mesh encloses no solid, or the cache cannot be written.
+
+    Examples
+    --------
+    >>> import trimesh
+    >>> from fracslice import from_trimesh, gyroid
+    >>> block = from_trimesh(trimesh.creation.box((10, 10, 10)))
+    >>> float(block.distance([0, 0, 8]))
+    3.0
+    >>> (block & gyroid(period=4)).bounds.box.size
+    (10.0, 10.0, 10.0)
+    """
+    given = Mesh(np.array(mesh.vertices, np.float64), np.array(mesh.faces, np.int32))
+    folder = Kept(cache_folder() / "models").place()
+    if folder is None:
+        raise MeshError(f"{cache_folder()}: expected a folder that others cannot write in, for the triangles")
+    path = folder / f"{key(given.vertices, given.triangles)}.ply"
+    if not path.exists():
+        given.export(path)
+    made = get("model")(str(path), size=size, place=place)
+    try:
+        made.bounds  # noqa: B018
+    except SceneError as error:
+        raise MeshError(str(error.__cause__).partition(";")[0]) from None
+    return made
+
+
+@lru_cache(maxsize=8)
+def solid(file: str, sha256: str, size: float | None, place: str, units: str) -> Solid:
+    """Solid of a model file, placed and scaled; see `formulas.model`."""
+    mesh = _checked(file, sha256)
+    if units != "mm" and os.path.splitext(file)[1].lower() in WITH_UNITS:
+        raise MeshError(f"states its own unit: expected no units, found {units}")
+    low, high = mesh.bounds
+    scale = MILLIMETRES[units] if size is None else size / float((high - low).max())
+    middle = (low + high) / 2
+    origin = {"as is": np.zeros(3), "centre": middle, "bed": np.array([*middle[:2], low[2]])}[place]
+    return Solid.of(Mesh((mesh.vertices - origin) * scale, mesh.triangles))
+
+
+@lru_cache(maxsize=4)
+def _checked(file: str, sha256: str) -> Mesh:
+    """Mesh of a file that has a hash, if it encloses a solid, without triangles that are but an edge."""
+    try:
+        mesh = read_mesh(file)
+    except MeshError as error:
+        raise MeshError(str(error).removeprefix(f"{file}: ")) from None
+    if _digest(file) != sha256:
+        raise MeshError("the file was changed while it was read")
+    report = check_mesh(mesh)
+    # A surface may touch itself at vertices; triangles between two corners at one place are left out.
+    if problems := replace(report, nonmanifold_vertices=0, degenerate_triangles=0).problems:
+        mended = f"`fracslice repair {os.path.basename(file)} -o OUT` mends what it can"
+        raise MeshError(f"{', '.join(problems)}: expected a solid; {mended}")
+    a, b, c = mesh.triangles.T
+    return mesh.selected((a != b) & (b != c) & (c != a))
