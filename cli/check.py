@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, cast
 
 import click
 
-from fracslice.common.files import MODELS
 from fracslice.common.messages import decimal, format_count, significant
+from fracslice.common.parameters import MODELS
 from fracslice.records import PIXEL, MeshJob, Placed, Print, SliceJob
 
 from .inputs import BadInput, check_targets, is_model, load_model, load_scene, refuse_options

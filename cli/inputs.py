@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fracslice.common.files import MODELS
+from fracslice.common.parameters import MODELS
 from fracslice.errors import MeshError, SceneError
 
 from .execution import stopped_at_once

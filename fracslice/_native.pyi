@@ -143,7 +143,7 @@ def surface_error(
     voxel: float,
     threads: int = 0,
 ) -> NDArray[float64]:
-    """Distances of points from a surface; call `fracslice.volume.accuracy.surface_error`."""
+    """Distances of points from a surface; call `fracslice.mesh.fit.surface_error`."""
 
 class ProjectionLoops:
     """Compiled loops that project points to a surface; keeps its arguments alive.
@@ -404,7 +404,7 @@ def quantise(
     frame: tuple[float, Point, float],
     threads: int = 0,
 ) -> tuple[NDArray[float64], NDArray[int32], NDArray[bool_], NDArray[int64]]:
-    """See `fracslice.mesh.quantisation.quantise`. Raises ValueError for a coordinate that is not finite."""
+    """See `fracslice.mesh.cleaning.quantise`. Raises ValueError for a coordinate that is not finite."""
 
 def selected(
     vertices: NDArray[float64], triangles: NDArray[int32], keep: NDArray[bool_], threads: int = 0

@@ -11,9 +11,8 @@ from inspect import Parameter, cleandoc, signature
 from pathlib import Path
 from typing import Any, Literal, ParamSpec, TypeAlias, TypedDict, TypeVar, get_type_hints
 
-from ..common.files import MODELS
 from ..common.messages import hint
-from ..common.parameters import REQUIRED, AnyLength, AnyScale, Record, parameter_lines, short_repr
+from ..common.parameters import MODELS, REQUIRED, AnyLength, AnyScale, Record, parameter_lines, short_repr
 from ..errors import SceneError
 from ..fields.devices import choose_device
 from ..fields.node import TriangleMesh

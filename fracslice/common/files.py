@@ -36,10 +36,6 @@ NO_WAIT = getattr(os, "O_NONBLOCK", 0)
 """Flag without which opening a pipe would block."""
 
 
-MODELS = frozenset({".stl", ".3mf", ".ply", ".obj", ".glb"})
-"""Extensions of `mesh.reading.READERS`, which scenes need not import."""
-
-
 class NotPrivateError(PermissionError):
     """Another user can write to this place."""
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from ..common.cache import warn
 from ..common.parameters import Choice, validate_value
 from ..errors import DeviceError
 from .field import Device
-from .node import Node
+
+if TYPE_CHECKING:
+    from .node import Node
 
 DEVICES = Choice("auto", "what computes", ("cpu", "cuda", "auto"))
 """Parameter of the device to compute on."""

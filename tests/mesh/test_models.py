@@ -103,7 +103,7 @@ def saved(mesh: Mesh, path: Path) -> str:
 @pytest.fixture(params=MODELS)
 def solid(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Node, Mesh]:
     """A model, and its mesh as a file has it."""
-    from fracslice.mesh.quantisation import quantise_mesh
+    from fracslice.mesh.cleaning import quantise_mesh
 
     mesh = quantise_mesh(MODELS[request.param]())
     return model(saved(mesh, tmp_path / "model.stl")), mesh
