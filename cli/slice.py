@@ -124,7 +124,7 @@ def slice_(given: SliceOptions) -> int:
     fracslice slice mandelbulb -o bulb.goo --printer mars-5 --exposure 2.5 30 --hollow 2mm
     fracslice slice my.xml -o layers --pixel 0.05mm --preview sheet.png
     """
-    from fracslice.export.layer_files import PICTURES, PRINTS, slice_format, write_slices
+    from fracslice.export.layers import PICTURES, PRINTS, slice_format, write_slices
     from fracslice.export.resuming import KEPT
     from fracslice.jobs.completeness import layers_amount
 
@@ -170,7 +170,7 @@ def recipe(given: SliceOptions, scene: Scene, kind: str, resin: Resin | None) ->
 
 def describe_layers(run: SliceRun, output: str, complete: Completeness) -> list[str]:
     """Lines on the layers, with notes of the stack, on missing volume, exposure and the printer's file."""
-    from fracslice.export.layer_files import PRINTS, printers_file, slice_format
+    from fracslice.export.layers import PRINTS, printers_file, slice_format
 
     stack, screen = run.stack, run.screen
     size = " x ".join(map(decimal, stack.size))
@@ -218,7 +218,7 @@ def refuse_what_no_print_has(given: SliceOptions, kind: str, resin: Resin | None
 
     This is checked before print preparation, which may take minutes.
     """
-    from fracslice.export.layer_files import ENDINGS, is_convertible, printers_file
+    from fracslice.export.layers import ENDINGS, is_convertible, printers_file
     from fracslice.slicing.printers import PRINTERS
 
     machine, output = given.machine, given.output
@@ -248,7 +248,7 @@ def upload(output: str, address: str | None, work: Work) -> str | None:
 
 def refuse_to_send(output: str, kind: str, address: str) -> None:
     """Raise an error for a file that no printer reads, or an invalid address, before any work is done."""
-    from fracslice.export.layer_files import PRINTS
+    from fracslice.export.layers import PRINTS
     from fracslice.export.sending import printer_address
 
     if kind not in PRINTS:

@@ -29,7 +29,7 @@ JOB = """
 from pathlib import Path
 from fracslice import sphere, make_mesh
 from fracslice.export.slice_run import SliceRun
-from fracslice.export.layer_files import write_slices
+from fracslice.export.layers import write_slices
 from fracslice.slicing import SliceJob, plan_stack
 from fracslice.slicing.raster import Screen
 folder = Path(sys.argv[1])

@@ -6,13 +6,13 @@ from __future__ import annotations
 
 import struct
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from itertools import chain
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,9 @@ class LayerFormat(ABC):
     encoding: Encoding | None = field(default=None, kw_only=True)
     # maximum size of the encoded layers, bytes; None for no limit
     most: int | None = field(default=None, kw_only=True)
+    endings: tuple[str, ...] = field(default=(), kw_only=True)  # extensions of files; "" is a folder
+    # second extension that printers of an extension read
+    also: Mapping[str, str] = field(default_factory=dict, kw_only=True)
 
     def pictures(self, run: SliceRun) -> Pictures | None:
         """Pictures of a run for `Slicer.map` to make; None if it cannot."""
@@ -256,14 +259,14 @@ class PrintFormat(LayerFormat):
 
 
 def pixel_format(
-    name: str, encoding: Encoding, assemble: Callable[[PrintData, BinaryIO], None], most: int | None = None
+    name: str, encoding: Encoding, assemble: Callable[[PrintData, BinaryIO], None], **options: Any
 ) -> PrintFormat:
     """Return the format of a printer's file whose layers are encoded pictures."""
 
     def encode(run: SliceRun, layer: Layer) -> bytes:
         return run.screen.encoded(layer, encoding)
 
-    return PrintFormat(name, encode, assemble, encoding=encoding, most=most)
+    return PrintFormat(name, encode, assemble, encoding=encoding, **options)
 
 
 def rgb565(picture: NDArray[np.uint8]) -> NDArray[np.uint16]:

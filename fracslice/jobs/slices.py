@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..export.layer_files import FORMATS
 from ..export.layer_tasks import Encode
+from ..export.layers import FORMATS
 from ..export.resins import Resin
 from ..export.slice_run import EPOCH, SliceRun
 from ..formulas import Node

@@ -19,7 +19,7 @@ from fracslice.animation import FilmJob, Timeline, write_frames
 from fracslice.cluster import ResultFolder, Workers, connect, connection, workers
 from fracslice.cluster.workers import Identity
 from fracslice.errors import Cancelled, ClusterError, FracsliceWarning
-from fracslice.export.layer_files import write_slices
+from fracslice.export.layers import write_slices
 from fracslice.formulas import mandelbulb, sphere
 from fracslice.jobs import shared
 from fracslice.jobs.mesh import make_mesh

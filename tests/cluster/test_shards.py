@@ -15,8 +15,8 @@ from fracslice.cluster import ResultFolder, Shard
 from fracslice.common import files
 from fracslice.errors import ClusterError, SharedError
 from fracslice.export import packages
-from fracslice.export.layer_files import write_slices
 from fracslice.export.layer_tasks import RangeTask
+from fracslice.export.layers import write_slices
 from fracslice.formulas import box, cone, flake, sphere
 from fracslice.jobs import shared, shared_writing
 from fracslice.jobs.mesh import Result, make_mesh

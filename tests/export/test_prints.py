@@ -18,8 +18,15 @@ import numpy as np
 import pytest
 
 from fracslice.errors import ExportError
-from fracslice.export import archives
-from fracslice.export.layer_files import ENDINGS, FORMATS, PRINTS, printers_file, slice_format, write_slices
+from fracslice.export.layers import (
+    ENDINGS,
+    FORMATS,
+    PRINTS,
+    archives,
+    printers_file,
+    slice_format,
+    write_slices,
+)
 from fracslice.export.resins import Resin
 from fracslice.export.slice_run import SliceRun
 from fracslice.formulas import difference, menger, sphere

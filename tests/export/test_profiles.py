@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from fracslice.errors import ExportError, SliceError
-from fracslice.export.layer_files import ENDINGS, printers_file, slice_format
+from fracslice.export.layers import ENDINGS, printers_file, slice_format
 from fracslice.export.resins import Resin, default_resin, resin
 from fracslice.slicing import printers
 from fracslice.slicing.printers import PRINTERS, printer

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from fracslice.export.layer_files import write_slices
+from fracslice.export.layers import write_slices
 from fracslice.export.slice_run import SliceRun
 from fracslice.formulas import difference, menger, sphere
 from fracslice.jobs.slices import StackModel

@@ -25,7 +25,7 @@ from PIL import Image
 
 from fracslice.errors import Cancelled, ExportError, FracsliceWarning
 from fracslice.export import layer_formats, png, resuming
-from fracslice.export.layer_files import FORMATS, slice_format, write_slices
+from fracslice.export.layers import FORMATS, slice_format, write_slices
 from fracslice.export.resins import Resin
 from fracslice.export.resuming import Journal, journal, resumable_folder
 from fracslice.export.slice_run import SliceRun

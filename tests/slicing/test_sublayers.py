@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fracslice.errors import ExportError, SliceError
-from fracslice.export.layer_files import write_slices
+from fracslice.export.layers import write_slices
 from fracslice.export.slice_run import SliceRun
 from fracslice.formulas import Node, box, intersection, transform
 from fracslice.slicing import SliceJob, Slicer, Stack, adapted, plan_stack

@@ -23,7 +23,7 @@ from typing import Any
 from fracslice.animation import FilmJob, Timeline, write_frames
 from fracslice.cluster import Contents, Pool, ResultFolder, Task, Workers, connect
 from fracslice.cluster.pool import run_task as make_piece
-from fracslice.export.layer_files import write_slices
+from fracslice.export.layers import write_slices
 from fracslice.formulas import mandelbulb
 from fracslice.jobs import shared
 from fracslice.jobs.mesh import make_mesh

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from fracslice.common.memory import peak_rss_mb
-from fracslice.export.layer_files import write_slices
+from fracslice.export.layers import write_slices
 from fracslice.export.slice_run import SliceRun
 from fracslice.formulas import mandelbulb
 from fracslice.slicing import SliceJob, Slicer, Stack, plan_stack

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
-from fracslice.export.layer_files import write_slices
+from fracslice.export.layers import write_slices
 from fracslice.export.resins import Resin
 from fracslice.export.slice_run import SliceRun
 from fracslice.formulas import mandelbulb

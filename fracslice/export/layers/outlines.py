@@ -11,9 +11,9 @@ from typing import BinaryIO
 import numpy as np
 from isal.isal_zlib import crc32
 
-from ..slicing import Contours, Layer
-from .layer_formats import FileFormat, FolderFormat
-from .slice_run import SliceRun
+from ...slicing import Contours, Layer
+from ..layer_formats import FileFormat, FolderFormat
+from ..slice_run import SliceRun
 
 MICRON = 0.001
 """Unit of Common Layer Interface files, mm."""
@@ -145,21 +145,26 @@ def _between(
     encode: Callable[[SliceRun, Layer], bytes],
     head: Callable[[SliceRun], bytes],
     tail: bytes,
+    *endings: str,
 ) -> FileFormat:
     """Format of a file with the layers between a head and a tail."""
 
     def assemble(run: SliceRun, layers: Iterable[bytes], file: BinaryIO) -> None:
         file.writelines(chain([head(run)], layers, [tail]))
 
-    return FileFormat(name, encode, assemble)
+    return FileFormat(name, encode, assemble, endings=endings)
 
 
 FORMATS = (
     FolderFormat("svg", _svg, lambda _: {}),
-    _between("slic3r", _slic3r, _slic3r_head, b"</svg>\n"),
+    _between("slic3r", _slic3r, _slic3r_head, b"</svg>\n", ".svg"),
     _between(
-        "cli", _cli_text, lambda run: _cli_head(run, "ASCII") + b"\n$$GEOMETRYSTART\n", b"$$GEOMETRYEND\n"
+        "cli",
+        _cli_text,
+        lambda run: _cli_head(run, "ASCII") + b"\n$$GEOMETRYSTART\n",
+        b"$$GEOMETRYEND\n",
+        ".cli",
     ),
     _between("cli-binary", _cli_bytes, lambda run: _cli_head(run, "BINARY"), b""),
-    _between("json", _json, _json_head, b"\n]}\n"),
+    _between("json", _json, _json_head, b"\n]}\n", ".json"),
 )

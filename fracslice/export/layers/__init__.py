@@ -1,57 +1,30 @@
-"""Layer file formats by name."""
+"""Layer file formats: one module each, with `FORMATS`."""
 
 from __future__ import annotations
 
+from importlib import import_module
+from itertools import chain
 from pathlib import Path
+from pkgutil import iter_modules
 
-from .._slices import Encoding
-from ..common.files import check_target
-from ..errors import ExportError
-from ..slicing.printers import Printer
-from . import anycubic, archives, chitu, goo, outlines, png, slices3mf
-from .layer_formats import FolderFormat, LayerFormat
-from .slice_run import SliceRun
+from ...common.files import check_target
+from ...errors import ExportError
+from ...slicing.printers import Printer
+from ..layer_formats import FolderFormat, LayerFormat, PrintFormat
+from ..slice_run import SliceRun
 
-PRINTS = {form.name: form for form in (*archives.FORMATS, goo.FORMAT, *chitu.FORMATS, anycubic.FORMAT)}
+_MODULES = [import_module(f".{module.name}", __name__) for module in iter_modules(__path__)]
+FORMATS: dict[str, LayerFormat] = {form.name: form for module in _MODULES for form in module.FORMATS}
+PRINTS = {name: form for name, form in FORMATS.items() if isinstance(form, PrintFormat)}
 """Formats of printers; they need a printer and a resin."""
 
-PNG = FolderFormat(
-    "png",
-    png.encode_layer,
-    lambda run: {"manifest.json": run.describe()},
-    encoding=Encoding.PNG,
-)
-FORMATS: dict[str, LayerFormat] = {
-    "png": PNG,
-    **PRINTS,
-    "3mf": slices3mf.FORMAT,
-    **{form.name: form for form in outlines.FORMATS},
-}
-PICTURES = {"png", *PRINTS}
+PICTURES = {name for name, form in FORMATS.items() if name in PRINTS or form.encoding is not None}
 FOLDERS = {name for name, form in FORMATS.items() if isinstance(form, FolderFormat)}
-PHOTON = "pwmx pwmo pwms pmsq pwma pwmb pmx2 pm3 pm3m pm3r dlp dl2p pw0 pwx"
-"""Extensions of one format, one for each model."""
+ENDINGS = {ending: name for name, form in FORMATS.items() for ending in form.endings}
+"""Format of each extension; that of a folder has none."""
 
-ENDINGS = {
-    ".sl1": "sl1",
-    ".sl1s": "sl1",
-    ".goo": "goo",
-    ".prz": "goo",
-    ".ctb": "ctb",
-    ".cbddlp": "cbddlp",
-    ".photon": "cbddlp",
-    **{f".{ending}": "pwmx" for ending in PHOTON.split()},
-    ".nanodlp": "nanodlp",
-    ".3mf": "3mf",
-    ".svg": "slic3r",
-    ".cli": "cli",
-    ".json": "json",
-    "": "png",
-}
-
-
-ALIASES = {".sl1": (".sl1s",), ".prz": (".goo",), ".photon": (".cbddlp",)}
-"""Extensions of the same format that the same printers read."""
+ALSO = dict(chain.from_iterable(form.also.items() for form in FORMATS.values()))
+"""Second extension that printers of an extension read."""
 
 
 def slice_format(path: str | Path, name: str | None = None) -> str:
@@ -78,7 +51,7 @@ def slice_format(path: str | Path, name: str | None = None) -> str:
 def printers_file(printer: Printer, output: str | Path) -> str:
     """Compare the file to write with the one that a printer reads."""
     path, ending = Path(output), f".{printer.file}"
-    own = {ending, *ALIASES.get(ending, ())}
+    own = {ending, ALSO.get(ending, ending)}
     if not printer.file or path.suffix.lower() in own:
         return ""
     if ending in ENDINGS:

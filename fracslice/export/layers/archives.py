@@ -12,14 +12,14 @@ from typing import BinaryIO
 
 from isal.isal_zlib import crc32
 
-from .._slices import Encoding
-from ..errors import ExportError
-from ..version import __version__
-from . import png
-from .layer_formats import PrintData, PrintFormat
-from .layer_tasks import Encode
-from .png import write_png
-from .slice_run import SliceRun
+from ..._slices import Encoding
+from ...errors import ExportError
+from ...version import __version__
+from .. import png
+from ..layer_formats import PrintData, PrintFormat
+from ..layer_tasks import Encode
+from ..png import write_png
+from ..slice_run import SliceRun
 
 MOST_MEMBERS = 65_535
 
@@ -243,6 +243,15 @@ def _profile(job: PrintData) -> dict[str, object]:
 
 
 FORMATS = (
-    Sl1Format("sl1", png.encode_layer, _assemble_sl1, encoding=Encoding.PNG),
-    ArchiveFormat("nanodlp", png.encode_layer, _assemble_nanodlp, encoding=Encoding.PNG),
+    Sl1Format(
+        "sl1",
+        png.encode_layer,
+        _assemble_sl1,
+        encoding=Encoding.PNG,
+        endings=(".sl1", ".sl1s"),
+        also={".sl1": ".sl1s"},
+    ),
+    ArchiveFormat(
+        "nanodlp", png.encode_layer, _assemble_nanodlp, encoding=Encoding.PNG, endings=(".nanodlp",)
+    ),
 )

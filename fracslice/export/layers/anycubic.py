@@ -10,8 +10,8 @@ import struct
 from itertools import accumulate
 from typing import BinaryIO
 
-from .._slices import Encoding
-from .layer_formats import ADDRESSED, PrintData, pixel_format, rgb565
+from ..._slices import Encoding
+from ..layer_formats import ADDRESSED, PrintData, pixel_format, rgb565
 
 PREVIEW = 224, 168
 """Width and height of the preview, pixels."""
@@ -97,4 +97,15 @@ def _machine(job: PrintData) -> bytes:
     return _section("MACHINE", contents, 16)
 
 
-FORMAT = pixel_format("pwmx", Encoding.RLE4, _assemble, ADDRESSED)
+ENDINGS = "pwmx pwmo pwms pmsq pwma pwmb pmx2 pm3 pm3m pm3r dlp dl2p pw0 pwx"
+"""Extensions, one for each model."""
+
+FORMATS = (
+    pixel_format(
+        "pwmx",
+        Encoding.RLE4,
+        _assemble,
+        most=ADDRESSED,
+        endings=tuple(f".{ending}" for ending in ENDINGS.split()),
+    ),
+)

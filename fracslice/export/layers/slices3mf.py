@@ -8,12 +8,12 @@ from typing import BinaryIO
 
 import numpy as np
 
-from ..errors import ExportError
-from ..slicing import Layer
-from .layer_formats import FileFormat
-from .layer_tasks import Encode
-from .packages import package, rows
-from .slice_run import SliceRun
+from ...errors import ExportError
+from ...slicing import Layer
+from ..layer_formats import FileFormat
+from ..layer_tasks import Encode
+from ..packages import package, rows
+from ..slice_run import SliceRun
 
 LEVEL = 1
 HEAD = (
@@ -41,7 +41,7 @@ class SlicesAndMesh(FileFormat):
 
 
 def _assemble(run: SliceRun, layers: Iterable[bytes], file: BinaryIO) -> None:
-    from .threemf import mesh_element  # of this format alone
+    from ..threemf import mesh_element  # of this format alone
 
     assert run.mesh
     middle = np.array(run.stack.shape[::-1]) * run.stack.pixel / 2
@@ -65,4 +65,4 @@ def _slice(_: SliceRun, layer: Layer) -> bytes:
     return b"".join([*texts, b"</s:slice>\n"])
 
 
-FORMAT = SlicesAndMesh("3mf", _slice, _assemble)
+FORMATS = (SlicesAndMesh("3mf", _slice, _assemble, endings=(".3mf",)),)

@@ -8,9 +8,9 @@ from __future__ import annotations
 import struct
 from typing import BinaryIO
 
-from .._slices import Encoding
-from ..version import __version__
-from .layer_formats import PrintData, pixel_format, rgb565
+from ..._slices import Encoding
+from ...version import __version__
+from ..layer_formats import PrintData, pixel_format, rgb565
 
 MAGIC = b"\x07\0\0\0DLP\0"
 DELIMITER = b"\r\n"
@@ -71,4 +71,4 @@ def _layer(job: PrintData, index: int, size: int) -> bytes:
     )
 
 
-FORMAT = pixel_format("goo", Encoding.GOO, _assemble)
+FORMATS = (pixel_format("goo", Encoding.GOO, _assemble, endings=(".goo", ".prz"), also={".prz": ".goo"}),)

@@ -15,10 +15,10 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from .._slices import Encoding
-from ..slicing import Layer
-from .layer_formats import ADDRESSED, PrintData, PrintFormat, pixel_format, rgb565
-from .slice_run import SliceRun
+from ..._slices import Encoding
+from ...slicing import Layer
+from ..layer_formats import ADDRESSED, PrintData, PrintFormat, pixel_format, rgb565
+from ..slice_run import SliceRun
 
 CTB, CBDDLP = 0x12FD0086, 0x12FD0019
 LEVELS = 4
@@ -140,6 +140,13 @@ def _preview(picture: NDArray[np.uint8]) -> bytes:
 
 
 FORMATS = (
-    pixel_format("ctb", Encoding.RLE7, _assemble_ctb, ADDRESSED),
-    PrintFormat("cbddlp", _level_sets, _assemble_cbddlp, most=ADDRESSED),
+    pixel_format("ctb", Encoding.RLE7, _assemble_ctb, most=ADDRESSED, endings=(".ctb",)),
+    PrintFormat(
+        "cbddlp",
+        _level_sets,
+        _assemble_cbddlp,
+        most=ADDRESSED,
+        endings=(".cbddlp", ".photon"),
+        also={".photon": ".cbddlp"},
+    ),
 )
