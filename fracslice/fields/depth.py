@@ -15,7 +15,7 @@ from ..common.parameters import AUTO, Count
 from ..errors import EmptyError
 from ..expr.host import keep_text, kept_text
 from .algebra import affine, stretches
-from .boxes import possible_cells
+from .box import possible_cells
 from .cpu import compile_scene
 from .registry import Node
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..expr import functions
 from ..expr.intervals import ARRAYS, Interval, on_intervals
-from .boxes import Corners, undecided_cells
+from .box import Corners, undecided_cells
 from .orbit_code import R2, Round, function_of_text
 
 MOST, LEVELS, MARGIN = 1 << 15, 12, 1e-9

@@ -17,8 +17,7 @@ import numpy as np
 from ..expr import functions
 from ..expr.intervals import Interval, on_intervals
 from . import orbit_code
-from .box import Box
-from .boxes import possible_cells, proved_half
+from .box import Box, possible_cells, proved_half
 from .escape import CORE, levels
 from .escape_radius import constant_stretch, escape_radius, least_size
 from .orbit_code import R2, Code, Form, Round, field, function_of_text, indent_lines, mapped

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import SceneError
-from ..fields.boxes import possible_cells
+from ..fields.box import possible_cells
 from ..fields.depth import resolve_depths
 from ..fields.registry import Node
 from ..formulas.csg import intersection

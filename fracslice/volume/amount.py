@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..fields.algebra import length
-from ..fields.boxes import possible_cells
+from ..fields.box import possible_cells
 from ..fields.field import Bounds, Field, Kernel
 from ..formulas import Box, Node
 from ..records import DUST

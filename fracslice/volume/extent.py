@@ -10,8 +10,7 @@ import numpy as np
 from .._native import Sides
 from .._native import climb as climbed
 from ..errors import EmptyError, VolumeError
-from ..fields.box import Box
-from ..fields.boxes import possible_cells
+from ..fields.box import Box, possible_cells
 from ..fields.field import Field, Kernel
 from ..formulas import Node
 from ..work import Work

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fracslice.expr.intervals import Interval
-from fracslice.fields.boxes import proved_half
+from fracslice.fields.box import proved_half
 from fracslice.fields.reference import enclosure, reference
 from fracslice.fields.registry import Node
 from fracslice.formulas import (
