@@ -1,7 +1,4 @@
-"""Printability checks of layers, and the problems that they find.
-
-volume and weight.
-"""
+"""Printability checks of layers, and the problems that they find."""
 
 from __future__ import annotations
 
