@@ -505,7 +505,12 @@ class MeshField:
         low: NDArray[float64],
         high: NDArray[float64],
     ) -> None: ...
-    def points(self, points: NDArray[float64], measured: bool) -> NDArray[float64]: ...
+    def points(
+        self, x: NDArray[float64], y: NDArray[float64], z: NDArray[float64], measured: bool
+    ) -> NDArray[float64]: ...
+    def bricks(
+        self, corners: NDArray[int32], origin: Point, voxel: float, measured: bool
+    ) -> NDArray[float32]: ...
 
 class Nearest:
     """See `fracslice.mesh.spatial.Nearest`. Refers to the arrays during its lifetime."""
