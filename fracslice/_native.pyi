@@ -592,6 +592,11 @@ class SampledField:
     def crossings(self, rows: NDArray[int64]) -> tuple[NDArray[float64], NDArray[float64], NDArray[float64]]:
         """See `fracslice.printing.walls.edge_crossings`."""
 
+    def may_be_deep(self, depth: float, lipschitz: float) -> bool:
+        """False if no point is deeper inside than `depth` voxels, where values are distances times at most
+        `lipschitz`.
+        """
+
 def solid_components(
     ijk: NDArray[int32], values: NDArray[float32] | NDArray[int8], index: NDArray[int32]
 ) -> tuple[NDArray[int32] | NDArray[int64], NDArray[int64], NDArray[bool_]]:
