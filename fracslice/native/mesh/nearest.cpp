@@ -228,6 +228,7 @@ class Nearest::Run {
                 if (few_ == kFew) return false;
                 const size_t t = size_t(nearest_.tree_.order[n]);
                 candidates_[few_++] = Candidate(nearest_.mesh_, t);
+                if (t == guess_) std::swap(candidates_[0], candidates_[few_ - 1]);  // that leaves most of the others too far
             }
         }
         return few_ > 0;
