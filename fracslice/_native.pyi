@@ -505,7 +505,12 @@ class MeshField:
         low: NDArray[float64],
         high: NDArray[float64],
     ) -> None: ...
-    def points(self, points: NDArray[float64], measured: bool) -> NDArray[float64]: ...
+    def points(
+        self, x: NDArray[float64], y: NDArray[float64], z: NDArray[float64], measured: bool
+    ) -> NDArray[float64]: ...
+    def bricks(
+        self, corners: NDArray[int32], origin: Point, voxel: float, measured: bool
+    ) -> NDArray[float32]: ...
 
 class Nearest:
     """See `fracslice.mesh.spatial.Nearest`. Refers to the arrays during its lifetime."""
@@ -586,6 +591,11 @@ class SampledField:
 
     def crossings(self, rows: NDArray[int64]) -> tuple[NDArray[float64], NDArray[float64], NDArray[float64]]:
         """See `fracslice.printing.walls.edge_crossings`."""
+
+    def may_be_deep(self, depth: float, lipschitz: float) -> bool:
+        """False if no point is deeper inside than `depth` voxels, where values are distances times at most
+        `lipschitz`.
+        """
 
 def solid_components(
     ijk: NDArray[int32], values: NDArray[float32] | NDArray[int8], index: NDArray[int32]

@@ -15,7 +15,7 @@ from tests.export.test_slices import run
 
 FORMULA = '''
 from fracslice.formulas import Box, Number, shape
-from fracslice.formulas.vocabulary import sqrt
+from fracslice.expr.vocabulary import sqrt
 
 
 @shape(radius=Number(1.0, "the radius", above=0))
@@ -27,7 +27,7 @@ def pearl(x, y, z, radius):
 @pearl.bounds
 def pearl_bounds(node):
     return Box.centred(node["radius"])
-'''.replace("fracslice.formulas.vocabulary", "fracslice.expr.vocabulary")
+'''.replace("fracslice.expr.vocabulary", "fracslice.expr.vocabulary")
 
 FORMAT = """
 from fracslice.export.layer_formats import FileFormat

@@ -1,1 +1,1 @@
-"""What every layer uses: files, keys, compiled loops, records of arrays."""
+"""What every layer uses: files, keys, records of arrays."""

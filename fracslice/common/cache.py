@@ -37,10 +37,6 @@ class Kept:
         """Read a cached file."""
         return self._trusted(lambda here: self._read(name, read, here))
 
-    def place(self) -> Path | None:
-        """Return the path of the folder, for code that needs one."""
-        return self._trusted(lambda _: Path(os.path.realpath(self.folder)))
-
     def put(self, name: str, write: Callable[[BinaryIO], object]) -> None:
         """Write a cached file atomically; ignore a folder that is not trusted."""
         target = Path(os.path.realpath(self.folder), name)

@@ -57,6 +57,15 @@ class _MeshKernel(Kernel):
 
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
         """`Kernel.points`."""
-        points = np.stack([np.asarray(a, np.float64).ravel() for a in (x, y, z)], 1)
-        values = self._native.points(points, self._measured)
+        u, v, w = (np.asarray(a, np.float64).reshape(-1) for a in (x, y, z))
+        values = self._native.points(u, v, w, self._measured)
         return values.reshape(np.shape(x)).astype(self.dtype, copy=False)
+
+    def bricks(
+        self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray
+    ) -> None:
+        """`Kernel.bricks`."""
+        if out.dtype == np.float32:
+            out[:] = self._native.bricks(corners, origin, voxel, self._measured)
+        else:
+            super().bricks(corners, origin, voxel, out)

@@ -7,10 +7,10 @@
 
 namespace fracslice {
 
-// Sets over an array of parents, at first each its own, that any number of threads unite. A root is the lowest of its set, and a
-// parent is lower than its children: whoever loses a race looks again (Anderson and Woll, "Wait-free Parallel Algorithms for the
-// Union-Find Problem", 1991).
-template <class Index>
+// Sets over an array of parents, at first each its own, that one thread unites, or if they are shared any number. A root is the
+// lowest of its set, and a parent is lower than its children: whoever loses a race looks again (Anderson and Woll, "Wait-free
+// Parallel Algorithms for the Union-Find Problem", 1991).
+template <class Index, bool kShared = false>
 class DisjointSets {
   public:
     explicit DisjointSets(std::span<Index> parent) : parent_(parent) {}
@@ -29,8 +29,13 @@ class DisjointSets {
     bool unite(Index a, Index b) const {
         while ((a = root(a)) != (b = root(b))) {
             const Index high = a > b ? a : b, low = a > b ? b : a;
-            Index expected = high;
-            if (of(high).compare_exchange_strong(expected, low, std::memory_order_relaxed)) return true;
+            if constexpr (kShared) {
+                Index expected = high;
+                if (of(high).compare_exchange_strong(expected, low, std::memory_order_relaxed)) return true;
+            } else {
+                parent_[size_t(high)] = low;
+                return true;
+            }
         }
         return false;
     }

@@ -147,9 +147,14 @@ def thin_share(signs: SignBricks) -> float:
     """Share of the material in bodies whose mean thickness is below a voxel:
     `SolidComponents.thin_share`.
     """
-    inside = np.unpackbits(signs.signs, axis=-1, bitorder="little").view(np.int8)
-    values = -inside.reshape(-1, 512)
-    return components_of(Bricks(signs.origin, signs.voxel, signs.ijk, values, signs.index)).thin_share
+    return components_of(sign_samples(signs)).thin_share
+
+
+def sign_samples(signs: SignBricks) -> Bricks:
+    """Signs as samples, int8: -1 inside, else 0."""
+    inside = np.unpackbits(signs.signs.reshape(-1), bitorder="little").view(np.int8)
+    values = np.negative(inside, out=inside).reshape(-1, 512)
+    return Bricks(signs.origin, signs.voxel, signs.ijk, values, signs.index)
 
 
 def components_of(bricks: Bricks) -> SolidComponents:

@@ -115,7 +115,10 @@ def check_solid(
     thin, tight = thin_features(root, solid, work)
 
     kinds = walls_of(solid, most, work, [Measure(), Measure(gaps=True), Measure(direction=UP)])
-    solid_walls, gaps, upright = (project_faces(root, kind, bricks.voxel, work) for kind in kinds)
+    solid_walls, gaps, upright = (
+        project_faces(root, features.lasting(kind, bricks.voxel), bricks.voxel, work)
+        for kind, features in zip(kinds, (thin, tight, thin), strict=True)
+    )
     thick = thin.beside(solid_walls, most)
     between = tight.beside(gaps, most)
     floors = thin.beside(upright, most, UP)

@@ -22,11 +22,12 @@ from ..fields.box import Box
 from ..fields.field import Bounds, Device, Field, Kernel, Precision
 from ..fields.tree import ArrayField
 from ..formulas.confining import moved_slope
-from ..volume import Bricks, Lattice, sample
+from ..volume import Bricks, Lattice, sample, sample_signs
 from ..volume.lattice import BRICK, values_at
 from ..work import Work
+from .components import sign_samples
 from .samples import Samples
-from .walls import AT_ONCE, OPPOSITE, Direction, Walls, edge_crossings, in_blocks, slopes, walls
+from .walls import AT_ONCE, AWAY, OPPOSITE, Direction, Walls, edge_crossings, in_blocks, slopes, walls
 
 ROUNDS = 400
 """Maximum number of steps along a ray."""
@@ -164,6 +165,10 @@ class ThinFeatures:
     # and `walls` has only those that the samples miss
     replaces: float
 
+    def lasting(self, sampled: Walls, voxel: float) -> Walls:
+        """Walls measured on samples that `beside` may keep once their faces are projected."""
+        return sampled.chosen(sampled.width >= self.replaces - 2.01 * AWAY * voxel)
+
     def beside(self, sampled: Walls, limit: float, direction: Direction | None = None) -> Walls:
         """Combine with walls measured on samples.
 
@@ -231,6 +236,9 @@ class _Look:
 
     def from_within(self) -> Walls:
         """Thin gaps between thick walls, searched from within them."""
+        bounds = self.root.bounds
+        if not (bounds.exterior_only or self.seen.native.may_be_deep(NEAR, bounds.lipschitz)):
+            return Walls.none()
         try:
             rays = self.rays(-1.0)
         except VolumeError:  # all walls are thin
@@ -455,7 +463,7 @@ def resolve_connectivity(
     "Discrete analytical hyperplanes"). A fractal has walls of every thickness; it is resampled only if it
     appears disconnected.
 
-    `least`: squared scene units; `signs`: whether the signs of finer samples suffice.
+    `least`: squared scene units; `signs`: whether the signs of finer samples suffice, see `sign_samples`.
     """
     times = AGAIN if loose else 1.0
     if not root.bounds.exterior_only:
@@ -467,7 +475,9 @@ def resolve_connectivity(
         return bricks
     lattice = Lattice.around(Samples(bricks).bounds.box, bricks.voxel / times)
     kernel = root.kernel()
-    return sample(root.sign_kernel() if signs else kernel, root.bounds, lattice, work, kernel)
+    if signs:
+        return sign_samples(sample_signs(root.sign_kernel(), root.bounds, lattice, work, kernel))
+    return sample(kernel, root.bounds, lattice, work, kernel)
 
 
 def _times(bricks: Bricks, thin: Walls, least: float, most: float) -> float:

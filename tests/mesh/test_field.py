@@ -99,3 +99,25 @@ def test_points_above_each_other_share_the_crossings_of_their_line() -> None:
     z = np.linspace(-1, 39, 410)
     values = field_of(*plates).kernel().points(0 * z + 0.3, 0 * z + 0.2, z)
     assert ((values < 0) == (np.abs((z + 1) % 2 - 1) < 0.5)).all()
+
+
+@pytest.mark.parametrize("sides", [(20, 0.05, 20), (3, 4, 5), (1e-4, 9, 9), (0.01, 0.01, 30)])
+def test_few_triangles_are_compared_one_by_one_to_the_last_bit(sides: tuple[float, float, float]) -> None:
+    field = field_of(moved(trimesh.creation.box(sides), 0.1, -0.2, 0.3))
+    rng = np.random.default_rng(2)
+    some = rng.uniform(-1, 1, (2000, 3)) * np.array(sides) * rng.choice([0.4, 0.5, 0.51, 0.8], (2000, 1))
+    points = np.ascontiguousarray(some + [0.1, -0.2, 0.3])
+    nearest = Nearest(field.mesh)
+    alone = np.array([nearest.points(p[None])[0] for p in points])
+    np.testing.assert_array_equal(np.abs(field.kernel("cpu", "float64").points(*points.T)), alone)
+
+
+def test_bricks_have_the_values_of_their_points() -> None:
+    field = field_of(trimesh.creation.box((20, 0.05, 20)), moved(trimesh.creation.icosphere(2, 3.0), 4, 1, 0))
+    corners = np.array([(-8, -8, 0), (0, -8, 8), (40, 0, -16), (-96, 0, 96)], np.int32)
+    origin, inner = (0.03, -0.01, 0.02), np.indices((8, 8, 8)).reshape(3, 512)
+    for kernel in (field.kernel(), field.sign_kernel(), field.kernel("cpu", "float64")):
+        out = np.empty((len(corners), 512), kernel.dtype)
+        kernel.bricks(corners, origin, 0.1, out)
+        grid = [origin[k] + 0.1 * (corners[:, k, None] + inner[k]) for k in range(3)]
+        np.testing.assert_array_equal(out, kernel.points(*grid))

@@ -11,14 +11,17 @@ from scipy import ndimage
 from scipy.sparse import coo_array, csgraph
 
 from fracslice import _native
+from fracslice.errors import VolumeError
 from fracslice.fields.cpu import compile_scene
 from fracslice.formulas import Node, box, mandelbulb, shell, sphere, transform, union
 from fracslice.printing.bridging import capsules, nearer
 from fracslice.printing.components import components_of, thin_share
 from fracslice.printing.samples import Samples, together
-from fracslice.printing.walls import edge_crossings
+from fracslice.printing.thin_features import thin_features
+from fracslice.printing.walls import Measure, edge_crossings, project_faces, walls_of
 from fracslice.volume import Bricks, Lattice, sample
 from fracslice.volume.bricks import INSIDE, OUTSIDE
+from fracslice.work import Work
 
 pytestmark = pytest.mark.once
 
@@ -260,3 +263,31 @@ def test_squares_near_capsules_are_the_least() -> None:
         away = np.minimum(away, np.linalg.norm(points - a - share[..., None] * along, axis=2))
     expected = np.minimum(away - 0.1, 2 * made.voxel)
     np.testing.assert_allclose(made.values, expected, atol=1e-5)
+
+
+@pytest.mark.parametrize(("half", "deep"), [(0.2, False), (0.95, True), (1.4, True), (4.0, True)])
+def test_no_point_is_deep_where_samples_say_so(half: float, deep: bool) -> None:
+    """Plates of so many voxels to either side of their middle, wherever that lies between samples."""
+    voxel, told = 0.05, []
+    for shift in np.linspace(0, 1, 9):
+        plate = transform(box(size=(1, 1, 2 * half * voxel)), translate=(0, 0, float(shift) * voxel))
+        for turned in (plate, transform(plate, rotate=(1, 0, 0, 20)), transform(plate, rotate=(1, 1, 0, 45))):
+            lattice = Lattice.around(turned.bounds.box.grown(0.1), voxel)
+            try:
+                solid = sample(compile_scene(turned), turned.bounds, lattice)
+            except VolumeError:  # between all samples
+                continue
+            told.append(Samples(solid).native.may_be_deep(0.9, 1.0))
+    assert set(told) == {deep}
+
+
+def test_walls_that_projection_cannot_widen_enough_are_left_out() -> None:
+    """What `lasting` drops, `beside` would drop with the projected faces."""
+    root, work = union(shell(sphere(), thickness=0.05), shell(sphere(radius=0.6), thickness=0.2)), Work()
+    solid = sampled(root, 50)
+    thin, _ = thin_features(root, Samples(solid), work)
+    (found,) = walls_of(Samples(solid), 1.0, work, [Measure()])
+    lasting = thin.lasting(found, solid.voxel)
+    both = [thin.beside(project_faces(root, w, solid.voxel, work), 1.0) for w in (found, lasting)]
+    assert 0 < len(lasting.width) < len(found.width)
+    np.testing.assert_array_equal(both[0].width, both[1].width)

@@ -83,6 +83,8 @@ class BoundNearest {
     Nearest nearest_;
 };
 
+using Strided = nb::ndarray<const double, nb::ndim<1>, nb::device::cpu>;
+
 class BoundMeshField {
   public:
     BoundMeshField(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<int64_t>& order,
@@ -94,13 +96,29 @@ class BoundMeshField {
           })) {}
 
     // Calls come from many threads: each takes one.
-    nb::object points(const Rows<double>& points, bool measured) const {
-        Array<double> values(points.shape(0), 1);
+    nb::object points(const Strided& x, const Strided& y, const Strided& z, bool measured) const {
+        const size_t count = x.shape(0);
+        if (y.shape(0) != count || z.shape(0) != count) throw std::invalid_argument("coordinates differ in length");
+        Array<double> points(count, 3), values(count, 1);
         {
             nb::gil_scoped_release released;
-            field_.points(span_of(points), measured, values.data.get());
+            size_t k = 0;
+            for (const Strided* row : {&x, &y, &z}) {
+                const double* from = row->data();
+                for (size_t i = 0; i < count; ++i) points.data[3 * i + k] = from[ptrdiff_t(i) * row->stride(0)];
+                ++k;
+            }
+            field_.points({points.data.get(), 3 * count}, measured, values.data.get());
         }
-        return to_numpy(std::move(values), {points.shape(0)});
+        return to_numpy(std::move(values), {count});
+    }
+    nb::object bricks(const Rows<int32_t>& corners, const std::array<double, 3>& origin, double voxel, bool measured) const {
+        Array<float> values(corners.shape(0), 512);
+        {
+            nb::gil_scoped_release released;
+            field_.bricks(span_of(corners), origin, voxel, measured, values.data.get());
+        }
+        return to_numpy(std::move(values), {corners.shape(0), 512});
     }
 
   private:
@@ -161,7 +179,8 @@ void bind_reduction(nb::module_& module) {
     nb::class_<BoundMeshField>(module, "MeshField")
         .def(nb::init<const Rows<double>&, const Rows<int32_t>&, const Vector<int64_t>&, const Rows<double>&, const Rows<double>&>(),
              "vertices"_a, "triangles"_a, "order"_a, "low"_a, "high"_a)
-        .def("points", &BoundMeshField::points, "points"_a, "measured"_a);
+        .def("points", &BoundMeshField::points, "x"_a, "y"_a, "z"_a, "measured"_a)
+        .def("bricks", &BoundMeshField::bricks, "corners"_a, "origin"_a, "voxel"_a, "measured"_a);
     nb::class_<BoundSolid>(module, "Solid")
         .def(nb::init<const Rows<double>&, const Rows<int32_t>&, const Vector<int64_t>&, const Rows<double>&, const Rows<double>&>(),
              "vertices"_a, "triangles"_a, "order"_a, "low"_a, "high"_a)

@@ -98,7 +98,7 @@ std::vector<Reach> reaches(const MeshView& mesh, std::span<const int32_t> labels
 Components connected_components(const Triangles& triangles) {
     Array<int32_t> parent(triangles.vertices, 1);
     for_each_number(triangles.vertices, [&](size_t v) { parent.data[v] = int32_t(v); });
-    const DisjointSets<int32_t> forest({parent.data.get(), triangles.vertices});
+    const DisjointSets<int32_t, true> forest({parent.data.get(), triangles.vertices});
     for_each_number(triangles.count, [&](size_t t) {
         forest.unite(triangles[t][0], triangles[t][1]);
         forest.unite(triangles[t][0], triangles[t][2]);

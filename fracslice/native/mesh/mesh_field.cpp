@@ -18,6 +18,11 @@ bool crosses(const double* a, const double* b, double x, double y) {
     return a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0]) > x;
 }
 
+// Twice the area of a triangle in projection, positive if it faces up.
+double area(const double* a, const double* b, const double* c) {
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+}
+
 }  // namespace
 
 Winding::Winding(const MeshView& mesh) : mesh_(mesh), side_(std::clamp(size_t(std::sqrt(double(mesh.count))), size_t(1), kCells)) {
@@ -26,10 +31,11 @@ Winding::Winding(const MeshView& mesh) : mesh_(mesh), side_(std::clamp(size_t(st
         for (size_t v = 0; v < mesh.vertices; ++v) {
             low = std::min(low, mesh.positions[3 * v + k]), high = std::max(high, mesh.positions[3 * v + k]);
         }
-        low_[k] = low, scale_[k] = double(side_) / std::max(high - low, 1e-30);
+        low_[k] = low, high_[k] = high, scale_[k] = double(side_) / std::max(high - low, 1e-30);
     }
     auto each = [&](const auto& act) {
         for (size_t t = 0; t < mesh.count; ++t) {
+            if (area(mesh.corner(t, 0), mesh.corner(t, 1), mesh.corner(t, 2)) == 0) continue;  // no line goes through it
             size_t first[2], last[2];
             for (size_t k = 0; k < 2; ++k) {
                 double a = mesh.corner(t, 0)[k], b = mesh.corner(t, 1)[k], c = mesh.corner(t, 2)[k];
@@ -57,6 +63,8 @@ void Winding::inside(std::span<const double> points, bool* inside) const {
     double x = std::numeric_limits<double>::quiet_NaN(), y = x;
     for (size_t i = 0; i < points.size() / 3; ++i) {
         const double* p = &points[3 * i];
+        inside[i] = false;
+        if (p[0] < low_[0] || p[0] > high_[0] || p[1] < low_[1] || p[1] > high_[1]) continue;
         if (p[0] != x || p[1] != y) x = p[0], y = p[1], cross(x, y, crossings);
         int winding = 0;
         for (const Crossing& one : crossings) winding += one.height > p[2] ? one.turn : 0;
@@ -73,8 +81,7 @@ void Winding::cross(double x, double y, std::vector<Crossing>& crossings) const 
         const size_t t = triangles_[entry];
         const double *a = mesh_.corner(t, 0), *b = mesh_.corner(t, 1), *c = mesh_.corner(t, 2);
         if (!(crosses(a, b, x, y) ^ crosses(b, c, x, y) ^ crosses(c, a, x, y))) continue;
-        double up = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-        if (up == 0) continue;
+        const double up = area(a, b, c);
         double s = ((x - a[0]) * (c[1] - a[1]) - (y - a[1]) * (c[0] - a[0])) / up;
         double r = ((b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])) / up;
         crossings.push_back({a[2] + s * (b[2] - a[2]) + r * (c[2] - a[2]), up > 0 ? 1 : -1});
@@ -84,16 +91,42 @@ void Winding::cross(double x, double y, std::vector<Crossing>& crossings) const 
 void MeshField::points(std::span<const double> points, bool measured, double* values) const {
     std::vector<double> known;
     std::vector<size_t> which;
+    auto is_finite = [](const double* p) { return std::isfinite(p[0] + p[1] + p[2]); };
+    size_t first = 0;
+    while (first < points.size() && is_finite(&points[first])) first += 3;
+    if (first == points.size()) return finite_points(points, measured, values);
     for (size_t i = 0; i < points.size() / 3; ++i) {
         const double* p = &points[3 * i];
         values[i] = std::numeric_limits<double>::quiet_NaN();
-        if (std::isfinite(p[0] + p[1] + p[2])) known.insert(known.end(), p, p + 3), which.push_back(i);
+        if (is_finite(p)) known.insert(known.end(), p, p + 3), which.push_back(i);
     }
-    std::vector<double> away(which.size(), 1.0);
-    auto inside = std::make_unique<bool[]>(which.size());
-    winding_.inside(known, inside.get());
-    if (measured) nearest_.near(known, away.data());
-    for (size_t i = 0; i < which.size(); ++i) values[which[i]] = inside[i] ? -away[i] : away[i];
+    std::vector<double> found(which.size());
+    finite_points(known, measured, found.data());
+    for (size_t i = 0; i < which.size(); ++i) values[which[i]] = found[i];
+}
+
+void MeshField::finite_points(std::span<const double> points, bool measured, double* values) const {
+    const size_t count = points.size() / 3;
+    auto inside = std::make_unique<bool[]>(count);
+    winding_.inside(points, inside.get());
+    std::fill_n(values, count, 1.0);
+    if (measured) nearest_.near(points, values);
+    for (size_t i = 0; i < count; ++i) values[i] = inside[i] ? -values[i] : values[i];
+}
+
+void MeshField::bricks(std::span<const int32_t> corners, const std::array<double, 3>& origin, double voxel, bool measured,
+                       float* values) const {
+    std::array<double, 3 * 512> grid;
+    std::array<double, 512> result;
+    for (size_t brick = 0; brick < corners.size() / 3; ++brick) {
+        const int32_t* corner = &corners[3 * brick];
+        for (int s = 0; s < 512; ++s) {
+            const int at[3] = {s >> 6, s >> 3 & 7, s & 7};
+            for (size_t k = 0; k < 3; ++k) grid[3 * size_t(s) + k] = origin[k] + voxel * (corner[k] + at[k]);
+        }
+        points(grid, measured, result.data());
+        std::copy(result.begin(), result.end(), values + 512 * brick);
+    }
 }
 
 }  // namespace fracslice::mesh

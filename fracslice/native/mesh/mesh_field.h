@@ -1,5 +1,6 @@
 // A closed mesh as a field: distances, negative where the mesh winds around a point.
 #pragma once
+#include <array>
 #include <span>
 #include <vector>
 
@@ -25,7 +26,7 @@ class Winding {
     void cross(double x, double y, std::vector<Crossing>& crossings) const;
 
     MeshView mesh_;
-    double low_[2], scale_[2];  // the lower corner of the grid, and cells per unit
+    double low_[2], high_[2], scale_[2];  // corners of the grid, and cells per unit
     size_t side_;               // cells along each axis
     std::vector<size_t> starts_;
     std::vector<uint32_t> triangles_;  // of each cell
@@ -38,8 +39,12 @@ class MeshField {
 
     // Values at points [n, 3]; NaN where one is not finite. Only signs mean anything if they are not measured.
     void points(std::span<const double> points, bool measured, double* values) const;
+    // The same on bricks of 8 x 8 x 8 grid points, from their first ones: [n, 3] to [n, 512], offset x*64 + y*8 + z.
+    void bricks(std::span<const int32_t> corners, const std::array<double, 3>& origin, double voxel, bool measured, float* values) const;
 
   private:
+    void finite_points(std::span<const double> points, bool measured, double* values) const;
+
     Nearest nearest_;
     Winding winding_;
 };

@@ -15,6 +15,10 @@ namespace {
 constexpr size_t kTurn = 256;
 // Points that share a search, those that share a part of what it finds, and the most leaves that it may find.
 constexpr size_t kRun = 64, kGroup = 8, kMost = 512;
+// The most triangles that a run or a group compares one by one.
+constexpr size_t kFew = 8;
+// The least length of the normal of a triangle that is no sliver, by the squares of its sides.
+constexpr double kSliver = 1e-4;
 // Points that are sorted in space, and cells along each side of their box.
 constexpr size_t kSorted = 512, kCells = 8;
 // The longest way over neighbouring triangles.
@@ -137,6 +141,25 @@ struct Nearest::Found {
     Boxes<kMost> boxes;
 };
 
+// A triangle, with what many points ask of it.
+struct Candidate {
+    size_t triangle = 0;
+    TriangleDistance distance;
+    const double* corner = nullptr;
+    double normal[3] = {0, 0, 0};  // of unit length; 0 of a sliver, which leaves it no digits
+
+    Candidate() = default;
+    Candidate(const MeshView& mesh, size_t t) : triangle(t), distance(mesh, t), corner(mesh.corner(t, 0)) {
+        distance.normal(normal);
+        const double length = std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
+        for (double& x : normal) x = length > kSliver * distance.square_sides() ? x / length : 0;
+    }
+    // The distance of a point from the plane, to the rounding of coordinates.
+    double height(const double* p) const {
+        return std::abs((p[0] - corner[0]) * normal[0] + (p[1] - corner[1]) * normal[1] + (p[2] - corner[2]) * normal[2]);
+    }
+};
+
 // Distances of runs of points: leaves in which the nearest triangles of a run may be, of them those of a group.
 class Nearest::Run {
   public:
@@ -146,12 +169,18 @@ class Nearest::Run {
         Ball ball(points);
         Neighbour nearest = nearest_(ball.centre, guess_);
         guess_ = nearest.triangle;
-        const bool all = nearest_.around(ball.centre, ball.reach(nearest.square), around_);
+        const double reach = ball.reach(nearest.square);
+        const bool all = nearest_.around(ball.centre, reach, around_);
+        if (all && choose(around_, Rounded(ball.centre), reach)) {
+            for (size_t i = 0; i < points.size() / 3; ++i) distances[i] = std::sqrt(among(&points[3 * i]).square);
+            return;
+        }
         for (size_t first = 0, count = points.size() / 3; first < count; first += kGroup) {
             const size_t last = std::min(first + kGroup, count);
-            if (all) choose(points.subspan(3 * first, 3 * (last - first)));
+            const bool few = all && choose(points.subspan(3 * first, 3 * (last - first)));
             for (size_t i = first; i < last; ++i) {
-                Neighbour one = all ? among(chosen_, &points[3 * i]) : nearest_(&points[3 * i], guess_);
+                const double* p = &points[3 * i];
+                Neighbour one = few ? among(p) : all ? among(chosen_, p) : nearest_(p, guess_);
                 guess_ = one.triangle, distances[i] = std::sqrt(one.square);
             }
         }
@@ -169,7 +198,8 @@ class Nearest::Run {
         return best;
     }
 
-    void choose(std::span<const double> group) {
+    // The leaves of a group; whether their triangles are few.
+    bool choose(std::span<const double> group) {
         Ball ball(group);
         Neighbour nearest = among(around_, ball.centre);
         const double reach = ball.reach(nearest.square);
@@ -183,12 +213,44 @@ class Nearest::Run {
             }
             chosen_.leaves[chosen_.count++] = around_.leaves[i];
         }
+        return choose(chosen_, Rounded(ball.centre), reach);
+    }
+
+    // Triangles of leaves within a distance of a point, given its square; whether they are few.
+    bool choose(const Found& found, const Rounded& centre, double reach) {
+        few_ = 0;
+        for (size_t i = 0; i < found.count; ++i) {
+            float squares[kLeaf];
+            const size_t leaf = found.leaves[i], first = nearest_.tree_.first(leaf);
+            nearest_.circles_[leaf].squares(centre.x, float(nearest_.larger_), squares);
+            for (size_t n = first; n < nearest_.tree_.last(leaf); ++n) {
+                if (squares[n - first] > reach) continue;
+                if (few_ == kFew) return false;
+                const size_t t = size_t(nearest_.tree_.order[n]);
+                candidates_[few_++] = Candidate(nearest_.mesh_, t);
+                if (t == guess_) std::swap(candidates_[0], candidates_[few_ - 1]);  // that leaves most of the others too far
+            }
+        }
+        return few_ > 0;
+    }
+
+    Neighbour among(const double* p) const {
+        Neighbour best{candidates_[0].triangle, candidates_[0].distance.square(p)};
+        for (size_t i = 1; i < few_; ++i) {
+            const Candidate& one = candidates_[i];
+            const double above = std::max(one.height(p) - nearest_.larger_, 0.0);  // less than from its plane
+            if (above * above >= best.square) continue;
+            if (double square = one.distance.square(p); square < best.square) best = {one.triangle, square};
+        }
+        return best;
     }
 
     const Nearest& nearest_;
     size_t guess_ = 0;
     Found around_, chosen_;
     float squares_[kMost];
+    size_t few_ = 0;
+    Candidate candidates_[kFew];  // those that are compared one by one
 };
 
 Nearest::Nearest(const MeshView& mesh, const TreeView& tree, bool closed) : mesh_(mesh), tree_(tree), circles_(tree.leaves) {

@@ -88,6 +88,9 @@ class Bound {
         return nb::make_tuple(to_numpy<double>(found.points), to_numpy<double>(found.normals),
                               numbers<double>(found.area, {found.area.size()}));
     }
+    bool may_be_deep(double depth, double lipschitz) const {
+        return unlocked([&] { return field_.may_be_deep(depth, lipschitz); });
+    }
 
   private:
     volume::Bricks checked() const {
@@ -221,7 +224,8 @@ void bind_printing(nb::module_& module) {
         .def("capsule_values", &Bound::capsule_values, "x"_a, "y"_a, "z"_a, "radius"_a)
         .def("free", &Bound::free, "start"_a, "directions"_a, "far"_a)
         .def("through", &Bound::through, "start"_a, "directions"_a, "limit"_a, "towards"_a)
-        .def("crossings", &Bound::crossings, "rows"_a);
+        .def("crossings", &Bound::crossings, "rows"_a)
+        .def("may_be_deep", &Bound::may_be_deep, "depth"_a, "lipschitz"_a);
     module.def("solid_components", &bind_components<float>, "ijk"_a, "values"_a.noconvert(), "index"_a);
     module.def("solid_components", &bind_components<int8_t>, "ijk"_a, "values"_a.noconvert(), "index"_a);
     module.def("crossings_by_component", &bind_crossings<float, int32_t>, "ijk"_a, "values"_a.noconvert(), "index"_a,

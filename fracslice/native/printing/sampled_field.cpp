@@ -265,4 +265,32 @@ Crossings SampledField::crossings(std::span<const int64_t> rows) const {
     return result;
 }
 
+// A point as deep is farther from each corner of its cell than what the value there exceeds -depth by; of two opposite corners,
+// the squares of its distances are at most three in sum.
+bool SampledField::may_be_deep(double depth, double lipschitz) const {
+    constexpr std::array<int, 3> steps{kAround * kAround, kAround, 1};
+    const size_t count = bounds_.size(), samples = bricks_.count * volume::kSamples;
+    if (std::find(bricks_.index, bricks_.index + count, volume::kInside) != bricks_.index + count) return true;
+    const double unit = lipschitz * voxel_;
+    if (!samples || *std::min_element(bricks_.values, bricks_.values + samples) <= -depth * unit) return samples > 0;
+    auto square = [&](float f) {
+        const double away = std::max(f / unit + depth, 0.0);
+        return away * away;
+    };
+    Neighbourhood f;
+    for (size_t row = 0; row < bricks_.count; ++row) {
+        gather(row, f);
+        for (int s = 0; s < volume::kSamples; ++s) {
+            const float* here = &f[size_t(((s >> 6) + 1) * steps[0] + ((s >> 3 & 7) + 1) * steps[1] + (s & 7) + 1)];
+            bool is_possible = true;
+            for (int corner = 0; is_possible && corner < 4; ++corner) {
+                const int at = (corner >> 1) * steps[1] + (corner & 1), opposite = steps[0] + steps[1] + 1 - at;
+                is_possible = square(here[at]) + square(here[opposite]) <= 3;
+            }
+            if (is_possible) return true;
+        }
+    }
+    return false;
+}
+
 }  // namespace fracslice::printing

@@ -37,6 +37,8 @@ class SampledField {
     // Distances along rays to where `towards` times the value turns positive; twice the limit if that is farther.
     std::vector<double> through(const Rays& rays, double limit, double towards) const;
     Crossings crossings(std::span<const int64_t> rows) const;
+    // Whether some point may be deeper inside than `depth` voxels, where values differ by at most `lipschitz` times a distance.
+    bool may_be_deep(double depth, double lipschitz) const;
 
   private:
     static constexpr int kAround = 11;  // samples along each axis of a brick with one layer before it and two after it

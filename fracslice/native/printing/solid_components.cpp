@@ -23,7 +23,7 @@ template <class Index, class Value>
 class Elements {
   public:
     Elements(const volume::Layout& layout, const Value* values, std::span<Index> parent)
-        : layout_(layout), values_(values), sets_(parent), tile_(size_t(layout.size[0]) * size_t(layout.size[1]) * size_t(layout.size[2])) {
+        : layout_(layout), values_(values), parent_(parent), sets_(parent), tile_(size_t(layout.size[0]) * size_t(layout.size[1]) * size_t(layout.size[2])) {
         Index next = Index(1 + layout.count * kSamples);
         for (size_t b = 0; b < tile_.size(); ++b) tile_[b] = layout.index[b] < 0 ? next++ : 0;
     }
@@ -46,7 +46,7 @@ class Elements {
     void unite_samples(size_t row) {
         const auto brick = brick_of(layout_, row);
         const Value* f = values_ + row * kSamples;
-        for (int axis = 0; axis < 3; ++axis) {
+        for (int axis = 2; axis >= 0; --axis) {
             const int shift = 6 - 3 * axis;
             auto before = brick, behind = brick;
             --before[size_t(axis)], ++behind[size_t(axis)];
@@ -79,11 +79,12 @@ class Elements {
         return within ? tile_[(size_t(x) * size_t(ny) + size_t(y)) * size_t(nz) + size_t(z)] : 0;
     }
     void unite_like(bool side, Index element, bool other_side, Index other) {
-        if (side == other_side) sets_.unite(element, other);
+        if (side == other_side && parent_[size_t(element)] != parent_[size_t(other)]) sets_.unite(element, other);
     }
 
     const volume::Layout& layout_;
     const Value* values_;
+    std::span<const Index> parent_;
     DisjointSets<Index> sets_;
     std::vector<Index> tile_;  // element of each unsampled brick
 };
