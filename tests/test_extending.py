@@ -14,8 +14,7 @@ from fracslice.scene import reads
 from tests.export.test_slices import run
 
 FORMULA = '''
-from fracslice.formulas import Box, Number, shape
-from fracslice.expr.vocabulary import sqrt
+from fracslice.formulas import Box, Number, shape, sqrt
 
 
 @shape(radius=Number(1.0, "the radius", above=0))
@@ -27,7 +26,7 @@ def pearl(x, y, z, radius):
 @pearl.bounds
 def pearl_bounds(node):
     return Box.centred(node["radius"])
-'''.replace("fracslice.expr.vocabulary", "fracslice.expr.vocabulary")
+'''
 
 FORMAT = """
 from fracslice.export.layer_formats import FileFormat

@@ -37,6 +37,10 @@ class Kept:
         """Read a cached file."""
         return self._trusted(lambda here: self._read(name, read, here))
 
+    def place(self) -> Path | None:
+        """Return the path of the folder, for what needs one; None if others can write to it."""
+        return self._trusted(lambda _: Path(os.path.realpath(self.folder)))
+
     def put(self, name: str, write: Callable[[BinaryIO], object]) -> None:
         """Write a cached file atomically; ignore a folder that is not trusted."""
         target = Path(os.path.realpath(self.folder), name)
