@@ -6,8 +6,10 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from ..expr.vectors import upward
 from ..fields.linker import FieldDialect, Linker, link_tree
 from ..fields.registry import Fixed, Node
+from ..scene.lights import KINDS, sky
 from ..scene.view import Camera, Fog, Light, View
 from . import glow
 from .environments import PIXELS, Environment, environment, load_picture
@@ -17,7 +19,7 @@ from .scattering import division_lines, lacquer_lines
 from .setup import Optics, ray_bound
 from .units import environment as units
 from .units import fog as fog_units
-from .units import lights, march, shade
+from .units import march, shade
 from .units.glossy import highlight
 from .units.intrinsics import background, blocker, transparent
 from .units.pixel import linear
@@ -26,28 +28,19 @@ from .units.weights import behind, mixed_weights, sun_density, sunshine, weights
 
 def casts_shadows(light: Light) -> bool:
     """Return whether the light may be blocked; the surfaces in view never block a light at the camera."""
-    return light.shadows == "yes" and light.kind != "camera"
+    return light.shadows == "yes" and KINDS[light.kind].is_blocked
 
 
 def bind_light(linker: Linker, name: str, light: Light, eye: tuple[float, float, float], far: float) -> None:
-    """Bind the unit of a sun or lamp, or of a light at the camera."""
-    if light.kind == "camera":
-        linker.bind(name, lights.sharp_lamp, {"position": eye})
-        return
-    if light.kind == "lamp":
-        soft, function = {"radius": light.size}, lights.lamp if light.size else lights.sharp_lamp
-        linker.bind(name, function, {"position": light.position, **(soft if light.size else {})})
-        return
-    length = math.hypot(*light.position)
-    values: dict[str, Any] = {"towards": tuple(p / length for p in light.position), "far": far}
-    if light.size:
-        values["spread"] = math.tan(math.radians(light.size) / 2)
-    linker.bind(name, lights.sun if light.size else lights.sharp_sun, values)
+    """Bind the unit of a light that does not surround the scene."""
+    unit = KINDS[light.kind].unit
+    assert unit is not None
+    linker.bind(name, *unit(light, eye, far))
 
 
 def seen_as_disc(light: Light) -> bool:
     """Return whether continued rays meet the light: a sun of some size."""
-    return light.kind == "sun" and light.size > 0 and light.shadows == "yes"
+    return KINDS[light.kind].is_disc and light.size > 0 and light.shadows == "yes"
 
 
 def tint(light: Light) -> tuple[float, ...]:
@@ -166,9 +159,9 @@ def _inscatter_lines(lighting: Lighting, fog: Fog, values: dict[str, float]) -> 
         lines.append("haze = where(side < 0.0, 0.0, haze)")
     part = linker.argument(fog.scatter / 4)
     for k, light in enumerate(lighting.view.lights):
-        if light.kind not in ("sun", "lamp"):
+        if light.surrounds or not KINDS[light.kind].is_blocked:
             continue
-        soft = lighting.drawn.names(2) if light.size else ["t", "t"]
+        soft = lighting.drawn.names(2) if KINDS[light.kind].is_soft(light) else ["t", "t"]
         lines.append(f"lx, ly, lz, far, power = light{k}(px, py, pz, {', '.join(soft)}, P)")
         if light.shadows == "yes":
             lines.append("power = power * visible_(px, py, pz, lx, ly, lz, far, h, P)")
@@ -259,12 +252,10 @@ class Lighting:
     def light(self, k: int, light: Light, look: Look) -> list[str]:
         """Lines for one sun or lamp, or a light at the camera."""
         self.linker.share(shade.phong)
-        soft = light.size and light.kind != "camera"
-        u, v = self.drawn.names(2) if soft else ("t", "t")
+        kind = KINDS[light.kind]
+        u, v = self.drawn.names(2) if kind.is_soft(light) else ("t", "t")
         bind_light(self.linker, f"light{k}", light, self.camera.eye, self.seen.far)
-        strength = light.strength
-        if light.kind == "camera":
-            strength *= math.dist(self.camera.eye, self.camera.target) ** 2
+        strength = light.strength * kind.scale(self.camera.eye, self.camera.target)
         colour = [self.linker.argument(c * strength) for c in linear(light.colour)]
         lines = [
             f"lx, ly, lz, far, power = light{k}(x, y, z, {u}, {v}, P)",
@@ -354,7 +345,7 @@ class Lighting:
             lines = ["hr, hg, hb = sky_(nx, ny, nz, P)", "open = ambient * 0.0 + 1.0"]
         else:
             u, v = self.drawn.names(2)
-            self.linker.share(lights.upward)
+            self.linker.share(upward)
             far = self.linker.argument(self.seen.far)
             lines = [
                 f"lx, ly, lz = upward(nx, ny, nz, {u}, {v})",
@@ -371,7 +362,7 @@ class Lighting:
             return
         names = {"zenith": light.colour, "horizon": light.horizon, "ground": light.ground}
         values = {n: tuple(c * light.strength for c in linear(colour)) for n, colour in names.items()}
-        self.linker.bind("sky_", lights.sky, values)
+        self.linker.bind("sky_", sky.radiance, values)
 
     def fog(self, onward: bool) -> list[str]:
         """Lines for fog; see `fog_lines`."""

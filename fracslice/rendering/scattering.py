@@ -6,12 +6,13 @@ from functools import lru_cache
 
 import numpy as np
 
+from ..expr import vectors
 from ..fields.linker import Linker
 from . import glow
 from .glow import Drawn
 from .materials import Look
 from .setup import ray_bound
-from .units import glossy, lights, march, shade, weights
+from .units import glossy, march, shade, weights
 
 CHANNELS = "rgb"
 MIDPOINTS = 24
@@ -101,7 +102,7 @@ def _start_lines(linker: Linker, look: Look) -> list[str]:
 
 def _reflection_lines(linker: Linker, drawn: Drawn, look: Look) -> list[str]:
     """Lines for reflection by microfacets."""
-    for function in (glossy.width, glossy.hidden, lights.frame, glossy.glossy):
+    for function in (glossy.width, glossy.hidden, vectors.frame, glossy.glossy):
         linker.share(function)
     u, v = drawn.names(2)
     lines = [f"ex, ey, ez, weight, half = glossy(dx, dy, dz, nx, ny, nz, roughness, {u}, {v})", "es = side"]
@@ -141,7 +142,7 @@ def _scatter_choice_lines(linker: Linker, drawn: Drawn, look: Look) -> list[str]
     One sample of both (Veach 1997), and Russian roulette with the probability of the throughput (Arvo and
     Kirk 1990).
     """
-    for function in (lights.disc, lights.upward):
+    for function in (vectors.disc, vectors.upward):
         linker.share(function)
     u, v, choice, life = drawn.names(4)
     lines = [f"wx, wy, wz = upward(nx, ny, nz, {u}, {v})"]

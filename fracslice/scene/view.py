@@ -7,9 +7,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from ..common.parameters import Choice, Count, File, Number, Vector, attribute, validate_value
+from ..common.parameters import Choice, Count, File, Number, Vector, alternatives, attribute, validate_value
 from ..fields.box import Box
 from ..records import Part
+from .lights import KINDS
 
 if TYPE_CHECKING:
     import numpy as np
@@ -284,8 +285,8 @@ class Light(Part):
     kind: str = attribute(
         Choice,
         "sun",
-        "far away, near, all around, a picture of the surroundings, or at the camera",
-        ("sun", "lamp", "sky", "environment", "camera"),
+        alternatives(*(kind.doc for kind in KINDS.values())),
+        tuple(KINDS),
     )
     position: Triple = attribute(
         Vector, (-1.0, -2.0, 3.0), "where a lamp is, or the direction in which the sun stands", nonzero=True
@@ -320,7 +321,7 @@ class Light(Part):
     @property
     def surrounds(self) -> bool:
         """True if rays that miss the scene show it."""
-        return self.kind in ("sky", "environment")
+        return KINDS[self.kind].surrounds
 
     def validate(self) -> None:
         """Raise `SceneError` unless an environment, and nothing else, has a file."""

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+from ...expr.vectors import disc, normalised
 from ...expr.vocabulary import cos, maximum, minimum, sin, sqrt, where
-from .lights import disc
-from .march import normalised
 
 
 def pinhole(px, py, lens_u, lens_v, eye, corner, across, down):

@@ -7,9 +7,9 @@ function of the rows, then that of the columns of each row, every one from 0 to 
 
 from __future__ import annotations
 
+from ...expr.vectors import TURN
 from ...expr.vocabulary import atan2, cos, floor, maximum, minimum, sin, sqrt, where
 from .intrinsics import gather
-from .lights import TURN
 
 HALF_TURN = 3.141592653589793
 

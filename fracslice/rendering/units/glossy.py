@@ -5,11 +5,10 @@ Trowbridge and Reitz 1975 (GGX of Walter et al. 2007), with Smith's height-corre
 
 from __future__ import annotations
 
+from ...expr.vectors import TURN, frame, normalised
 from ...expr.vocabulary import cos, floor, maximum, rsqrt, sin, sqrt, where
 from .environment import bounded
 from .intrinsics import gather
-from .lights import TURN, frame
-from .march import normalised
 from .shade import fresnel, mirrored
 
 SMOOTHEST = 1e-3

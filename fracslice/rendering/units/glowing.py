@@ -7,8 +7,9 @@ Carlo Rendering", with one sample. The ray itself finds what it meets, so that b
 
 from __future__ import annotations
 
+from ...expr.vectors import normalised
 from ...expr.vocabulary import absolute, maximum, where
-from .march import normalised, span
+from .march import span
 from .weights import HALF_TURN, facet_density
 
 SENT = 0.5

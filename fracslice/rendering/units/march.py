@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from ...expr.vocabulary import absolute, any_of, exp, maximum, minimum, rsqrt, sqrt, where
+from ...expr.vectors import normalised
+from ...expr.vocabulary import absolute, any_of, exp, maximum, minimum, sqrt, where
 from .intrinsics import blocker, field, transparent
 
 MOST = 1.8
@@ -190,12 +191,6 @@ def tinted_shadow(x, y, z, dx, dy, dz, far, least, P, steepness, patience):
         t = t + step
         going = going & (t < far)
     return r, g, b
-
-
-def normalised(x, y, z):
-    """Normalise a vector; the zero vector stays zero."""
-    over = rsqrt(maximum(x * x + y * y + z * z, 1e-36))
-    return x * over, y * over, z * over
 
 
 def normal(x, y, z, h, P):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from ...expr.vectors import normalised
 from ...expr.vocabulary import absolute, exp, floor, log, maximum, minimum, sqrt, where
 from .intrinsics import field
-from .march import normalised
 
 
 def phong(nx, ny, nz, dx, dy, dz, lx, ly, lz, specular, shininess):

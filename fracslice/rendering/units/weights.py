@@ -58,7 +58,7 @@ def density_onward(chosen, nx, ny, nz, dx, dy, dz, ex, ey, ez, rough, share):
 
 
 def sun_density(dx, dy, dz, towards, spread):
-    """Return the density with which `lights.sun` takes a direction."""
+    """Return the density with which `scene.lights.sun` takes a direction."""
     lx, ly, lz = towards
     cosine = dx * lx + dy * ly + dz * lz
     s2 = spread * spread
