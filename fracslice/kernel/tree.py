@@ -59,9 +59,9 @@ def loops(root: Node, loops: Sequence[Loop], precision: Precision, device: Devic
     """Compile loops over a tree with resolved depths; see `Field.loops`."""
     if device == "cpu":
         return cpu.compile_loops(link(root), tuple(loops), precision)
-    from . import cuda_launching
+    from . import cuda
 
-    return cuda_launching.compile_loops(link(root), tuple(loops), precision)
+    return cuda.compile_loops(link(root), tuple(loops), precision)
 
 
 def cells(root: Node, precision: Precision) -> Cells:

@@ -11,7 +11,7 @@ import pytest
 
 from fracslice.errors import FracsliceError, SceneError
 from fracslice.formulas.node import FORMULAS
-from fracslice.kernel import compile_scene, cuda_loops, cuda_source, link, reference
+from fracslice.kernel import compile_scene, link, reference
 from tests.kernel.idioms import HEAD, SAME, P, X, Y, Z, imported
 
 
@@ -34,7 +34,6 @@ def test_pythons_own_words_are_those_of_the_vocabulary(module, body: str) -> Non
     root = module(HEAD + "    " + body).mine(radius=0.7)
     np.testing.assert_allclose(reference(root)(*P), SAME[body], rtol=1e-13, atol=1e-13)
     np.testing.assert_allclose(compile_scene(root, "float64").points(*P), SAME[body], rtol=1e-12, atol=1e-12)
-    assert "**" not in cuda_source.module(link(root), 32, [cuda_loops.points])
 
 
 REFUSED = {

@@ -63,7 +63,7 @@ def test_native_objects_refuse_other_loops() -> None:
         slab_of((kernel._bricks, kernel._parameters))
     with pytest.raises(RuntimeError):
         slab_of((kernel._points, kernel._parameters.astype(np.float64)))
-    assert (bricks.arguments, points.arguments) == ("rrrrrirn", "rrrrrn")
+    assert (bricks.arguments, points.arguments) == ("rxxxxrrrirn", "rrrrrn")
 
 
 def test_arrays_become_addresses_in_one_place() -> None:
@@ -73,7 +73,7 @@ def test_arrays_become_addresses_in_one_place() -> None:
         str(path.relative_to(package)) for path in package.rglob("*.py") if address.search(path.read_text())
     }
     own = {"viewer/screen.py"}  # names X11's result type
-    driver = {f"kernel/cuda_{part}.py" for part in ("launching", "memory")}  # returns when it has copied
+    driver = {"kernel/cuda.py", "kernel/cuda_driver.py"}  # which returns when it has copied
     assert result == {"kernel/machine.py"} | own | driver
 
 
