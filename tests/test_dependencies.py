@@ -19,7 +19,6 @@ EXTRAS = PROJECT["optional-dependencies"]
 MODULES = {
     "pillow": "PIL",
     "scikit-image": "skimage",
-    "numba-cuda": "numba_cuda",
     "imageio-ffmpeg": "imageio_ffmpeg",
 }
 """Of packages, where it has another name."""
@@ -28,7 +27,7 @@ WITHIN = {"vtkmodules": "pyvista", "Imath": "OpenEXR"}
 """Modules that come with a package, and no other way."""
 
 BLOCKED = (
-    "pyvista vtkmodules matplotlib skimage numba_cuda manifold3d pymeshlab lxml networkx "
+    "pyvista vtkmodules matplotlib skimage manifold3d pymeshlab lxml networkx "
     "hypothesis shapely imageio_ffmpeg pyoidn distributed dask fsspec"
 )
 
@@ -73,7 +72,7 @@ def test_every_core_dependency_is_imported_at_run_time() -> None:
 
 def test_what_is_imported_at_run_time_is_declared() -> None:
     extras = [package for name, packages in EXTRAS.items() if name not in DEVELOPERS for package in packages]
-    assert used() - {"numba_cuda"} <= modules(PROJECT["dependencies"] + extras)
+    assert used() <= modules(PROJECT["dependencies"] + extras)
     assert modules(extras) - used() == set()
 
 
@@ -122,11 +121,6 @@ def test_the_main_job_needs_no_extra(ball_xml: Path) -> None:
             'clusters need distributed{} "distributed"',
         ),
         ("matplotlib", "bench", 'plots need matplotlib{} "matplotlib"'),
-        (
-            "numba_cuda",
-            "mesh ball.xml -o b.stl --device cuda",
-            'device cuda: CUDA needs numba-cuda[cu13]{} "numba-cuda[cu13]"',
-        ),
     ],
 )
 def test_a_missing_extra_is_one_line_that_says_what_to_install(

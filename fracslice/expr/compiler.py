@@ -1,4 +1,6 @@
-"""Compilation of a linked scene to machine code by LLVM. Imported only if the kernel is not cached."""
+"""Compilation of a linked scene by LLVM, to machine code of the CPU or to PTX, the text that NVIDIA's driver
+assembles. Imported only if the kernel is not cached.
+"""
 
 from __future__ import annotations
 
@@ -6,16 +8,18 @@ import ast
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import llvmlite.binding as llvm
+import numpy as np
 from llvmlite import ir
 
 from . import lanes_math
 from .emitter import Emitter
 from .language import CALLED, Linked, parse
 from .loop_linker import link_loops
-from .loops import Loop
+from .loops import OWN, Loop, element_type, is_array
 from .values import DOUBLE, FLOAT, WHOLE, Lanes
 
 PART = ["x", "y", "z", "P", "P0"]
@@ -36,33 +40,68 @@ class Target:
 def compile_object(linked: Linked, target: Target, loops: Sequence[Loop]) -> bytes:
     """Compile loops over a scene's field to an object file with one C function per loop."""
     lanes_math.HOST_FEATURES = frozenset(f[1:] for f in target.features.split(",") if f.startswith("+"))
-    module = llvm.parse_assembly(_text(linked, target, loops))
+    lanes = Lanes(target.bits, target.width, target.registers)
+    text = _text(linked, lanes, llvm.get_process_triple(), loops)
+    # Stack frames are aligned to whole registers; otherwise registers spilled to the stack would straddle two
+    # cache lines.
+    module = llvm.parse_assembly(re.sub(r"(?m)^define .*$", r'\g<0> "stackrealign"', text))
     _optimise(module, _target_machine(target))
     return bytes(_machine(target).emit_object(module))
 
 
-def _text(linked: Linked, target: Target, loops: Sequence[Loop]) -> str:
-    """LLVM IR of the loops and of the scene's functions that they call.
+GPU = "nvptx64-nvidia-cuda"
+ARCHITECTURES = {50: 15, 60: 15, 70: 15, 75: 15, 80: 15, 86: 15, 89: 16, 90: 16, 100: 20, 120: 20}
+"""Compute capabilities, tenfold, that LLVM knows from a version on. Code for one runs on newer GPUs, too."""
 
-    Stack frames are aligned to whole registers; otherwise registers spilled to the stack would straddle two
-    cache lines.
+
+def compile_ptx(linked: Linked, bits: int, capability: tuple[int, int], loops: Sequence[Loop]) -> bytes:
+    """Compile loops over a scene's field to PTX with one kernel per loop.
+
+    `capability`: compute capability of the GPU.
     """
+    module = llvm.parse_assembly(_text(linked, Lanes(bits, 1, 1, on_gpu=True), GPU, loops))
+    version, most = llvm.llvm_version_info[0], 10 * capability[0] + capability[1]
+    chosen = max(number for number, since in ARCHITECTURES.items() if since <= version and number <= most)
+    features = "+ptx60" if chosen < 70 else ""  # has the barrier of a warp
+    machine = _gpu_target().create_target_machine(cpu=f"sm_{chosen}", features=features, opt=3)
+    _optimise(module, machine)
+    return str(machine.emit_assembly(module)).encode()
+
+
+@lru_cache(maxsize=1)
+def _gpu_target() -> llvm.Target:
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    llvm.set_option("", "-nvptx-fma-level=1")  # lets the GPU's assembler fuse products with sums
+    return llvm.Target.from_triple(GPU)
+
+
+def _text(linked: Linked, lanes: Lanes, triple: str, loops: Sequence[Loop]) -> str:
+    """LLVM IR of the loops and of the scene's functions that they call."""
     trees = [tree for tree in parse(linked.source).body if isinstance(tree, ast.FunctionDef)]
     called = frozenset(tree.name for tree in trees if CALLED in map(ast.unparse, tree.decorator_list))
-    lanes = Lanes(target.bits, target.width, target.registers)
     own = link_loops(tuple(loops))
     functions = {tree.name: tree for tree in (*trees, *(linked.tree for linked in own.values()))}
     emitter = Emitter(lanes, functions, called, {name: linked.file for name, linked in own.items()})
-    real = FLOAT if target.bits == 32 else DOUBLE
-    kinds = {"r": real.as_pointer(), "i": ir.IntType(32).as_pointer(), "n": WHOLE}
     for tree in trees:  # innermost elements first, so that the recursion is not as deep as the scene
         if [a.arg for a in tree.args.args] == PART:
             for points in sorted({loop.points for loop in loops}):
-                emitter.function(tree.name, (points, points, points, kinds["r"], WHOLE))
+                emitter.function(tree.name, (points, points, points, lanes.scalar.as_pointer(), WHOLE))
     for loop in loops:
-        emitter.entry(loop.name, tuple(kinds[letter] for letter in loop.arguments))
-    emitter.module.triple = llvm.get_process_triple()
-    return re.sub(r"(?m)^define .*$", r'\g<0> "stackrealign"', str(emitter.module))
+        own_arrays = {k: loop.own for k, letter in enumerate(loop.arguments) if letter in OWN}
+        emitter.entry(loop.name, tuple(_kind(letter, lanes) for letter in loop.arguments), own_arrays)
+    emitter.module.triple = triple
+    return str(emitter.module)
+
+
+def _kind(letter: str, lanes: Lanes) -> ir.Type:
+    """LLVM type of a loop's argument."""
+    element = element_type(letter, np.dtype(f"float{lanes.bits}"))
+    if element.kind == "f":
+        number = FLOAT if element.itemsize == 4 else DOUBLE
+    else:
+        number = ir.IntType(8 * element.itemsize)
+    return number.as_pointer() if is_array(letter) else number
 
 
 def _optimise(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> None:

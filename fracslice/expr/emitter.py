@@ -13,6 +13,7 @@ import ast
 import operator
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from ctypes import c_float
 from dataclasses import dataclass, field, replace
 from functools import reduce
 from typing import Any
@@ -20,10 +21,9 @@ from typing import Any
 from llvmlite import ir
 
 from ..errors import KernelError
-from . import lanes_math
 from .intervals import Interval, Possible, enclosed
 from .language import assigned_names, parse_expression
-from .registers import Vec
+from .registers import Vec, declare
 from .values import (
     BOOL,
     DOUBLE,
@@ -151,6 +151,7 @@ SPECIAL = {
     "upper": 1,
     "gather": 2,
     "solid_distance": 4,
+    "together": 0,
 }
 """Special intrinsics and their numbers of arguments."""
 
@@ -185,7 +186,7 @@ class SpecialIntrinsics:
         """Emit `any_of`: one bit test of the joined mask registers."""
         if isinstance(mask, Possible):
             return self.intrinsic_any_of(mask.may)
-        if not isinstance(mask, Vec):
+        if self.lanes.one or not isinstance(mask, Vec):
             return truth(self.builder, mask)
         parts = self.lanes.condition(self.builder, mask).parts
         word = ir.IntType(parts[0].type.count)
@@ -206,6 +207,9 @@ class SpecialIntrinsics:
 
     def extreme(self, which: str, a: Any, b: Any) -> Any:
         """Emit the minimum or maximum of two scalars."""
+        if self.lanes.one and any(isinstance(v, Vec) for v in (a, b)):
+            lane: Vec = getattr(self.lanes.math, f"{which}imum")(*self.numbers(a, b))
+            return lane
         if any(isinstance(v, (Vec, tuple)) for v in (a, b)):
             raise MismatchError("this is for numbers that are the same everywhere")
         kind = common(a.type, b.type)
@@ -244,8 +248,9 @@ class SpecialIntrinsics:
 
     def intrinsic_gather(self, index: Value, place: Any) -> Vec:
         """Load an element from memory for each lane."""
-        like = self.lanes.register
-        parts = []
+        if self.lanes.one:
+            return self.lanes.vec(self.builder, self.builder.load(self.address(place, index)))
+        like, parts = self.lanes.register, []
         for register in self.lanes.vec(self.builder, index).to_whole().parts:
             loaded = ir.Constant(like, ir.Undefined)
             for k in range(like.count):
@@ -279,10 +284,28 @@ class SpecialIntrinsics:
         builder.call(function, [builder.inttoptr(address, place), rows, result, ir.Constant(WHOLE, size)])
         return self.intrinsic_load(result, ir.Constant(WHOLE, 0))
 
+    def intrinsic_together(self) -> None:
+        """Wait for the other threads of the warp."""
+        if self.lanes.on_gpu:
+            kind = ir.FunctionType(ir.VoidType(), [ir.IntType(32)])
+            barrier = declare(self.builder.module, kind, "llvm.nvvm.bar.warp.sync")
+            self.builder.call(barrier, [ir.Constant(ir.IntType(32), -1)])
+
+    def thread(self) -> Any:
+        """Emit the index of this thread in the grid."""
+        kind = ir.FunctionType(ir.IntType(32), [])
+
+        def register(name: str) -> Any:
+            read = declare(self.builder.module, kind, f"llvm.nvvm.read.ptx.sreg.{name}.x")
+            return self.builder.zext(self.builder.call(read, []), WHOLE)
+
+        return self.builder.add(self.builder.mul(register("ctaid"), register("ntid")), register("tid"))
+
     def registers(self, place: Any, index: Value) -> list[Any]:
         """Addresses of the registers of lanes, starting at an array element."""
         first, kind = self.address(place, index), self.lanes.register
-        steps = (ir.Constant(WHOLE, k * kind.count) for k in range(self.lanes.registers))
+        size = self.lanes.width // self.lanes.registers
+        steps = (ir.Constant(WHOLE, k * size) for k in range(self.lanes.registers))
         return [self.builder.bitcast(self.builder.gep(first, [step]), kind.as_pointer()) for step in steps]
 
 
@@ -292,7 +315,7 @@ _ON_LANES: dict[type, Callable[[Vec, Vec], Vec]] = {
     ast.NotEq: operator.ne,
 }  # fmt: skip
 _INTRINSICS = {
-    name: (getattr(lanes_math, name), count)
+    name: count
     for count, names in (
         (1, ("sqrt", "rsqrt", "log", "exp", "sin", "cos", "floor", "absolute", *sorted(OF_CELLS))),
         (2, ("ratio", "atan2", "minimum", "maximum")),
@@ -332,7 +355,10 @@ class Expressions(SpecialIntrinsics):
                     lambda a, b: self.short(op, a, b), others, truth(self.builder, self.value(first))
                 )
             case ast.IfExp(test, yes, no):
-                return self.chosen(self.condition(test), lambda: self.value(yes), lambda: self.value(no))
+                known = self.condition(test)
+                if isinstance(known, ir.Constant):
+                    return self.value(yes if known.constant else no)
+                return self.chosen(known, lambda: self.value(yes), lambda: self.value(no))
             case ast.Subscript(place, index):
                 return self.element(self.value(place), self.value(index))
             case ast.Call(ast.Name(name), arguments):
@@ -343,6 +369,9 @@ class Expressions(SpecialIntrinsics):
         """Emit a constant."""
         if isinstance(value, bool):
             return ir.Constant(BOOL, int(value))
+        if isinstance(value, float) and self.lanes.one:
+            rounded = c_float(value).value if self.lanes.bits == 32 else value
+            return Vec(self.builder, (ir.Constant(self.lanes.register, rounded),))
         if isinstance(value, (int, float)):
             return ir.Constant(WHOLE if isinstance(value, int) else DOUBLE, value)
         raise MismatchError("a number is expected")
@@ -381,10 +410,14 @@ class Expressions(SpecialIntrinsics):
             made = self.lanes.possible if cells else self.lanes.condition
             a, b = (made(self.builder, v) for v in (a, b))
             return a & b if isinstance(op, ast.BitAnd) else a | b
+        if self.lanes.one and isinstance(op, ast.Div):
+            a, b = self.numbers(a, b)
         return self.on_lanes(op, a, b) or operate(self.builder, op, a, b)
 
     def comparison(self, op: ast.cmpop, a: Value, b: Value) -> Value:
-        """Emit a comparison."""
+        """Emit a comparison; of constants, such as WIDTH, it is one."""
+        if all(isinstance(v, ir.Constant) and v.type == WHOLE for v in (a, b)):
+            return ir.Constant(BOOL, bool(_ON_LANES[type(op)](a.constant, b.constant)))
         return self.on_lanes(op, a, b) or compare(self.builder, op, a, b)
 
     def on_lanes(self, op: ast.AST, a: Value, b: Value) -> Value | None:
@@ -393,7 +426,10 @@ class Expressions(SpecialIntrinsics):
             return None
         if type(op) not in _ON_LANES:
             raise MismatchError("this is for numbers that are the same everywhere")
-        return _ON_LANES[type(op)](*self.numbers(a, b))
+        left, right = self.numbers(a, b)
+        if isinstance(op, ast.Div) and isinstance(left, Vec):
+            return self.lanes.math.divide(left, right)
+        return _ON_LANES[type(op)](left, right)
 
     def short(self, op: ast.boolop, a: Any, node: ast.expr) -> Any:
         """Emit ``and`` or ``or``; evaluate the second operand only if the first does not decide."""
@@ -429,6 +465,8 @@ class Expressions(SpecialIntrinsics):
         """Emit an access to an array element in memory or to a tuple element."""
         if not isinstance(place, tuple):
             loaded = self.builder.load(self.address(place, index))
+            if self.lanes.one and loaded.type == self.lanes.scalar:
+                return self.lanes.vec(self.builder, loaded)
             return widen(self.builder, loaded, WHOLE) if isinstance(loaded.type, ir.IntType) else loaded
         if isinstance(index, ir.Constant):
             return place[index.constant]
@@ -447,7 +485,7 @@ class Expressions(SpecialIntrinsics):
         if name in self.emitter.functions:
             count = len(self.emitter.functions[name].args.args)
         elif name in _INTRINSICS or name in SPECIAL:
-            count = _INTRINSICS[name][1] if name in _INTRINSICS else SPECIAL[name]
+            count = _INTRINSICS[name] if name in _INTRINSICS else SPECIAL[name]
         else:
             raise MismatchError(f"{name!r} is no function")
         if len(given) != count:
@@ -458,7 +496,7 @@ class Expressions(SpecialIntrinsics):
             first, *others = self.numbers(*given)
             if isinstance(first, Interval):
                 return getattr(first, name)(*others)
-            return _INTRINSICS[name][0](first, *others)
+            return getattr(self.lanes.math, name)(first, *others)
         value: Value = getattr(self, f"intrinsic_{name}")(*given)
         return value
 
@@ -472,6 +510,13 @@ class Expressions(SpecialIntrinsics):
 
 
 Names = dict[str, Value]
+
+
+def _fills_array(body: Sequence[ast.stmt]) -> bool:
+    """True if statements, which no break leaves, assign elements of an array."""
+    nodes = [node for statement in body for node in ast.walk(statement)]
+    stores = any(isinstance(n, ast.Subscript) and isinstance(n.ctx, ast.Store) for n in nodes)
+    return stores and not any(isinstance(n, ast.Break) for n in nodes)
 
 
 @dataclass
@@ -491,15 +536,20 @@ class Emitter:
         key = name, repr(kinds)
         if key not in self.made:
             body = Body(self, name)
-            function = body.written(kinds, f"{name}.{len(self.made)}")
+            function = body.written(kinds, f"{name}.{len(self.made)}", {})
             function.linkage = "internal"
             function.attributes.add("noinline" if name in self.called else "alwaysinline")
             self.made[key] = function, body.returned
         return self.made[key]
 
-    def entry(self, name: str, kinds: tuple[Kind, ...]) -> None:
-        """Emit an exported function under its own name."""
-        Body(self, name).written(kinds, name)
+    def entry(self, name: str, kinds: tuple[Kind, ...], own: Mapping[int, int]) -> None:
+        """Emit an exported function under its own name.
+
+        `own`: sizes of the arrays, by the places of the arguments, that are a GPU thread's own.
+        """
+        function = Body(self, name).written(kinds, name, own if self.lanes.on_gpu else {})
+        if self.lanes.on_gpu:
+            function.calling_convention = "ptx_kernel"
 
 
 class _WiderError(Exception):
@@ -520,13 +570,24 @@ class Body(Expressions):
         self.exits: list[list[tuple[Any, Names]]] = []  # of the loops around: a block and the names there
         self.blocks: dict[str, Any] = {}
 
-    def written(self, kinds: Sequence[Kind], name: str) -> ir.Function:
-        """Emit the function under a name of the module."""
-        types = [t for kind in kinds for t in types_of(kind, self.lanes)]
+    def written(self, kinds: Sequence[Kind], name: str, own: Mapping[int, int]) -> ir.Function:
+        """Emit the function under a name of the module; see `Emitter.entry`."""
+        types = [t for k, kind in enumerate(kinds) if k not in own for t in types_of(kind, self.lanes)]
         function = ir.Function(self.emitter.module, ir.FunctionType(ir.VoidType(), types), name)
         function.attributes.add("nounwind")
         self.builder = ir.IRBuilder(function.append_basic_block())
-        given = made_of(tuple(kinds), function.args, self.lanes, self.builder)
+        passed = iter(function.args)
+        parts = [
+            self.builder.alloca(kind.pointee, own[k]) if k in own else next(passed)
+            for k, kind in enumerate(kinds)
+            for _ in types_of(kind, self.lanes)
+        ]
+        given = made_of(tuple(kinds), parts, self.lanes, self.builder)
+        if self.lanes.one:
+            given = tuple(
+                self.lanes.vec(self.builder, v) if getattr(v, "type", None) == self.lanes.scalar else v
+                for v in given
+            )
         width = {"WIDTH": ir.Constant(WHOLE, self.lanes.width)}
         self.names: Names = width | dict(zip((a.arg for a in self.tree.args.args), given, strict=True))
         if self.statements(self.tree.body):
@@ -588,14 +649,20 @@ class Body(Expressions):
                 self.exits[-1].append((self.builder.block, dict(self.names)))
                 return False
             case ast.If(test, body, orelse):
-                return self.branch(self.condition(test), body, orelse)
+                known = self.condition(test)
+                if isinstance(known, ir.Constant):
+                    return self.statements(body if known.constant else orelse)
+                return self.branch(known, body, orelse)
             case ast.While(ast.Constant(True)):
                 return self.loop(node, (), lambda: None)
             case ast.While(test):
                 return self.loop(node, (), lambda: self.condition(test))
-            case ast.For(ast.Name(counter), ast.Call(ast.Name("range"), limits), body):
+            case ast.For(ast.Name(counter), ast.Call(ast.Name("range"), limits)):
                 ends = [number(self.builder, self.value(v), WHOLE) for v in limits]
                 return self.counted(node, counter, ends)
+            case ast.For(ast.Name(counter), ast.Call(ast.Name("shares"), [count, step])):
+                ends = [number(self.builder, self.value(v), WHOLE) for v in (count, step)]
+                return self.shared(node, counter, *ends)
             case ast.Pass():
                 pass
             case _:
@@ -652,18 +719,42 @@ class Body(Expressions):
 
     def counted(self, node: ast.For, counter: str, limits: Sequence[Any]) -> bool:
         """Emit a loop over a range with a positive step. After the loop its counter has no value."""
-        zero, one = ir.Constant(WHOLE, 0), ir.Constant(WHOLE, 1)
+        if self.lanes.one and all(isinstance(v, ir.Constant) for v in limits) and _fills_array(node.body):
+            return self.unrolled(node.body, counter, range(*(v.constant for v in limits)))
+        kind = ir.IntType(32) if self.lanes.on_gpu else WHOLE  # of which a GPU's registers are
+        zero, one = ir.Constant(kind, 0), ir.Constant(kind, 1)
+        limits = [number(self.builder, limit, kind) for limit in limits]
         first, end, step = [zero, *limits, one] if len(limits) == 1 else [*limits, one][:3]
         place = f"{counter} of {node.lineno}"
         self.names[place] = first
 
         def test() -> Any:
-            here = self.names[counter] = self.names[place]
+            here = self.names[place]
+            self.names[counter] = number(self.builder, here, WHOLE)
             inside = self.builder.icmp_signed("<", here, end)
             self.names[place] = self.builder.add(here, step)
             return inside
 
         return self.loop(node, (place, counter), test)
+
+    def unrolled(self, body: Sequence[ast.stmt], counter: str, rounds: range) -> bool:
+        """Emit the rounds of a loop one after the other: an array with known indices becomes registers."""
+        for k in rounds:
+            self.names[counter] = ir.Constant(WHOLE, k)
+            if not self.statements(body):
+                return False
+        return True
+
+    def shared(self, node: ast.For, counter: str, count: Any, step: Any) -> bool:
+        """Emit a loop that the threads of a GPU share, one round each; elsewhere it is a loop over a range.
+
+        Where there is one lane, a round is of one.
+        """
+        if not self.lanes.on_gpu:
+            step = ir.Constant(WHOLE, 1) if self.lanes.one else step
+            return self.counted(node, counter, [ir.Constant(WHOLE, 0), count, step])
+        self.names[counter] = thread = self.thread()
+        return self.branch(self.builder.icmp_signed("<", thread, count), node.body, ())
 
     def loop(self, node: ast.For | ast.While, own: tuple[str, ...], test: Callable[[], Any]) -> bool:
         """Emit a loop, again if names turn out to be of wider kinds than at its beginning."""

@@ -17,8 +17,8 @@ from llvmlite import ir
 from .registers import Vec, declare
 
 
-def _polynomial(x: Vec, coefficients: Sequence[float]) -> Vec:
-    """Horner's rule, highest power first."""
+def polynomial(x: Vec, coefficients: Sequence[float]) -> Vec:
+    """Evaluate a polynomial by Horner's rule, highest power first."""
     total = x.const(coefficients[0])
     for c in coefficients[1:]:
         total = total * x + c
@@ -79,12 +79,17 @@ def _extreme(a: Vec, b: Vec, which: str) -> Vec:
     return a.each(lambda x, y: a.builder.call(function, [x, y, current]), b)
 
 
+def divide(a: Vec, b: Vec) -> Vec:
+    """Return a/b."""
+    return a / b
+
+
 def ratio(a: Vec, b: Vec) -> Vec:
     """Return a/b by division.
 
     The divider is mostly idle, while an estimate with Newton steps takes multiplications.
     """
-    return a / b
+    return divide(a, b)
 
 
 def rsqrt(a: Vec) -> Vec:
@@ -106,7 +111,7 @@ HOST_FEATURES: frozenset[str] = frozenset()
 
 
 def _is_avx512(a: Vec) -> bool:
-    return "avx512f" in HOST_FEATURES and a.register.count * a.bits == 512
+    return "avx512f" in HOST_FEATURES and a.count * a.bits == 512
 
 
 def _avx512(a: Vec, instruction: str, arguments: list[ir.Type]) -> Any:
@@ -114,7 +119,7 @@ def _avx512(a: Vec, instruction: str, arguments: list[ir.Type]) -> Any:
     return declare(a.builder.module, ir.FunctionType(a.register, arguments), name)
 
 
-_LN2_HI, _LN2_LO = (
+LN2_HI, LN2_LO = (
     {32: 6.9313812256e-01, 64: 6.93147180369123816490e-01},
     {32: 9.0580006145e-06, 64: 1.90821492927058770002e-10},
 )
@@ -136,8 +141,8 @@ def log(x: Vec) -> Vec:
     m = above.masked((1 << mantissa) - 1).plus(root_half).as_real()
     s = (m - 1.0) / (m + 1.0)
     z = s * s
-    polynomial = (_polynomial if x.bits == 32 else _polynomial_in_pairs)(z, _LOG[x.bits])
-    return exponent * math.log(2) + s * (z * polynomial + 2.0)
+    series = (polynomial if x.bits == 32 else _polynomial_in_pairs)(z, _LOG[x.bits])
+    return exponent * math.log(2) + s * (z * series + 2.0)
 
 
 def exp(x: Vec) -> Vec:
@@ -145,8 +150,8 @@ def exp(x: Vec) -> Vec:
     mantissa, bias, top, terms = (23, 127, 87.0, 7) if x.bits == 32 else (52, 1023, 708.0, 13)
     x = minimum(maximum(x, x.const(-top)), x.const(top))
     n = floor(x * (1 / math.log(2)) + 0.5)
-    r = (x - n * _LN2_HI[x.bits]) - n * _LN2_LO[x.bits]
-    value = _polynomial(r, [1 / math.factorial(k) for k in range(terms, -1, -1)])
+    r = (x - n * LN2_HI[x.bits]) - n * LN2_LO[x.bits]
+    value = polynomial(r, [1 / math.factorial(k) for k in range(terms, -1, -1)])
     return value * n.to_whole().plus(bias).left(mantissa).as_real()
 
 
@@ -164,15 +169,15 @@ _COS = [
 ]  # fmt: skip
 
 
-def _sine(x: Vec, quarter_turns: int) -> Vec:
-    """sin(x + quarter_turns pi/2) for |x| up to about 10^4."""
+def sine(x: Vec, quarter_turns: int, sines: Sequence[float] = _SIN, cosines: Sequence[float] = _COS) -> Vec:
+    """Return sin(x + quarter_turns pi/2) for |x| up to about 10^4, by two polynomials up to pi/4."""
     turns = floor(x * (2 / math.pi) + 0.5)
     r = x
     for part in _HALF_PI[x.bits]:
         r = r - turns * part
     z = r * r
-    sine = r + r * z * _polynomial(z, _SIN)
-    cosine = (z * z * _polynomial(z, _COS) - z * 0.5) + 1.0
+    sine = r + r * z * polynomial(z, sines)
+    cosine = (z * z * polynomial(z, cosines) - z * 0.5) + 1.0
     quadrant = turns.to_whole().plus(quarter_turns)
     value = quadrant.masked(1).is_set().choose(cosine, sine)
     return quadrant.masked(2).is_set().choose(-value, value)
@@ -180,12 +185,12 @@ def _sine(x: Vec, quarter_turns: int) -> Vec:
 
 def sin(x: Vec) -> Vec:
     """Return the sine for |x| up to about 10^4."""
-    return _sine(x, 0)
+    return sine(x, 0)
 
 
 def cos(x: Vec) -> Vec:
     """Return the cosine for |x| up to about 10^4."""
-    return _sine(x, 1)
+    return sine(x, 1)
 
 
 _ATAN = [
@@ -205,7 +210,7 @@ def atan2(y: Vec, x: Vec) -> Vec:
     far = t > math.sqrt(2) - 1
     u = far.choose((t - 1.0) / (t + 1.0), t)
     z = u * u
-    angle = u - u * z * _polynomial(z, _ATAN)
+    angle = u - u * z * polynomial(z, _ATAN)
     angle = far.choose(angle + math.pi / 4, angle)
     angle = steep.choose(math.pi / 2 - angle, angle)
     angle = (x < 0.0).choose(math.pi - angle, angle)

@@ -6,9 +6,8 @@ elements, and the numbers and functions of its module. It becomes a C function.
 Here they are implemented on NumPy arrays, so that a loop also runs as plain Python: lanes are a slice, and P
 is the field itself, a function of ``x, y, z``. The compiler implements the same names in machine code.
 
-`cuda_intrinsics` implements them on a GPU, and can be imported only where Numba's CUDA target is available.
-
-One thread does the work of one lane. The numbers of a loop are typed by hand: ``real(0.5)``, ``whole(3)``.
+On a GPU a thread has one lane, WIDTH is 1, and the threads share the rounds of the loop over `shares`.
+There, a lane is a number: a loop for a GPU only may branch on its condition and assign it to an element.
 """
 
 from __future__ import annotations
@@ -40,6 +39,17 @@ def intrinsic(function: Function) -> Function:
 def is_intrinsic(value: Any) -> bool:
     """Return True if a value is an intrinsic, which loops may call."""
     return callable(value) and value in _INTRINSICS
+
+
+@intrinsic
+def shares(count: int, step: int) -> range:
+    """Range up to `count`, whose rounds the threads of a GPU share."""
+    return range(0, count, step)
+
+
+@intrinsic
+def together() -> None:
+    """Wait for the other threads of a GPU's warp."""
 
 
 @intrinsic
@@ -96,18 +106,45 @@ def field(x: Any, y: Any, z: Any, P: Any) -> Any:
     return P(x, y, z)
 
 
+_ELEMENTS = {
+    "i": "int32",
+    "v": "int32",
+    "h": "int16",
+    "b": "uint8",
+    "f": "float32",
+    "d": "float64",
+    "n": "int64",
+}
+OWN = "wv"
+"""Letters of workspaces: arrays that a thread of a GPU has to itself, without their being passed."""
+
+
+def element_type(letter: str, real: np.dtype) -> np.dtype:
+    """Return the type of the elements of an array argument, or of a number.
+
+    `letter`: "r" or "w" an array of the kernel's float type, "i" or "v" of int32, "h" of int16, "b" of uint8,
+    "f" of float32, "d" of float64; "n" an integer, "x" a float.
+    """
+    return np.dtype(_ELEMENTS.get(letter, real))
+
+
+def is_array(letter: str) -> bool:
+    """Return True for the letter of an array."""
+    return letter not in "nx"
+
+
 @dataclass(frozen=True)
 class Loop:
     """C function over a field."""
 
     function: Callable[..., None]  # python function of the loop
-    # one letter per argument: "r" a pointer to the kernel's float type, "i" to int32, "n" an integer. The
-    # first argument is P by convention
-    arguments: str = ""
+    # one letter per argument, see `element_type`. The first argument is P by convention
+    arguments: str
     # further arguments by name, constant at compile time: functions, and records of numbers
     fixed: tuple[tuple[str, Any], ...] = ()
     # kind of the coordinates that it passes to the field: "lanes", or "interval" for cells
     points: str = "lanes"
+    own: int = 0  # numbers in each workspace of a thread of a GPU
 
     @property
     def name(self) -> str:
@@ -131,7 +168,7 @@ def points(P, X, Y, Z, F, n):
     `P`: parameters of the scene; `X`, `Y`, `Z`: [n] each, scene units; `F`: [n]; `n`: number of points, a
     multiple of WIDTH.
     """
-    for i in range(0, n, WIDTH):
+    for i in shares(n, WIDTH):
         x = load(X, i)
         y = load(Y, i)
         z = load(Z, i)
@@ -140,16 +177,16 @@ def points(P, X, Y, Z, F, n):
         store(F, i, where(s == s, f, s))
 
 
-@loop("rrrrrirn")
-def bricks(P, FRAME, IX, IY, IZ, corners, F, n):
-    """Evaluate the 512 samples of bricks, at ``FRAME[:3] + FRAME[3] * (corner + (IX, IY, IZ))``.
+@loop("rxxxxrrrirn")
+def bricks(P, ox, oy, oz, h, IX, IY, IZ, corners, F, n):
+    """Evaluate the 512 samples of bricks, at ``(ox, oy, oz) + h * (corner + (IX, IY, IZ))``.
 
     Parameters
     ----------
     P
         Parameters of the scene.
-    FRAME
-        Position of grid point (0, 0, 0), then grid spacing, [4], scene units.
+    ox, oy, oz, h
+        Position of grid point (0, 0, 0), and grid spacing, scene units.
     IX, IY, IZ
         Offsets of the samples from the corner, [512] each.
     corners
@@ -159,15 +196,21 @@ def bricks(P, FRAME, IX, IY, IZ, corners, F, n):
     n
         Number of bricks.
     """
-    h = FRAME[3]
-    for b in range(n):
+    samples = 512 if WIDTH > 1 else 1  # of a round: a brick, or the one of a thread
+    for first in shares(512 * n, samples):
+        b = first >> 9
+        begin = first & 511
         x0 = corners[3 * b]
         y0 = corners[3 * b + 1]
         z0 = corners[3 * b + 2]
-        for s in range(0, 512, WIDTH):
-            x = (load(IX, s) + x0) * h + FRAME[0]
-            y = (load(IY, s) + y0) * h + FRAME[1]
-            z = (load(IZ, s) + z0) * h + FRAME[2]
+        for s in range(begin, begin + samples, WIDTH):
+            if WIDTH > 1:
+                ix, iy, iz = load(IX, s), load(IY, s), load(IZ, s)
+            else:  # loads are what a thread waits for
+                ix, iy, iz = 1.0 * (s >> 6 & 7), 1.0 * (s >> 3 & 7), 1.0 * (s & 7)
+            x = (ix + x0) * h + ox
+            y = (iy + y0) * h + oy
+            z = (iz + z0) * h + oz
             store(F, 512 * b + s, field(x, y, z, P))
 
 
@@ -179,50 +222,10 @@ def enclosures(P, FRAME, X, Y, Z, LOW, HIGH, n):
     `HIGH`: [n]; `n`: number of cells, a multiple of WIDTH.
     """
     half = FRAME[0]
-    for i in range(0, n, WIDTH):
+    for i in shares(n, WIDTH):
         x = around(load(X, i), half)
         y = around(load(Y, i), half)
         z = around(load(Z, i), half)
         f = field(x, y, z, P)
         store(LOW, i, lower(f))
         store(HIGH, i, upper(f))
-
-
-def kernel(function: Callable[..., None]) -> Loop:
-    """Decorate a loop that threads are launched on."""
-    return Loop(function)
-
-
-def device(function: Function) -> Function:
-    """Decorate a function that loops call and whose numbers are typed by hand."""
-    return function
-
-
-@intrinsic
-def real(value: Any) -> Any:
-    """Return a number of the kernel's float type."""
-    return float(value)
-
-
-@intrinsic
-def whole(value: Any) -> Any:
-    """Return a 32-bit integer."""
-    return int(value)
-
-
-@intrinsic
-def thread() -> int:
-    """Return the global index of this thread."""
-    raise NotImplementedError
-
-
-@intrinsic
-def together() -> None:
-    """Synchronise the threads of the warp."""
-    raise NotImplementedError
-
-
-@intrinsic
-def divide(a: Any, b: Any) -> Any:
-    """Return a / b by the GPU's own division."""
-    raise NotImplementedError

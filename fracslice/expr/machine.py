@@ -1,6 +1,6 @@
 """Machine code as functions of NumPy arrays: object files of x86-64 in memory, without LLVM.
 
-This is the only place where an array becomes an address, beside calls of CUDA's driver (`cuda_memory`), which
+This is the only place where an array becomes an address, beside calls of CUDA's driver (`cuda_driver`), which
 copy before they return. Code and arrays are kept alive by the call, or by the native object that holds both
 (`fracslice/native/machine.h`), so neither can be freed while in use.
 
@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .functions import WORDS, InMemory, words
-from .loops import Loop
+from .loops import Loop, element_type, is_array
 
 MAGIC, KIND = b"\x7fELF\x02\x01\x01", struct.pack("<HH", 1, 62)
 """Begin of a file of 64 bits, and its kind: relocatable, of x86-64."""
@@ -160,18 +160,19 @@ def _layout(sections: list[Section]) -> tuple[dict[int, int], int]:
 class Function:
     """Compiled loop, called with arrays and integers. Thread-safe; releases the GIL.
 
-    Arrays must be C-contiguous, of the kernel's dtype where the loop has "r" and int32 where it has "i";
-    otherwise a call raises `ctypes.ArgumentError`.
+    Arrays must be C-contiguous, of the type that the loop's letter says; otherwise a call raises
+    `ctypes.ArgumentError`.
     """
 
     def __init__(self, engine: Any, loop: Loop, dtype: np.dtype) -> None:
-        kinds = {"r": _Pointer(dtype), "i": _Pointer(np.dtype(np.int32)), "n": ctypes.c_ssize_t}
+        kinds: dict[str, Any] = {a: _Pointer(element_type(a, dtype)) for a in loop.arguments if is_array(a)}
+        kinds |= {"n": ctypes.c_ssize_t, "x": np.ctypeslib.as_ctypes_type(dtype)}
         self.arguments = loop.arguments
         self.address: int = engine.get_function_address(loop.name)
-        self._call = ctypes.CFUNCTYPE(None, *[kinds[a] for a in loop.arguments])(self.address)  # type: ignore[arg-type]
+        self._call = ctypes.CFUNCTYPE(None, *[kinds[a] for a in loop.arguments])(self.address)
         self._engine = engine
 
-    def __call__(self, *arguments: np.ndarray | int) -> None:
+    def __call__(self, *arguments: np.ndarray | float) -> None:
         self._call(*arguments)
 
 

@@ -14,8 +14,15 @@ from typing import Any
 from llvmlite import ir
 
 
-def splat(builder: Any, scalar: Any, vector: ir.VectorType) -> Any:
+def vector(element: ir.Type, count: int) -> ir.Type:
+    """Return the type of a register; of one element it is a scalar."""
+    return element if count == 1 else ir.VectorType(element, count)
+
+
+def splat(builder: Any, scalar: Any, vector: ir.Type) -> Any:
     """Broadcast a scalar to every element of a register."""
+    if not isinstance(vector, ir.VectorType):
+        return scalar
     undefined = ir.Constant(vector, ir.Undefined)
     first = builder.insert_element(undefined, scalar, ir.Constant(ir.IntType(32), 0))
     return builder.shuffle_vector(
@@ -37,29 +44,39 @@ class Vec:
     factors: tuple[Vec, Vec] | None = None
 
     @property
-    def register(self) -> ir.VectorType:
+    def register(self) -> ir.Type:
         """LLVM type of a register."""
         return self.parts[0].type
+
+    @property
+    def element(self) -> ir.Type:
+        """LLVM type of an element."""
+        return self.register.element if isinstance(self.register, ir.VectorType) else self.register
+
+    @property
+    def count(self) -> int:
+        """Elements of a register."""
+        return self.register.count if isinstance(self.register, ir.VectorType) else 1
 
     @property
     def bits(self) -> int:
         """Width of an element: 1, 32 or 64."""
         sizes = {ir.FloatType: 32, ir.DoubleType: 64}
-        return sizes.get(type(self.register.element)) or self.register.element.width
+        return sizes.get(type(self.element)) or self.element.width
 
     @property
-    def whole(self) -> ir.VectorType:
+    def whole(self) -> ir.Type:
         """LLVM type of a register of integers of the same width."""
-        return ir.VectorType(ir.IntType(self.bits), self.register.count)
+        return vector(ir.IntType(self.bits), self.count)
 
     @property
-    def real(self) -> ir.VectorType:
+    def real(self) -> ir.Type:
         """LLVM type of a register of floats of the same width."""
-        return ir.VectorType(ir.FloatType() if self.bits == 32 else ir.DoubleType(), self.register.count)
+        return vector(ir.FloatType() if self.bits == 32 else ir.DoubleType(), self.count)
 
     def const(self, number: float) -> Vec:
         """Return a constant of this type."""
-        constant = ir.Constant(self.register, [number] * self.register.count)
+        constant = ir.Constant(self.register, number if self.count == 1 else [number] * self.count)
         return Vec(self.builder, (constant,) * len(self.parts))
 
     def each(self, emit: Callable[..., Any], *others: Vec | float) -> Vec:
@@ -143,7 +160,8 @@ class Vec:
         """Call an LLVM intrinsic on vectors of this type."""
         kind = self.register
         function = ir.FunctionType(kind, [kind] * (1 + len(others)))
-        declared = declare(self.builder.module, function, f"llvm.{name}.v{kind.count}f{self.bits}")
+        of = f"f{self.bits}" if self.count == 1 else f"v{self.count}f{self.bits}"
+        declared = declare(self.builder.module, function, f"llvm.{name}.{of}")
         return self.each(lambda *registers: self.builder.call(declared, registers), *others)
 
     def as_whole(self) -> Vec:
@@ -162,7 +180,7 @@ class Vec:
         """Convert floats with integer values to integers."""
         return self._to(self.builder.fptosi, self.whole)
 
-    def _to(self, conversion: Callable[[Any, ir.VectorType], Any], kind: ir.VectorType) -> Vec:
+    def _to(self, conversion: Callable[[Any, ir.Type], Any], kind: ir.Type) -> Vec:
         return self.each(lambda register: conversion(register, kind))
 
     def plus(self, n: int | Vec) -> Vec:

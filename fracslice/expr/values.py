@@ -7,21 +7,23 @@ There is no fast-math: results do not depend on the code around an operation (`r
 products are fused), and NaN and infinity are handled.
 
 Scalars mix as NumPy's do: an operation with a float literal is computed in 64 bits, and rounded once where it
-meets lanes.
+meets lanes. Where there is one lane, as on a thread of a GPU, it is a number itself: a float is a lane, and
+its condition may be branched on.
 """
 
 from __future__ import annotations
 
 import ast
 from dataclasses import dataclass
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 from llvmlite import ir
 
-from . import lanes_math
+from . import lanes_math, thread_math
 from .intervals import TINY, Interval, Numbers, Possible
-from .registers import Vec, splat
+from .registers import Vec, splat, vector
 
 BOOL, WHOLE, FLOAT, DOUBLE = ir.IntType(1), ir.IntType(64), ir.FloatType(), ir.DoubleType()
 
@@ -30,8 +32,14 @@ class MismatchError(Exception):
     """Incompatible values; the message names them."""
 
 
+def only_lane(value: Any) -> Any:
+    """Return the scalar of the only lane; any other value unchanged."""
+    return value.parts[0] if isinstance(value, Vec) and len(value.parts) == value.count == 1 else value
+
+
 def number(builder: ir.IRBuilder, value: Any, kind: ir.Type) -> Any:
     """Convert a scalar to another type."""
+    value = only_lane(value)
     if not isinstance(getattr(value, "type", None), (ir.IntType, ir.FloatType, ir.DoubleType)):
         raise MismatchError("a number is expected")
     given = value.type
@@ -40,10 +48,19 @@ def number(builder: ir.IRBuilder, value: Any, kind: ir.Type) -> Any:
     if isinstance(given, ir.IntType):
         if isinstance(kind, ir.IntType):
             return builder.trunc(value, kind) if kind.width < given.width else widen(builder, value, kind)
-        return builder.uitofp(value, kind) if given == BOOL else builder.sitofp(value, kind)
+        return builder.uitofp(value, kind) if given == BOOL else builder.sitofp(_narrow(builder, value), kind)
     if isinstance(kind, ir.IntType):
         return builder.fptosi(value, kind)
     return builder.fpext(value, kind) if kind == DOUBLE else builder.fptrunc(value, kind)
+
+
+def _narrow(builder: ir.IRBuilder, value: Any) -> Any:
+    """Return an integer that a mask limits to 31 bits in 32, of which a GPU's registers are."""
+    if isinstance(value, ir.Instruction) and value.opname == "and" and value.type == WHOLE:
+        masks = [v.constant for v in value.operands if isinstance(v, ir.Constant)]
+        if any(0 <= mask < 1 << 31 for mask in masks):
+            return builder.trunc(value, ir.IntType(32))
+    return value
 
 
 def widen(builder: ir.IRBuilder, value: Any, kind: ir.IntType) -> Any:
@@ -63,6 +80,7 @@ def common(a: ir.Type, b: ir.Type) -> ir.Type:
 
 def truth(builder: ir.IRBuilder, value: Any) -> Any:
     """Convert a scalar to a condition: True if it is not zero."""
+    value = only_lane(value)
     if isinstance(value, (Vec, tuple)):
         raise MismatchError("it may differ from point to point; expected where(...), or if any_of(...)")
     if value.type == BOOL:
@@ -139,6 +157,17 @@ class Lanes:
     bits: int  # width of a float: 32 or 64
     width: int  # number of lanes
     registers: int  # number of registers that hold them
+    on_gpu: bool = False  # whether they are the threads of a GPU
+
+    @property
+    def one(self) -> bool:
+        """True if a lane is a number."""
+        return self.width == 1
+
+    @property
+    def math(self) -> ModuleType:
+        """Elementary functions."""
+        return thread_math if self.on_gpu else lanes_math
 
     @property
     def scalar(self) -> ir.Type:
@@ -146,14 +175,14 @@ class Lanes:
         return FLOAT if self.bits == 32 else DOUBLE
 
     @property
-    def register(self) -> ir.VectorType:
+    def register(self) -> ir.Type:
         """LLVM type of a register of floats."""
-        return ir.VectorType(self.scalar, self.width // self.registers)
+        return vector(self.scalar, self.width // self.registers)
 
     @property
-    def mask(self) -> ir.VectorType:
+    def mask(self) -> ir.Type:
         """LLVM type of a register of booleans."""
-        return ir.VectorType(BOOL, self.width // self.registers)
+        return vector(BOOL, self.width // self.registers)
 
     def vec(self, builder: ir.IRBuilder, value: Value) -> Vec:
         """Return lanes unchanged; broadcast a scalar."""
@@ -206,4 +235,4 @@ class Lanes:
 
 def is_mask(value: Value) -> bool:
     """Return True for a mask or a condition on cells."""
-    return isinstance(value, Possible) or (isinstance(value, Vec) and value.register.element == BOOL)
+    return isinstance(value, Possible) or (isinstance(value, Vec) and value.element == BOOL)

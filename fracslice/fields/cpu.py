@@ -36,7 +36,7 @@ def object_code(linked: Linked, bits: int, width: int, loops: Sequence[Loop]) ->
     def compiled() -> bytes:
         from ..expr.compiler import Target, compile_object
 
-        return compile_object(linked, Target(bits, width, REGISTERS, *host()), loops)
+        return compile_object(linked, Target(bits, width, min(REGISTERS, width), *host()), loops)
 
     return Kept(cache_folder()).cached(name, compiled)  # incomplete code would crash the process
 
@@ -91,8 +91,7 @@ class CpuKernel(Kernel):
         self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray
     ) -> None:
         assert corners.shape == (len(out), 3) and out.shape == (len(corners), 512)
-        frame = np.array([*origin, voxel], self.dtype)
-        self._bricks(self._parameters, frame, *self._offsets, corners, out, len(corners))
+        self._bricks(self._parameters, *origin, voxel, *self._offsets, corners, out, len(corners))
 
 
 _kernel = lru_cache(maxsize=32)(CpuKernel)

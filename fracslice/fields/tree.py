@@ -62,9 +62,9 @@ def linked_loops(root: Node, loops: Sequence[Loop], precision: Precision, device
     """Compile loops over a tree with resolved depths; see `Field.loops`."""
     if for_field(root, device) == "cpu":
         return cpu.compile_loops(link(root), tuple(loops), precision)
-    from . import cuda_launching
+    from . import cuda
 
-    return cuda_launching.compile_loops(link(root), tuple(loops), precision)
+    return cuda.compile_loops(link(root), tuple(loops), precision)
 
 
 def cells(root: Node, precision: Precision) -> Cells:

@@ -8,10 +8,10 @@ from typing import Any, cast
 import numpy as np
 
 from .._native import Cells
-from ..expr.cuda_driver import require
+from ..expr.cuda_driver import device_array, pinned_array, require, to_device
 from ..expr.language import Linked
-from ..fields.cuda_launching import CudaLoop, launch, load_loops
-from .root_loops import LOOPS
+from ..fields.cuda import CudaFunction, CudaLoop, load_functions
+from .root_loops import collect, lay, start
 from .roots import SURE, Roots
 
 MOST_EDGES = 1 << 21
@@ -25,7 +25,7 @@ class Table:
     """
 
     def __init__(self, count: int, dtype: np.typing.DTypeLike) -> None:
-        self.whole = require().device_array((count, MOST_EDGES), dtype)
+        self.whole = device_array((count, MOST_EDGES), dtype)
         self.rows = [self.whole[k] for k in range(count)]
 
 
@@ -37,6 +37,8 @@ class Find:
     frame: Any
     segments: Table  # what it reads and writes
     roots: Any
+    start: CudaFunction  # loops that start `polish` from its roots, and collect the results of that
+    collect: CudaFunction
 
 
 class CudaSearch:
@@ -48,13 +50,18 @@ class CudaSearch:
     def __init__(
         self, fast: Roots, exact: Roots, cells: Cells, origin: tuple[float, float, float], voxel: float
     ) -> None:
-        self._cuda, self._cells, self._placement = require(), cells, (*origin, voxel)
-        self._loops = load_loops(Linked("", np.zeros(1)), "float64", LOOPS)
-        self._edges = self._cuda.device_array((MOST_EDGES, 4), np.int16)
+        require()
+        self._cells, self._placement = cells, (*origin, voxel)
+        nothing = Linked("", np.zeros(1))
+        self._lay = load_functions(nothing, "float64", (lay,))["lay"]
+        self._edges = device_array((MOST_EDGES, 4), np.int16)
         self._fast, self._exact = (
-            Find(*self._loop(roots, "find"), Table(6, roots.dtype), self._row(roots.dtype))
+            Find(
+                *self._loop(roots, "find"), Table(6, roots.dtype), self._row(roots.dtype),
+                **load_functions(nothing, roots.precision, (start, collect)),
+            )
             for roots in (fast, exact)
-        )
+        )  # fmt: skip
         self._polish = self._loop(exact, "polish")
         self._roots, self._polished = self._row(np.float64), Table(4, np.float64)
         self._normals, self._unsure = Table(3, np.float32), self._row(np.uint8)
@@ -62,17 +69,17 @@ class CudaSearch:
 
     def _loop(self, roots: Roots, name: str) -> tuple[Any, Any]:
         """Function that launches a loop, and its FRAME."""
-        return cast(CudaLoop, roots.runs[name]).launch, self._cuda.to_device(roots.frame)
+        return cast(CudaLoop, roots.runs[name]).launch, to_device(roots.frame)
 
     def _row(self, dtype: np.typing.DTypeLike) -> Any:
-        return self._cuda.device_array(MOST_EDGES, dtype)
+        return device_array(MOST_EDGES, dtype)
 
     def memory(self, size: int) -> tuple[np.ndarray, np.ndarray]:
         """See `Search.memory`. It alternates between two: the caller still reads the other."""
         self._memories.reverse()
         if size > len(self._memories[0][0]):
-            pinned = self._cuda.pinned_array  # the GPU copies faster into page-locked memory
-            self._memories[0] = pinned(size, np.float64), pinned((3, size), np.float32)
+            of = pinned_array(size, np.float64), pinned_array((3, size), np.float32)
+            self._memories[0] = of  # the GPU copies faster into page-locked memory
         return self._memories[0]
 
     def find(self, begin: int, end: int, t: np.ndarray, normals: np.ndarray) -> None:
@@ -96,14 +103,13 @@ class CudaSearch:
         n, (polish, frame) = len(edges), self._polish
         segments, polished = self._exact.segments, self._polished
         self._edges[:n].copy_to_device(edges)
-        launch(
-            self._loops.lay, n, self._edges, *self._placement, segments.whole, self._fast.segments.whole, n
-        )
+        rows = segments.whole, self._fast.segments.whole, MOST_EDGES
+        self._lay.launch(n, self._edges, *self._placement, *rows, n)
         find.launch(n, find.frame, *find.segments.rows, find.roots)
-        launch(self._loops.start, n, find.roots, self._roots, n)
+        find.start.launch(n, find.roots, self._roots, n)
         polish(n, frame, *segments.rows, self._roots, *polished.rows)
-        results = self._roots, polished.whole, SURE, self._normals.whole, self._unsure
-        launch(self._loops.collect, n, find.roots, *results, n)
+        results = self._roots, polished.whole, self._normals.whole, self._unsure
+        find.collect.launch(n, find.roots, *results, SURE, MOST_EDGES, n)
         for row, to in zip((self._roots, *self._normals.rows), (t, *normals), strict=True):
             row[:n].copy_to_host(to)
         flags: np.ndarray = self._unsure[:n].copy_to_host()

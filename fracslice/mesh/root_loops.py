@@ -11,7 +11,7 @@ segment.
 
 from __future__ import annotations
 
-from ..expr.loops import WIDTH, field, kernel, load, loop, real, store, thread
+from ..expr.loops import WIDTH, field, load, loop, shares, store
 from ..expr.vocabulary import absolute, any_of, maximum, minimum, rsqrt, where
 
 STEPS = 48
@@ -29,7 +29,7 @@ def find(P, FRAME, X, Y, Z, DX, DY, DZ, T, n):
     `T`: [n].
     """
     over, small, near, close = FRAME[0], FRAME[1], FRAME[2], FRAME[5]
-    for i in range(0, n, WIDTH):
+    for i in shares(n, WIDTH):
         x, y, z = load(X, i), load(Y, i), load(Z, i)
         dx, dy, dz = load(DX, i), load(DY, i), load(DZ, i)
         fa = 0.0 * x
@@ -74,7 +74,7 @@ def polish(P, FRAME, X, Y, Z, DX, DY, DZ, T, NX, NY, NZ, MISS, n):
     `T`: [n]; `NX`, `NY`, `NZ`: [n] each; `MISS`: [n].
     """
     e = FRAME[3]
-    for i in range(0, n, WIDTH):
+    for i in shares(n, WIDTH):
         dx, dy, dz, t = load(DX, i), load(DY, i), load(DZ, i), load(T, i)
         x = load(X, i) + t * dx
         y = load(Y, i) + t * dy
@@ -103,7 +103,7 @@ def aim(P, FRAME, X, Y, Z, DX, DY, DZ, T, MISS, n):
     `T`: [n]; `MISS`: receives |f| at the new roots in voxels, [n].
     """
     over = FRAME[0]
-    for i in range(0, n, WIDTH):
+    for i in shares(n, WIDTH):
         x, y, z = load(X, i), load(Y, i), load(Z, i)
         dx, dy, dz, t = load(DX, i), load(DY, i), load(DZ, i), load(T, i)
         e = FRAME[3] * rsqrt(maximum(dx * dx + dy * dy + dz * dz, 1e-200))
@@ -139,7 +139,7 @@ def lead(P, FRAME, X, Y, Z, LX, LY, LZ, HX, HY, HZ, OX, OY, OZ, MX, MY, MZ, DX, 
     units.
     """
     e, tight = FRAME[3], FRAME[4]
-    for i in range(0, n, WIDTH):
+    for i in shares(n, WIDTH):
         x, y, z = load(X, i), load(Y, i), load(Z, i)
         gx = 0.0 * x
         gy, gz, bx, by, bz, f = gx, gx, gx, gx, gx, gx
@@ -189,50 +189,43 @@ def lead(P, FRAME, X, Y, Z, LX, LY, LZ, HX, HY, HZ, OX, OY, OZ, MX, MY, MZ, DX, 
         store(DZ, i, where(between, mz, gz))
 
 
-@kernel
-def lay(E, ox, oy, oz, h, R, S, n):
-    """Lay grid edges out as segments.
+@loop("hxxxxdfnn")
+def lay(E, ox, oy, oz, h, R, S, stride, n):
+    """Lay n grid edges out as segments, on a GPU.
 
-    `E`: int16 (n or more, 4); `ox`, `oy`, `oz`, `h` in scene units; `R`, `S`: float32 (6, n or more); `n`:
-    number of edges.
+    `E`: [n, 4]; `ox`, `oy`, `oz`, `h` in scene units; `R`, `S`: six rows of `stride` numbers.
     """
-    i = thread()
-    if i < n:
-        R[0, i] = ox + h * real(E[i, 0])
-        R[1, i] = oy + h * real(E[i, 1])
-        R[2, i] = oz + h * real(E[i, 2])
+    for i in shares(n, 1):
+        R[i] = ox + h * E[4 * i]
+        R[stride + i] = oy + h * E[4 * i + 1]
+        R[2 * stride + i] = oz + h * E[4 * i + 2]
         for k in range(3):
-            R[3 + k, i] = h if E[i, 3] == k else real(0)
+            R[(3 + k) * stride + i] = h if E[4 * i + 3] == k else 0.0
         for k in range(6):
-            S[k, i] = R[k, i]
+            S[k * stride + i] = R[k * stride + i]
 
 
-@kernel
+@loop("rdn")
 def start(U, T, n):
-    """Start `polish` from the roots of `find`.
+    """Start `polish` from the roots of `find`, on a GPU.
 
-    `U`: roots of `find`; `T`: receives them; `n`: number of segments.
+    `U`: roots of `find`; `T`: receives them.
     """
-    i = thread()
-    if i < n:
+    for i in shares(n, 1):
         T[i] = U[i]
 
 
-@kernel
-def collect(U, T, D, sure, N, F, n):
-    """Collect results of `polish`; where a root is not exact, that of `find` stays.
+@loop("rddfbxnn")
+def collect(U, T, D, N, F, sure, stride, n):
+    """Collect n results of `polish`, on a GPU; where a root is not exact, that of `find` stays.
 
-    `U`: roots of `find`; `T`: roots of `polish`, modified in place; `D`: float64 (4, n or more); `N`:
-    float32 (3, n or more); `F`: receives 1 for roots that are not exact, else 0; `n`: number of segments.
+    `U`: roots of `find`; `T`: roots of `polish`, modified in place; `D`, `N`: four and three rows of `stride`
+    numbers; `F`: receives 1 for roots that are not exact, else 0.
     """
-    i = thread()
-    if i < n:
+    for i in shares(n, 1):
         for k in range(3):
-            N[k, i] = D[k, i]
+            N[k * stride + i] = D[k * stride + i]
         F[i] = 0
-        if not D[3, i] <= sure:
+        if not D[3 * stride + i] <= sure:
             F[i] = 1
             T[i] = U[i]
-
-
-LOOPS = lay, start, collect

@@ -38,7 +38,7 @@ class Roots:
     """
 
     def __init__(self, root: Field, precision: Precision, voxel: float, device: Device = "cpu") -> None:
-        self.dtype = np.dtype(precision)
+        self.precision, self.dtype = precision, np.dtype(precision)
         small, near, reach, tight, close = FRAMES[precision]
         frame = np.array([1 / voxel, small, near, reach * voxel, tight * voxel, close])
         self.frame = constant(frame, self.dtype)

@@ -72,15 +72,12 @@ class CpuTracer:
         shift = next(s for s in SHIFTS if s < self._shift)
         blocks, rows = (-(-pixels // (1 << shift)) for pixels in (self.width, self.height))
         starts, coarser = np.zeros(blocks * rows, self.dtype), (self._shift - shift, self._blocks)
-        ids = np.arange(len(starts), dtype=np.int32)
 
         def task(part: slice) -> None:
-            own = ids[part]
-            m = -(-len(own) // self.lanes) * self.lanes
-            arrays = self._parameters, starts, self._starts, own, *self._workspace
-            cones(*arrays, len(own), m, shift, blocks, *coarser, self.steps)
+            arrays = self._parameters, starts, self._starts, *self._workspace
+            cones(*arrays, part.start, part.stop - part.start, shift, blocks, *coarser, self.steps)
 
-        work.map(task, chunks(len(ids), _tile(len(ids), work.threads)))
+        work.map(task, chunks(len(starts), _tile(len(starts), work.threads)))
         self._shift, self._blocks, self._starts = shift, blocks, starts
 
     def add(self, sums: np.ndarray, plan: PassPlan, work: Work) -> None:

@@ -125,25 +125,16 @@ class Frame:
     # index in P of the far distance; the upper left pixel of the picture follows, and the half width of a
     # pixel's cone at distance 1
     far: int
-    block: int  # side of a block of the cone prepass on a GPU, pixels; a power of two
 
     @property
     def samples(self) -> int:
         """Random numbers per sample."""
         return self.camera_samples + (self.bounces + 1) * self.bounce_samples
 
-    @property
-    def shift(self) -> int:
-        """Binary logarithm of `block`."""
-        return self.block.bit_length() - 1
 
-
-def link_frame(root: Node, view: View, camera: Camera, seen: Optics, block: int) -> Frame:
-    """Link the kernel of a scene.
-
-    `block` in pixels.
-    """
-    return _Frame(root, view, camera, seen, block).linked()
+def link_frame(root: Node, view: View, camera: Camera, seen: Optics) -> Frame:
+    """Link the kernel of a scene."""
+    return _Frame(root, view, camera, seen).linked()
 
 
 @dataclass
@@ -154,7 +145,6 @@ class _Frame:
     view: View
     camera: Camera
     seen: Optics
-    block: int
     linker: Linker = field(default_factory=lambda: Linker(given=GIVEN))
     drawn: Drawn = field(default_factory=Drawn)
     bounces: int = 0
@@ -182,7 +172,7 @@ class _Frame:
         samples = camera_samples, self.drawn.count
         kind = self.sharp, self.lit, self.view.film.transparent, self.lighting.weighted
         faintest = 0.0 if self.paths else FAINTEST
-        return Frame(linked, *samples, self.bounces, *kind, faintest, far, self.block)
+        return Frame(linked, *samples, self.bounces, *kind, faintest, far)
 
     def marching(self) -> None:
         """Bind the units that march rays and cones."""

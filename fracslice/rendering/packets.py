@@ -1,4 +1,5 @@
-"""Ray packets: CPU loops around the render units on SIMD lanes, from pixels to sums of light.
+"""Loops around the render units, from pixels to sums of light: of packets of rays on the lanes of a CPU, or
+of one ray on a thread of a GPU.
 
 Conventions:
 
@@ -11,17 +12,16 @@ Conventions:
 - `pixels` holds ``y << 16 | x``. `width` is that of the picture, pixels; `limit` the largest number of steps
   of a ray; `blocks` the number of blocks in a row of the picture; `frame` the linked frame.
 
-The arrays are those of `packets`.
-
 Packets are refilled: a lane whose ray is done takes the next ray at once, so no lane idles while rays are
-left. The arrays are those of `packets`.
+left. A thread has one ray, whose workspace is in its registers.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from enum import IntEnum
 
-from ..expr.loops import WIDTH, Loop, load, loop, store
+from ..expr.loops import WIDTH, Loop, load, loop, shares, store, together
 from ..expr.vocabulary import any_of, where
 from .accumulator import CHANNELS, COUNT, COVER, GOAL
 from .linking import Frame
@@ -43,7 +43,8 @@ Row = IntEnum(
 - tr, tg, tb: throughput, the factor on light still to come.
 - cover: 1 if the camera ray hit.
 - dense: density of the direction, for frames whose lights are weighted.
-- px, py: film position, the first two random numbers. The other random numbers are in the rows after them.
+- px, py: film position, the first two random numbers. The rows after them are the other random numbers of the
+  camera ray, then those of the bounce under way.
 """
 Lane = IntEnum("Lane", "ox oy oz dx dy dz start end side path t steps done before stride", start=0)
 """State of a ray in a packet. The first ten entries are those of `Row`."""
@@ -73,6 +74,25 @@ def follow(W, L, rays, n, m, limit, P, step):
     A ray has missed once its free distance exceeds its end; an over-relaxed step beyond the end does not
     count.
     """
+    if WIDTH == 1:
+        follow_one(W, L, rays, limit, P, step)
+    else:
+        follow_packets(W, L, rays, n, m, limit, P, step)
+
+
+def follow_one(W, L, rays, limit, P, step):
+    """March the ray of a thread."""
+    if W[Row.start] >= W[Row.end]:
+        miss(W, 1, 0)
+    else:
+        take(W, L, rays, 1, 0, 0)
+        march(L, limit, P, step)
+        finish(W, L, 1, 0, 0)
+    together()  # threads whose rays hit first would shade alone, and a frame take twice as long
+
+
+def follow_packets(W, L, rays, n, m, limit, P, step):
+    """March rays on lanes."""
     for lane in range(WIDTH):
         rays[lane] = -1
         L[Lane.done * WIDTH + lane] = 1.0
@@ -81,11 +101,10 @@ def follow(W, L, rays, n, m, limit, P, step):
     while True:
         for lane in range(WIDTH):
             if L[Lane.done * WIDTH + lane] > 0.0:
-                under_way -= finish(W, L, rays, m, lane)
+                if rays[lane] >= 0:
+                    finish(W, L, m, lane, rays[lane])
+                    under_way -= 1
                 following = skip_missed(W, m, n, following)
-                L[Lane.before * WIDTH + lane] = 0.0
-                L[Lane.stride * WIDTH + lane] = 0.0
-                L[Lane.steps * WIDTH + lane] = 0.0
                 if following < n:
                     take(W, L, rays, m, lane, following)
                     following += 1
@@ -97,15 +116,11 @@ def follow(W, L, rays, n, m, limit, P, step):
         march(L, limit, P, step)
 
 
-def finish(W, L, rays, m, lane):
-    """Write the result of a lane's ray."""
-    i = rays[lane]
-    if i < 0:
-        return 0
+def finish(W, L, m, lane, i):
+    """Write the result of a lane's ray i."""
     W[Row.t * m + i] = L[Lane.t * WIDTH + lane]
     W[Row.steps * m + i] = L[Lane.steps * WIDTH + lane]
     W[Row.status * m + i] = L[Lane.done * WIDTH + lane]
-    return 1
 
 
 def skip_missed(W, m, n, i):
@@ -114,11 +129,16 @@ def skip_missed(W, m, n, i):
     `m`, `n`, `i`: numbers per row of W, rays, first ray.
     """
     while i < n and W[Row.start * m + i] >= W[Row.end * m + i]:
-        W[Row.status * m + i] = 2.0
-        W[Row.steps * m + i] = 0.0
-        W[Row.t * m + i] = 0.0
+        miss(W, m, i)
         i += 1
     return i
+
+
+def miss(W, m, i):
+    """Mark ray i as missed."""
+    W[Row.status * m + i] = 2.0
+    W[Row.steps * m + i] = 0.0
+    W[Row.t * m + i] = 0.0
 
 
 def take(W, L, rays, m, lane, i):
@@ -126,7 +146,15 @@ def take(W, L, rays, m, lane, i):
     for k in range(Row.path + 1):
         L[k * WIDTH + lane] = W[k * m + i]
     L[Lane.t * WIDTH + lane] = W[Row.start * m + i]
+    begin_steps(L, lane)
     rays[lane] = i
+
+
+def begin_steps(L, lane):
+    """Begin the steps of a lane's ray."""
+    L[Lane.before * WIDTH + lane] = 0.0
+    L[Lane.stride * WIDTH + lane] = 0.0
+    L[Lane.steps * WIDTH + lane] = 0.0
 
 
 def idle(L, rays, lane):
@@ -137,6 +165,7 @@ def idle(L, rays, lane):
     L[Lane.side * WIDTH + lane] = 1.0
     L[Lane.path * WIDTH + lane] = 0.0
     L[Lane.t * WIDTH + lane] = 1.0
+    begin_steps(L, lane)
     rays[lane] = -1
 
 
@@ -155,9 +184,9 @@ def march(L, limit, P, step):
         t, before, stride, gap = step(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P)
         steps = steps + 1.0
         free = where(stride > 0.0, t - stride + before, t)
-        done = where(gap < 0.0, 1.0, where(free > end, 2.0, where(steps < limit, 0.0 * steps, 3.0)))
-        if any_of(done > 0.0):
+        if any_of((gap < 0.0) | (free > end) | ~(steps < limit)):
             break
+    done = where(gap < 0.0, 1.0, where(free > end, 2.0, where(steps < limit, 0.0 * steps, 3.0)))
     store(L, Lane.t * WIDTH, t)
     store(L, Lane.steps * WIDTH, steps)
     store(L, Lane.before * WIDTH, before)
@@ -165,8 +194,9 @@ def march(L, limit, P, step):
     store(L, Lane.done * WIDTH, done)
 
 
-def shade(W, m, first, last, P, frame):
-    """Add the light of every ray, and replace each ray by its continuation."""
+def shade(W, m, last, P, frame):
+    """Add the light of every ray, and replace each ray by its continuation; return True if there is one."""
+    alive = False
     for i in range(0, m, WIDTH):
         status = load(W, Row.status * m + i)
         dx, dy, dz = load_vector(W, Row.dx, m, i)
@@ -186,7 +216,9 @@ def shade(W, m, first, last, P, frame):
             y = load(W, Row.oy * m + i) + t * dy
             z = load(W, Row.oz * m + i) + t * dz
             steps, side = load(W, Row.steps * m + i), load(W, Row.side * m + i)
-            u = tuple(load(W, (first + k) * m + i) for k in range(frame.bounce_samples))
+            u = tuple(
+                load(W, (Row.px + frame.camera_samples + k) * m + i) for k in range(frame.bounce_samples)
+            )
             q = load(W, Row.dense * m + i) if frame.weighted else 0.0
             light, onward = surface(x, y, z, dx, dy, dz, t, path, steps, side, last, q, u, P)
             hr, hg, hb = light
@@ -212,9 +244,11 @@ def shade(W, m, first, last, P, frame):
         elif frame.bounces:
             store_vector(W, Row.tr, m, i, more, more, more)
         if frame.bounces:  # start beyond end: terminated rays, whose values may be NaN, are not marched
+            alive = alive | any_of(more > frame.faintest)
             store(W, Row.start * m + i, where(more > frame.faintest, load(W, Row.start * m + i), 1e30))
         sr, sg, sb = load_vector(W, Row.r, m, i)
         store_vector(W, Row.r, m, i, sr + tr * r, sg + tg * g, sb + tb * b)
+    return alive
 
 
 def cover(W, m):
@@ -236,8 +270,8 @@ def clear(W, m):
         store_vector(W, Row.r, m, i, where(hit, r, 0.0), where(hit, g, 0.0), where(hit, b, 0.0))
 
 
-def gather(W, pixels, A, n, m, width, frame):
-    """Add one sample to each of n pixels. NaN, infinite and negative light is removed.
+def gather(W, pixels, A, first, n, m, width, frame):
+    """Add one sample to each of n pixels, from the first one on. NaN, infinite and negative light is removed.
 
     `A`: sums of the picture, changed in place.
     """
@@ -248,8 +282,7 @@ def gather(W, pixels, A, n, m, width, frame):
             store_vector(W, Row.r, m, i, cr, cg, cb)
         store(W, Row.t * m + i, brightness(cr, cg, cb))
     for k in range(n):
-        pixel = pixels[k]
-        a = CHANNELS * ((pixel >> 16) * width + (pixel & 65535))
+        a = place(pixels[first + k], width)
         bright = W[Row.t * m + k]
         A[a] += W[Row.r * m + k]
         A[a + 1] += W[Row.g * m + k]
@@ -260,94 +293,133 @@ def gather(W, pixels, A, n, m, width, frame):
         A[a + COVER] += W[Row.cover * m + k]
 
 
+def place(pixel, width):
+    """Return the index of a pixel's sums."""
+    return CHANNELS * ((pixel >> 16) * width + (pixel & 65535))
+
+
 def loops(frame: Frame) -> tuple[Loop, ...]:
-    """Return the C loops of a frame: `tile`, and `cones` if rays start at the eye."""
-    return tuple(made.fix(frame=frame) for made in ((tile, cones) if frame.sharp else (tile,)))
+    """Return the loops of a frame: `tile`, and `cones` if rays start at the eye."""
+    made = (tile, cones) if frame.sharp else (tile,)
+    return tuple(replace(one.fix(frame=frame), own=max(workspace(frame, 1), len(Lane))) for one in made)
 
 
 def workspace(frame: Frame, rays: int) -> int:
     """Return the size of a tile's workspace W."""
-    return (Row.px + frame.samples) * rays
+    return (Row.px + frame.camera_samples + frame.bounce_samples) * rays
 
 
-@loop("rirrriirnnnnn")
+def padded(n):
+    """Return the numbers in a row of n rays."""
+    return (n + WIDTH - 1) // WIDTH * WIDTH
+
+
+@loop("rirwwvirnnnnn")
 def tile(P, Q, S, W, L, rays, pixels, A, n, width, limit, shift, blocks, frame):
-    """Add samples to each of n pixels up to their goals.
+    """Add samples to each of n pixels up to their goals; on a thread, one sample to one pixel.
 
     `P`, `Q`, `S`: scene parameters, sample sequence, start distance of each block; `A`: `CHANNELS` per
     pixel; `n` in pixels.
     """
-    left = n
-    while left > 0:
-        m = (left + WIDTH - 1) // WIDTH * WIDTH
-        draw(W, Q, P, pixels, A, left, m, width, frame)
-        begin(W, m, P, frame)
-        for k in range(left):
-            pixel = pixels[k]
-            early = S[(pixel >> 16 + shift) * blocks + ((pixel & 65535) >> shift)]
-            W[Row.start * m + k] = max(W[Row.start * m + k], early)
-        for bounce in range(frame.bounces + 1):
-            follow(W, L, rays, left, m, limit, P, step_ray)
-            if bounce == 0:
-                cover(W, m)
-            last = 1.0 if bounce == frame.bounces else 0.0
-            shade(W, m, Row.px + frame.camera_samples + bounce * frame.bounce_samples, last, P, frame)
-            if frame.transparent and bounce == 0:
-                clear(W, m)
-        gather(W, pixels, A, left, m, width, frame)
-        left = unfinished(pixels, A, left, width)
+    for first in shares(n, n):
+        left = unfinished(pixels, A, first, n if WIDTH > 1 else 1, width)
+        while left > 0:
+            count = left if WIDTH > 1 else 1
+            m = padded(count)
+            draw(W, Q, P, pixels, A, first, count, m, width, frame)
+            begin(W, m, P, frame)
+            for k in range(count):
+                pixel = pixels[first + k]
+                early = S[(pixel >> 16 + shift) * blocks + ((pixel & 65535) >> shift)]
+                W[Row.start * m + k] = max(W[Row.start * m + k], early)
+            for bounce in range(frame.bounces + 1):
+                follow(W, L, rays, count, m, limit, P, step_ray)
+                if bounce == 0:
+                    cover(W, m)
+                draw_bounce(W, Q, P, pixels, A, first, count, m, width, bounce, frame)
+                alive = shade(W, m, 1.0 if bounce == frame.bounces else 0.0, P, frame)
+                if frame.transparent and bounce == 0:
+                    clear(W, m)
+                if not alive:
+                    break
+            gather(W, pixels, A, first, count, m, width, frame)
+            if WIDTH == 1:
+                break
+            left = unfinished(pixels, A, first, left, width)
 
 
-def unfinished(pixels, A, n, width):
-    """Move the pixels below their goals to the front."""
+def unfinished(pixels, A, first, n, width):
+    """Count the pixels below their goals of n from the first one on; on lanes, move them to the front."""
     kept = 0
     for k in range(n):
-        pixel = pixels[k]
-        a = CHANNELS * ((pixel >> 16) * width + (pixel & 65535))
+        pixel = pixels[first + k]
+        a = place(pixel, width)
         if A[a + COUNT] < A[a + GOAL]:
-            pixels[kept] = pixel
+            if WIDTH > 1:
+                pixels[first + kept] = pixel
             kept += 1
     return kept
 
 
-@loop("rrrirrinnnnnnn")
-def cones(P, S, C, ids, W, L, rays, n, m, shift, blocks, coarser, parents, limit, frame):
+@loop("rrrwwvnnnnnnn")
+def cones(P, S, C, W, L, rays, begun, n, shift, blocks, coarser, parents, limit, frame):
     """Cone prepass: compute the distance up to which all rays of each block of pixels are free.
 
-    `P`, `S`, `C`: scene parameters; `n`, `m`: blocks, and numbers per row of W.
+    `P`, `S`, `C`: scene parameters, start distance of each block, written, and of each of coarser blocks;
+    `begun`, `n`: first block and blocks.
     """
-    for k in range(m):
-        block = ids[min(k, n - 1)]
-        W[Row.px * m + k] = (block % blocks + 0.5) * (1 << shift) + P[frame.far + 1]
-        W[Row.py * m + k] = (block // blocks + 0.5) * (1 << shift) + P[frame.far + 2]
-    begin(W, m, P, frame)
-    for k in range(n):
-        block = ids[k]
-        W[Row.start * m + k] = C[(block // blocks >> coarser) * parents + (block % blocks >> coarser)]
-        W[Row.end * m + k] = P[frame.far]
-        W[Row.path * m + k] = P[frame.far + 3] * (1 << shift)
-    follow(W, L, rays, n, m, limit, P, step_cone)
-    for k in range(n):
-        S[ids[k]] = W[Row.t * m + k] if W[Row.status * m + k] != 2.0 else 1e30
+    for first in shares(n, n):
+        own = begun + first
+        count = n if WIDTH > 1 else 1
+        m = padded(count)
+        for k in range(m):
+            block = own + min(k, count - 1)
+            W[Row.px * m + k] = (block % blocks + 0.5) * (1 << shift) + P[frame.far + 1]
+            W[Row.py * m + k] = (block // blocks + 0.5) * (1 << shift) + P[frame.far + 2]
+        begin(W, m, P, frame)
+        for k in range(count):
+            block = own + k
+            W[Row.start * m + k] = C[(block // blocks >> coarser) * parents + (block % blocks >> coarser)]
+            W[Row.end * m + k] = P[frame.far]
+            W[Row.path * m + k] = P[frame.far + 3] * (1 << shift)
+        follow(W, L, rays, count, m, limit, P, step_cone)
+        for k in range(count):
+            S[own + k] = W[Row.t * m + k] if W[Row.status * m + k] != 2.0 else 1e30
 
 
-def draw(W, Q, P, pixels, A, n, m, width, frame):
-    """Draw all random numbers of the next sample of n pixels. Columns beyond n repeat the last pixel.
+def draw(W, Q, P, pixels, A, first, n, m, width, frame):
+    """Draw the random numbers of the camera rays of n pixels. Columns beyond n repeat the last pixel.
 
     A pixel has the same numbers in the film and in a part of it.
 
     `W`: workspace, written from `Row.px` on; `Q`, `P`, `pixels`, `A`: sample sequence, scene parameters,
     pixels, sums of the picture.
     """
-    first = (int(P[frame.far + 2]) << 16) + int(P[frame.far + 1])
     for k in range(m):
-        pixel = pixels[min(k, n - 1)]
-        q = frame.samples * int(A[CHANNELS * ((pixel >> 16) * width + (pixel & 65535)) + COUNT])
-        pixel += first
+        own = pixels[first + min(k, n - 1)]
+        q = frame.samples * int(A[place(own, width) + COUNT])
+        pixel = own + film_origin(P, frame)
         W[Row.px * m + k] = (pixel & 65535) + centred(Q[q], pixel, 0)
         W[Row.py * m + k] = (pixel >> 16) + centred(Q[q + 1], pixel, 1)
-        for d in range(2, frame.samples):
+        for d in range(2, frame.camera_samples):
             W[(Row.px + d) * m + k] = sample(Q[q + d], pixel, d)
+
+
+def draw_bounce(W, Q, P, pixels, A, first, n, m, width, bounce, frame):
+    """Draw the random numbers of n pixels for the light of rays that hit; see `draw`."""
+    begun = frame.camera_samples + bounce * frame.bounce_samples
+    for k in range(n):
+        if W[Row.status * m + k] != 2.0:
+            own = pixels[first + k]
+            q = frame.samples * int(A[place(own, width) + COUNT]) + begun
+            pixel = own + film_origin(P, frame)
+            for d in range(frame.bounce_samples):
+                W[(Row.px + frame.camera_samples + d) * m + k] = sample(Q[q + d], pixel, begun + d)
+
+
+def film_origin(P, frame):
+    """Return the upper left pixel of the picture in the film."""
+    return (int(P[frame.far + 2]) << 16) + int(P[frame.far + 1])
 
 
 def begin(W, m, P, frame):

@@ -24,7 +24,7 @@ from ..scene import Scene, reads, to_xml
 from ..scene.view import Camera, Film, View
 from ..work import Work
 from .accumulator import CHANNELS, Accumulator, PassPlan, grids
-from .cpu import BLOCK, CpuTracer
+from .cpu import CpuTracer
 from .crops import Crop
 from .film import picture
 from .host_accumulator import HostAccumulator
@@ -490,7 +490,7 @@ class Renderer:
     def _linked(self) -> Frame:
         setup = self.setup
         root = clip_scene(setup.root, setup.camera)
-        return link_frame(root, setup.view, setup.camera, setup.optics, BLOCK)
+        return link_frame(root, setup.view, setup.camera, setup.optics)
 
     def seen(self) -> Pass:
         """Return the current picture without another pass.

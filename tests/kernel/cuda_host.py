@@ -1,27 +1,30 @@
-"""NVIDIA's driver with host memory in place of a GPU's, and kernels that do nothing."""
+"""NVIDIA's driver with host memory in place of a GPU's, and threads that run in turn on the CPU."""
 
 from __future__ import annotations
 
 import ctypes
-import re
+import gc
 import struct
-import sys
-from itertools import chain
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
-from unittest import mock
 
 import numpy as np
 import pytest
 
-from fracslice.expr import cuda_driver, cuda_memory
-from fracslice.fields import cuda, cuda_launching
-from fracslice.formulas import sphere
+from fracslice.expr import cuda_driver
+from fracslice.expr.loops import OWN, Loop, element_type, is_array
+from fracslice.expr.machine import Function
+from fracslice.fields import cpu as lanes
+from fracslice.fields import cuda
+from fracslice.fields.field import Precision
+from fracslice.fields.linker import Linked
 
 H200 = (9, 0)
 
 
 class HostDriver:
-    """Stands in for `cuda_api.call`.
+    """Stands in for `cuda_driver.call`.
 
     memory: what is allocated, by address. images: loaded code. launches: entry, grid and 8-byte parameters.
     """
@@ -63,6 +66,20 @@ class HostDriver:
     def cuStreamSynchronize(self, stream: int) -> None:
         self.synchronised.append(stream)
 
+    def cuLinkCreate(self, count: int, options: Any, values: Any, state: Any) -> None:
+        assert (count, options._obj.value) == (1, 0)
+        state._obj.value = 1
+
+    def cuLinkAddData(self, state: Any, kind: int, text: bytes, size: int, *_: Any) -> None:
+        assert (kind, size) == (1, len(text) + 1)
+        self.code = ctypes.create_string_buffer(b"code of " + text)
+
+    def cuLinkComplete(self, state: Any, code: Any, size: Any) -> None:
+        code._obj.value, size._obj.value = ctypes.addressof(self.code), len(self.code) - 1
+
+    def cuLinkDestroy(self, state: Any) -> None:
+        pass
+
     def cuModuleLoadData(self, module: Any, image: bytes) -> None:
         self.images.append(image)
 
@@ -77,26 +94,54 @@ class HostDriver:
         self.launches.append((self.images[function.value - 1], tuple(grid), words))
 
 
-def driven(patch: pytest.MonkeyPatch) -> HostDriver:
-    """A GPU that is there and does nothing."""
+def driven(patch: pytest.MonkeyPatch) -> Iterator[HostDriver]:
+    """A fixture: a GPU that is there and does nothing."""
     host = HostDriver()
-    patch.delenv("NUMBA_ENABLE_CUDASIM", raising=False)
-    patch.setattr(cuda_memory, "call", host)
-    patch.setattr(cuda_launching, "call", host)
-    patch.setattr(cuda_launching, "capability", lambda: H200)
-    patch.setattr(cuda_driver, "present", lambda: True)
-    return host
+    patch.setattr(cuda_driver, "call", host)
+    patch.setattr(cuda_driver, "capability", lambda: H200)
+    patch.setattr(cuda_driver, "missing", lambda: None)
+    kept = cuda._functions, cuda._kernel, cuda.compile_loops
+    yield host
+    for cached in kept:
+        cached.cache_clear()
+    gc.collect()  # what is left is freed there, too
 
 
-def compiles_without_gpu() -> None:
-    """Numba compiles for an H100 or H200 where there is none."""
-    from numba.cuda import dispatcher
-    from numba.cuda.cudadrv import devices
+@dataclass(frozen=True)
+class Threads:
+    """Stands in for `cuda.CudaFunction`: all threads, one after the other, with one lane of the CPU each."""
 
-    device = mock.Mock(compute_capability=H200)
-    dispatcher.get_current_device = lambda: device
-    devices.get_context = lambda *_: mock.Mock(device=device)
-    dispatcher._Kernel.bind = lambda kernel: None
+    function: Function
+    loop: Loop
+    real: np.dtype
+
+    def launch(self, threads: int, *values: Any) -> None:
+        left = iter(values)
+        own = [np.zeros(self.loop.own) for letter in self.loop.arguments if letter in OWN]
+        places = iter(array.ctypes.data for array in own)
+        kinds, given = [], []
+        for letter in self.loop.arguments:
+            dtype = element_type(letter, self.real)
+            if letter in OWN:
+                given.append(next(places))
+            else:
+                value = next(left)
+                given.append(cuda_driver.address(value, dtype) if is_array(letter) else value)
+            kinds.append(ctypes.c_void_p if is_array(letter) else np.ctypeslib.as_ctypes_type(dtype))
+        ctypes.CFUNCTYPE(None, *kinds)(self.function.address)(*given)  # type: ignore[arg-type]
+
+
+def runs_on_cpu(patch: pytest.MonkeyPatch) -> Iterator[HostDriver]:
+    """A fixture: a GPU whose threads the CPU runs."""
+
+    def functions(source: str, precision: Precision, loops: tuple[Loop, ...]) -> Mapping[str, Threads]:
+        real = np.dtype(precision)
+        made = lanes.load_functions(Linked(source, np.zeros(1)), 8 * real.itemsize, 1, loops)
+        return {loop.name: Threads(made[loop.name], loop, real) for loop in loops}
+
+    for host in driven(patch):
+        patch.setattr(cuda, "_functions", functions)
+        yield host
 
 
 def words(kinds: str, *values: float) -> bytes:
@@ -104,44 +149,3 @@ def words(kinds: str, *values: float) -> bytes:
     return b"".join(
         struct.pack(f"<{kind}", value).ljust(8, b"\0") for kind, value in zip(kinds, values, strict=True)
     )
-
-
-def parameters(text: str, name: str) -> list[int]:
-    """Widths in bits of the parameters of a compiled loop."""
-    (kernel,) = getattr(cuda_launching.execute_module(text), name).overloads.values()
-    (entry,) = re.findall(r"\.entry [^)]*", kernel.library.get_asm_str())
-    return [int(bits) for bits in re.findall(r"\.param \.[a-z](\d+)", entry)]
-
-
-def main() -> None:
-    """Evaluate a field; print the number of loops that Numba compiled for that, and whether it was there."""
-    made: list[list[int]] = []
-    compiled = cuda_launching.compiled
-
-    def checked(text: str, name: str, kinds: tuple[cuda_memory.Kind, ...]) -> bytes:
-        code = compiled(text, name, kinds)
-        each = ([64] * (5 + 2 * n) if n else [8 * np.dtype(dtype).itemsize] for dtype, n, _ in kinds)
-        made.append(list(chain.from_iterable(each)))
-        assert parameters(text, name) == made[-1]
-        return code
-
-    def imported() -> str:
-        compiles_without_gpu()
-        return cuda_driver.cuda_toolchain()
-
-    with pytest.MonkeyPatch.context() as patch:
-        host = driven(patch)
-        patch.setattr(cuda_driver, "_imported", imported)
-        patch.setattr(cuda_launching, "compiled", checked)
-        kernel = cuda.compile_scene(sphere())
-        kernel.points(*np.zeros((3, 4)))
-        kernel.bricks(np.zeros((2, 3), np.int32), (0, 0, 0), 1, np.zeros((2, 512), np.float32))
-    assert all(code.startswith(b"\x7fELF") for code in host.images[::2])
-    assert len(host.launches) == 2
-    for (_, _, given), widths in zip(host.launches, made, strict=False):
-        assert len(given) == 8 * len(widths)
-    print(len(made), "numba.cuda" in sys.modules)
-
-
-if __name__ == "__main__":
-    main()

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from fracslice.errors import FracsliceError, SceneError
-from fracslice.expr import cuda_loops, cuda_source
 from fracslice.fields.cpu import compile_scene
 from fracslice.fields.linker import link
 from fracslice.fields.node import FORMULAS
@@ -37,7 +36,6 @@ def test_pythons_own_words_are_those_of_the_vocabulary(module, body: str) -> Non
     root = module(HEAD + "    " + body).mine(radius=0.7)
     np.testing.assert_allclose(reference(root)(*P), SAME[body], rtol=1e-13, atol=1e-13)
     np.testing.assert_allclose(compile_scene(root, "float64").points(*P), SAME[body], rtol=1e-12, atol=1e-12)
-    assert "**" not in cuda_source.module(link(root), 32, [cuda_loops.points])
 
 
 REFUSED = {

@@ -65,7 +65,7 @@ def test_native_objects_refuse_other_loops() -> None:
         slab_of((kernel._bricks, kernel._parameters))
     with pytest.raises(RuntimeError):
         slab_of((kernel._points, kernel._parameters.astype(np.float64)))
-    assert (bricks.arguments, points.arguments) == ("rrrrrirn", "rrrrrn")
+    assert (bricks.arguments, points.arguments) == ("rxxxxrrrirn", "rrrrrn")
 
 
 def test_arrays_become_addresses_in_one_place() -> None:
@@ -75,7 +75,7 @@ def test_arrays_become_addresses_in_one_place() -> None:
         str(path.relative_to(package)) for path in package.rglob("*.py") if address.search(path.read_text())
     }
     own = {"viewer/screen.py"}  # names X11's result type
-    driver = {"fields/cuda_launching.py", "expr/cuda_memory.py"}  # returns when it has copied
+    driver = {"fields/cuda.py", "expr/cuda_driver.py"}  # which returns when it has copied
     assert result == {"expr/machine.py"} | own | driver
 
 

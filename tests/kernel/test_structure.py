@@ -10,6 +10,7 @@ from fracslice.errors import SceneError
 from fracslice.expr import compiler
 from fracslice.expr.host import REGISTERS, host
 from fracslice.expr.loops import points
+from fracslice.expr.values import Lanes
 from fracslice.fields.cpu import compile_scene
 from fracslice.fields.linker import link
 from fracslice.fields.reference import reference
@@ -53,7 +54,8 @@ def nested(depth: int) -> Node:
 def instructions(root: Node) -> int:
     """Of LLVM's, in the kernel."""
     target = compiler.Target(32, 32, REGISTERS, *host())
-    module = llvm.parse_assembly(compiler._text(link(root), target, [points]))
+    lanes = Lanes(target.bits, target.width, target.registers)
+    module = llvm.parse_assembly(compiler._text(link(root), lanes, llvm.get_process_triple(), [points]))
     compiler._optimise(module, compiler._target_machine(target))
     return sum(1 for f in module.functions for b in f.blocks for _ in b.instructions)
 
@@ -143,7 +145,7 @@ def test_paints_of_many_materials_are_numbers() -> None:
         root = union(*(material(ball(k), colour=(0.1, 0.01 * k, 0.2)) for k in range(count)))
         camera = Camera(eye=(2, -2, 1))
         view = View(camera=camera, lights=(Light(shadows="no"),))
-        return link_frame(root, view, camera, optics(camera, (32, 32), root, 1e-7), 8).linked.source
+        return link_frame(root, view, camera, optics(camera, (32, 32), root, 1e-7)).linked.source
 
     def trace(text: str) -> str:
         return text[text.index("def T") : text.index("def surface(")]

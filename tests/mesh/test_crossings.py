@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
-import os
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
@@ -88,11 +83,3 @@ def test_planes_almost_in_one_are_distinguished(step: float) -> None:
     assert np.abs(field(*(edges[:3] + exact.t * edges[3:]))).max() < 1e-9 * bricks.voxel
     outward = np.where(field(*edges[:3]) < 0, 1, -1)
     assert ((exact.normals * edges[3:]).sum(0) * outward > 0).all()
-
-
-@pytest.mark.skipif(importlib.util.find_spec("numba_cuda") is None, reason="numba-cuda is not installed")
-def test_roots_on_a_gpu_are_found_ahead_on_the_simulator() -> None:
-    environment = {**os.environ, "NUMBA_ENABLE_CUDASIM": "1"}
-    command = [sys.executable, "-m", "tests.mesh.cuda_simulated"]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr

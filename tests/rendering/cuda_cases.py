@@ -21,7 +21,6 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.rendering.cpu import BLOCK
 from fracslice.rendering.linking import Frame, link_frame
 from fracslice.rendering.setup import optics
 from fracslice.scene.view import Camera, Film, Fog, Light, Shading, View
@@ -97,4 +96,4 @@ CASES: dict[str, tuple[Node, View]] = {
 def frame(name: str) -> Frame:
     root, view = CASES[name]
     camera = view.camera or Camera()
-    return link_frame(root, view, camera, optics(camera, (WIDTH, HEIGHT), root, 1e-5), BLOCK)
+    return link_frame(root, view, camera, optics(camera, (WIDTH, HEIGHT), root, 1e-5))

@@ -23,7 +23,7 @@ BULB = mandelbulb(iterations=4)
 
 def frame(root: Node = BULB, camera: Camera = CAMERA, **view: object) -> Frame:
     whole = View(camera=camera, **{"lights": PLAIN, **view})  # type: ignore[arg-type]
-    return link_frame(root, whole, camera, optics(camera, (32, 32), root, 1e-7), 8)
+    return link_frame(root, whole, camera, optics(camera, (32, 32), root, 1e-7))
 
 
 EFFECTS = {

@@ -15,7 +15,7 @@ import numpy as np
 
 from fracslice.formulas import mandelbulb
 from fracslice.rendering.accumulator import GOAL, PassPlan, tile_order
-from fracslice.rendering.cpu import BLOCK, CpuTracer
+from fracslice.rendering.cpu import CpuTracer
 from fracslice.rendering.host_accumulator import HostAccumulator
 from fracslice.rendering.linking import link_frame
 from fracslice.rendering.setup import optics
@@ -35,7 +35,7 @@ def tracer(width: int, height: int) -> CpuTracer:
     light = Light(position=tuple(np.array([-0.35, 0.5, -0.8]) @ sides), strength=0.7, shadows="no")
     view = View(camera=camera, lights=(light,), shading=Shading(ambient=0.1))
     seen = optics(camera, (width, height), root, 1e-7)
-    return CpuTracer(link_frame(root, view, camera, seen, BLOCK), np.dtype(np.float32), width, height)
+    return CpuTracer(link_frame(root, view, camera, seen), np.dtype(np.float32), width, height)
 
 
 def ours(of: CpuTracer, pixels: np.ndarray, samples: int, work: Work) -> Figures:

@@ -7,8 +7,6 @@ import ast
 from collections.abc import Sequence
 from typing import Any
 
-from fracslice.expr.cuda_source import after_parameters
-
 WORDS = {
     "where": "({} ? {} : {})",
     "any_of": "{}",
@@ -153,6 +151,12 @@ def _statement(node: ast.stmt) -> list[str]:
 
 def _count(node: ast.expr) -> str:
     return str(node.value) if isinstance(node, ast.Constant) else _expression(node)
+
+
+def after_parameters(arguments: list[ast.expr]) -> list[ast.expr]:
+    """The arguments of a call after P: integer offsets into P."""
+    names = [a.id if isinstance(a, ast.Name) else "" for a in arguments]
+    return arguments[names.index("P") + 1 :] if "P" in names[:-1] else []
 
 
 def _expression(node: ast.expr) -> str:

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from fracslice.fields import cuda
+from fracslice.expr import cuda_driver
 from fracslice.formulas import mandelbulb
 from fracslice.rendering.accumulator import CHANNELS, COUNT, COVER, GOAL, PassPlan, tile_order
-from fracslice.rendering.cpu import BLOCK, STEPS, CpuTracer
+from fracslice.rendering.cpu import SHIFTS, STEPS, CpuTracer
 from fracslice.rendering.cuda import CudaTracer
 from fracslice.rendering.linking import Frame, link_frame
 from fracslice.rendering.sequence import SampleRange
@@ -37,7 +37,7 @@ def frame(width: int, height: int) -> Frame:
     root, camera = mandelbulb(iterations=8), Camera(eye=(0.0, -2.6, 0.0), fov=37.0)
     light = Light(kind="sun", position=(1.0, -1.2, 1.2), shadows="no")
     view = View(camera=camera, lights=(light,), shading=Shading(ambient=0.15))
-    return link_frame(root, view, camera, optics(camera, (width, height), root, 1e-5), BLOCK)
+    return link_frame(root, view, camera, optics(camera, (width, height), root, 1e-5))
 
 
 FRAME = r"""
@@ -145,7 +145,7 @@ mean brightness of the first sample, the error code."""
 
 def program(seen: Frame) -> str:
     """FRAME with the constants of the renderer."""
-    numbers = {"CHANNELS": CHANNELS, "COUNT": COUNT, "GOAL": GOAL, "COVER": COVER, "SHIFT": seen.shift}
+    numbers = {"CHANNELS": CHANNELS, "COUNT": COUNT, "GOAL": GOAL, "COVER": COVER, "SHIFT": SHIFTS[0]}
     numbers |= {"ROUNDS": ROUNDS, "TIMES": TIMES}
     constants = "".join(f"constexpr int {name} = {value};\n" for name, value in numbers.items())
     return f"{constants}constexpr float LIMIT = {STEPS['float32']};\n{FRAME}"
@@ -157,10 +157,10 @@ def given(seen: Frame, pixels: np.ndarray) -> np.ndarray:
 
 
 def rows(run: Run) -> Iterator[Row]:
-    memory, seen, pixels = cuda.require(), frame(WIDTH, HEIGHT), tile_order(WIDTH, HEIGHT)
+    seen, pixels = frame(WIDTH, HEIGHT), tile_order(WIDTH, HEIGHT)
     tracer = CudaTracer(seen, SINGLE, WIDTH, HEIGHT)
-    placed = memory.to_device(pixels)
-    sums, work = memory.to_device(empty()), Work(1)
+    placed = cuda_driver.to_device(pixels)
+    sums, work = cuda_driver.to_device(empty()), Work(1)
     tracer.add(sums, PassPlan(placed, pixels.size, 1), work)
     picture = sums.copy_to_host().reshape(-1, CHANNELS)
     tracer.add(sums, PassPlan(placed, pixels.size, ROUNDS), work)

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fracslice.fields import cuda
+from fracslice.expr.cuda_driver import to_device
 from fracslice.formulas import mandelbulb
 from fracslice.rendering import Renderer
 from fracslice.rendering.accumulator import CHANNELS, GOAL, PassPlan, tile_order
@@ -28,7 +28,6 @@ RUNS = 20
 
 
 def rows(run: Run) -> Iterator[Row]:
-    memory = cuda.require()
     of = Renderer(mandelbulb(), VIEW, (1920, 1080), device="cuda")
     passes = of.passes(tolerance=0.0)
     for _ in range(WARM):
@@ -38,10 +37,10 @@ def rows(run: Run) -> Iterator[Row]:
     def shown() -> None:
         _ = next(passes).shown
 
-    pixels = memory.to_device(tile_order(1920, 1080))
+    pixels = to_device(tile_order(1920, 1080))
     sums = np.zeros((1920 * 1080, CHANNELS), of.dtype)
     sums[:, GOAL] = 3 * RUNS
-    placed = memory.to_device(sums.ravel())
+    placed = to_device(sums.ravel())
 
     def traced() -> None:
         of.tracer.add(placed, PassPlan(pixels, pixels.size, 1), of.work)

@@ -5,6 +5,7 @@ The kernel runs on arrays of the GPU; the sampler has its results in the compute
 
 from __future__ import annotations
 
+import ctypes
 import tempfile
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fracslice.expr import cuda_driver
 from fracslice.fields import cpu, cuda
 from fracslice.fields.linker import link
 from fracslice.formulas import Node, mandelbulb, menger
@@ -38,25 +40,26 @@ def surface(root: Node) -> np.ndarray:
 
 def best(run: Callable[[], None], rounds: int = 10) -> float:
     """The shortest of a few times on the GPU, ms; it is kept busy before, so that launching costs nothing."""
-    from fracslice.expr.cuda_intrinsics import cuda as numba_cuda
-
-    times = []
+    times, took = [], ctypes.c_float()
+    start, end = ctypes.c_void_p(), ctypes.c_void_p()
+    for event in (start, end):
+        cuda_driver.call("cuEventCreate", ctypes.byref(event), 0)
     for _ in range(rounds):
-        start, end = numba_cuda.event(), numba_cuda.event()
         run()
-        start.record()
+        cuda_driver.call("cuEventRecord", start, None)
         run()
-        end.record()
-        end.synchronize()
-        times.append(numba_cuda.event_elapsed_time(start, end))
-    return float(min(times))
+        cuda_driver.call("cuEventRecord", end, None)
+        cuda_driver.call("cuEventSynchronize", end)
+        cuda_driver.call("cuEventElapsedTime", ctypes.byref(took), start, end)
+        times.append(took.value)
+    return min(times)
 
 
 def rates(root: Node, corners: np.ndarray) -> dict[str, tuple[float, int]]:
     """By back end: G evaluations/s, and how many samples are inside."""
-    memory, kernel = cuda.require(), cuda.compile_scene(root)
-    count, placed = 512 * len(corners), memory.to_device(corners)
-    out = memory.device_array((len(corners), 512), np.float32)
+    kernel = cuda.compile_scene(root)
+    count, placed = 512 * len(corners), cuda_driver.to_device(corners)
+    out = cuda_driver.device_array((len(corners), 512), np.float32)
     took = best(lambda: kernel.bricks_on_device(placed, ORIGIN, VOXEL, out))
     measured = {"fracslice": (count / took / 1e6, int((out.copy_to_host() < 0).sum()))}
     with tempfile.TemporaryDirectory() as folder:

@@ -56,7 +56,7 @@ def instructions(name: str) -> int:
     root, view = PICTURES[name]
     whole = View(**{**PLAIN, **view})  # type: ignore[arg-type]
     seen = whole.camera or CAMERA
-    frame = link_frame(root, whole, seen, optics(seen, (32, 32), root, 1e-7), 4)
+    frame = link_frame(root, whole, seen, optics(seen, (32, 32), root, 1e-7))
     return _count(frame.linked, loops(frame))
 
 

@@ -1,11 +1,9 @@
-"""Run by test_crossings.py in a process of its own, on Numba's CUDA simulator, and fails as a test does."""
+"""Search of crossings on a GPU, whose threads the CPU runs, against the lanes."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
-from unittest import mock
 
 import numpy as np
 import pytest
@@ -17,12 +15,20 @@ from fracslice.mesh import contouring
 from fracslice.mesh.contouring import Crossings, Refiner, contour_pieces
 from fracslice.volume import plan, sample_scene_signs
 from fracslice.work import Work
+from tests.kernel.cuda_host import HostDriver, runs_on_cpu
+
+pytestmark = pytest.mark.once
 
 PLANNED = plan(torus(radius=1, tube=0.3), 12)
 SIGNS = sample_scene_signs(PLANNED)
 CELLS = Cells(SIGNS.ijk, SIGNS.signs, SIGNS.index)
 COUNT = CELLS.crossings_before(len(SIGNS.index))
 GPU = Work(1, device="cuda")
+
+
+@pytest.fixture(autouse=True)
+def threads(monkeypatch: pytest.MonkeyPatch) -> Iterator[HostDriver]:
+    yield from runs_on_cpu(monkeypatch)
 
 
 class Watched(Refiner):
@@ -39,16 +45,14 @@ class Watched(Refiner):
             self.searched.release()
 
 
-def roots() -> None:
-    """A thread per grid edge finds the crossings and normals of the lanes."""
+def test_crossings_and_normals_are_those_of_the_lanes() -> None:
     lanes, threads = (Watched(work).between(0, COUNT) for work in (Work(1), GPU))
     assert COUNT > 250
     np.testing.assert_allclose(threads.t, lanes.t, atol=1e-6)
     np.testing.assert_allclose(threads.normals, lanes.normals, atol=1e-4)
 
 
-def kept() -> None:
-    """The roots of a range stay while those of the next are found, whatever both share."""
+def test_roots_of_a_range_stay_while_those_of_the_next_are_found() -> None:
     whole, parts = Watched(GPU).between(0, COUNT), Watched(GPU)
     ranges = [(begin, min(begin + 90, COUNT)) for begin in range(0, COUNT, 60)]
     for number, part in enumerate(parts.each(ranges)):
@@ -60,19 +64,12 @@ def kept() -> None:
         np.testing.assert_array_equal(part.normals, whole.normals[:, own])
 
 
-@contextmanager
-def small_batches() -> Iterator[None]:
-    batches = contouring._batches
-    with mock.patch.object(contouring, "_batches", lambda *given: batches(*given[:3], 1)):
-        yield
-
-
-def pieces() -> None:
-    """A surface is the same in one batch, in several, and in pieces with one root finder."""
+def test_a_surface_is_the_same_in_batches_and_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
     (whole,) = contour_pieces(PLANNED.root, SIGNS, GPU, len(SIGNS))
-    with small_batches():
-        (batched,) = contour_pieces(PLANNED.root, SIGNS, GPU, len(SIGNS))
-        several = list(contour_pieces(PLANNED.root, SIGNS, GPU, 1))
+    batches = contouring._batches
+    monkeypatch.setattr(contouring, "_batches", lambda *given: batches(*given[:3], 1))
+    (batched,) = contour_pieces(PLANNED.root, SIGNS, GPU, len(SIGNS))
+    several = list(contour_pieces(PLANNED.root, SIGNS, GPU, 1))
     assert len(several) > 2
     for name in ("vertices", "triangles"):
         np.testing.assert_array_equal(getattr(batched.mesh, name), getattr(whole.mesh, name))
@@ -81,8 +78,7 @@ def pieces() -> None:
     assert sum(len(piece.mesh.triangles) for piece in several) == len(whole.mesh.triangles)
 
 
-def interrupted() -> None:
-    """What ends the search of a range ahead is raised where that range is asked for."""
+def test_what_ends_a_search_ahead_is_raised_where_its_range_is_asked_for() -> None:
     work = Work(1, device="cuda")
     found = Watched(work).each([(0, 60), (30, 120), (90, 150)])
     next(found)
@@ -90,14 +86,3 @@ def interrupted() -> None:
     with pytest.raises(Cancelled):
         list(found)
     assert next(found, None) is None
-
-
-def main() -> None:
-    roots()
-    kept()
-    pieces()
-    interrupted()
-
-
-if __name__ == "__main__":
-    main()
