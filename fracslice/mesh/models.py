@@ -19,7 +19,7 @@ from ..errors import MeshError, SceneError
 from ..formulas.box import Box
 from ..formulas.node import TriangleMesh
 from ..formulas.registry import InMemory, Node, get
-from .checks import check_mesh
+from .checks import MeshReport, check_mesh
 from .model import Mesh
 from .reading import READERS, read_mesh
 from .spatial import build
@@ -155,6 +155,11 @@ def solid(file: str, sha256: str, size: float | None, place: str, units: str) ->
     return Solid.of(Mesh((mesh.vertices - origin) * scale, mesh.triangles))
 
 
+def faults(report: MeshReport) -> tuple[str, ...]:
+    """Faults by which a mesh is no solid: it may touch itself at vertices, and triangles may be an edge."""
+    return replace(report, nonmanifold_vertices=0, degenerate_triangles=0).problems
+
+
 @lru_cache(maxsize=4)
 def _checked(file: str, sha256: str) -> Mesh:
     """Mesh of a file that has a hash, if it encloses a solid, without triangles that are but an edge."""
@@ -164,9 +169,7 @@ def _checked(file: str, sha256: str) -> Mesh:
         raise MeshError(str(error).removeprefix(f"{file}: ")) from None
     if _digest(file) != sha256:
         raise MeshError("the file was changed while it was read")
-    report = check_mesh(mesh)
-    # A surface may touch itself at vertices; triangles between two corners at one place are left out.
-    if problems := replace(report, nonmanifold_vertices=0, degenerate_triangles=0).problems:
+    if problems := faults(check_mesh(mesh)):
         mended = f"`fracslice repair {os.path.basename(file)} -o OUT` mends what it can"
         raise MeshError(f"{', '.join(problems)}: expected a solid; {mended}")
     a, b, c = mesh.triangles.T
