@@ -24,6 +24,8 @@ from .model import Mesh
 from .reading import READERS, read_mesh
 from .spatial import build
 
+LARGEST, MOST = 1 << 27, 1 << 21
+"""Most bytes of a file, half of them where a triangle takes less than in an STL file; and most triangles."""
 CHUNK = 1 << 20
 """Bytes that are hashed at once."""
 WITH_UNITS = frozenset({".3mf", ".glb"})
@@ -80,6 +82,10 @@ _SEEN = set[tuple[str, str]]()
 def _digest(path: str) -> str:
     try:
         with open_regular(path) as file:
+            most = LARGEST if path.lower().endswith((".stl", ".obj")) else LARGEST // 2
+            if (size := os.fstat(file.fileno()).st_size) > most:
+                large = f"a file of {size / 1e6:.0f} MB: expected at most {most / 1e6:.0f} MB"
+                raise MeshError(f"{large}, of fewer triangles or in a binary format")
             digest = hashlib.sha256()
             while data := file.read(CHUNK):
                 digest.update(data)
@@ -169,6 +175,8 @@ def _checked(file: str, sha256: str) -> Mesh:
         raise MeshError(str(error).removeprefix(f"{file}: ")) from None
     if _digest(file) != sha256:
         raise MeshError("the file was changed while it was read")
+    if len(mesh.triangles) > MOST:
+        raise MeshError(f"{len(mesh.triangles):,} triangles: expected at most {MOST:,}")
     if problems := faults(check_mesh(mesh)):
         mended = f"`fracslice repair {os.path.basename(file)} -o OUT` mends what it can"
         raise MeshError(f"{', '.join(problems)}: expected a solid; {mended}")

@@ -304,6 +304,13 @@ def test_bad_input_is_one_line(values: str, message: str, tmp_path: Path) -> Non
     assert "\n" not in str(error.value)
 
 
+def test_too_large_a_file_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    with (tmp_path / "large.ply").open("wb") as file:
+        file.truncate((1 << 26) + 1)
+    with pytest.raises(SceneError, match="a file of 67 MB: expected at most 67 MB, of fewer triangles or"):
+        model(str(tmp_path / "large.ply"))
+
+
 def test_a_model_is_computed_on_the_cpu_and_that_is_said() -> None:
     root = transform(model(BRACKET), scale=2)
     from fracslice.common import cache
