@@ -135,6 +135,7 @@ def test_commands_are_understood(line: str, folder: Path, monkeypatch, capfd) ->
         return
     for work in (
         "jobs.mesh.make_mesh",
+        "mesh.repair.repair",
         "jobs.implicit.make_implicit",
         "slicing.plan_stack",
         "jobs.slices.plan_layers",
