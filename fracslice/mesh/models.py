@@ -1,4 +1,4 @@
-"""Triangle models as solids of scenes: files and their hashes, checks, placement, and signed distances."""
+"""Triangle models as solids of scenes: files and their hashes, checks, and signed distances."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from .. import _native
 from ..common.cache import Kept, cache_folder, key
 from ..common.files import open_regular
-from ..common.parameters import MILLIMETRES
 from ..errors import MeshError, SceneError
 from ..formulas.box import Box
 from ..formulas.node import TriangleMesh
@@ -28,8 +27,6 @@ LARGEST, MOST = 1 << 27, 1 << 21
 """Most bytes of a file, half of them where a triangle takes less than in an STL file; and most triangles."""
 CHUNK = 1 << 20
 """Bytes that are hashed at once."""
-WITH_UNITS = frozenset({".3mf", ".glb"})
-"""Formats that state a unit, to which `read_mesh` scales."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +38,7 @@ class Solid(InMemory):
 
     @classmethod
     def of(cls, mesh: Mesh) -> Solid:
-        """Solid of a checked mesh, in scene units."""
+        """Solid of a checked mesh."""
         vertices, triangles = mesh.vertices, mesh.triangles
         # Triangles that are near each other lie together in memory.
         mesh = Mesh(vertices, triangles[build(mesh, halved=True).order]).in_order()
@@ -148,27 +145,14 @@ def from_trimesh(
     return made
 
 
-@lru_cache(maxsize=8)
-def solid(file: str, sha256: str, size: float | None, place: str, units: str) -> Solid:
-    """Solid of a model file, placed and scaled; see `formulas.model`."""
-    mesh = _checked(file, sha256)
-    if units != "mm" and os.path.splitext(file)[1].lower() in WITH_UNITS:
-        raise MeshError(f"states its own unit: expected no units, found {units}")
-    low, high = mesh.bounds
-    scale = MILLIMETRES[units] if size is None else size / float((high - low).max())
-    middle = (low + high) / 2
-    origin = {"as is": np.zeros(3), "centre": middle, "bed": np.array([*middle[:2], low[2]])}[place]
-    return Solid.of(Mesh((mesh.vertices - origin) * scale, mesh.triangles))
-
-
 def faults(report: MeshReport) -> tuple[str, ...]:
     """Faults by which a mesh is no solid: it may touch itself at vertices, and triangles may be an edge."""
     return replace(report, nonmanifold_vertices=0, degenerate_triangles=0).problems
 
 
-@lru_cache(maxsize=4)
-def _checked(file: str, sha256: str) -> Mesh:
-    """Mesh of a file that has a hash, if it encloses a solid, without triangles that are but an edge."""
+@lru_cache(maxsize=8)
+def solid(file: str, sha256: str) -> Solid:
+    """Solid of a model file with a hash, in mm; refused if it encloses none."""
     try:
         mesh = read_mesh(file)
     except MeshError as error:
@@ -181,4 +165,4 @@ def _checked(file: str, sha256: str) -> Mesh:
         mended = f"`fracslice repair {os.path.basename(file)} -o OUT` mends what it can"
         raise MeshError(f"{', '.join(problems)}: expected a solid; {mended}")
     a, b, c = mesh.triangles.T
-    return mesh.selected((a != b) & (b != c) & (c != a))
+    return Solid.of(mesh.selected((a != b) & (b != c) & (c != a)))
