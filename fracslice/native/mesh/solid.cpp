@@ -95,7 +95,7 @@ void Solid::set_normals() {
 
 double Solid::operator()(const double* p, size_t& found) const {
     if (!std::isfinite(p[0] + p[1] + p[2])) return std::numeric_limits<double>::quiet_NaN();
-    const Neighbour nearest = nearest_(p, found);
+    const Neighbour nearest = nearest_.first(p, found);
     found = nearest.triangle;
     const double distance = std::sqrt(nearest.square);
     return distance == 0 || outside(p, nearest.triangle) ? distance : -distance;
