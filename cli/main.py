@@ -45,6 +45,7 @@ NAMES = (
     "mesh",
     "print",
     "render",
+    "repair",
     "scenes",
     "show",
     "slice",

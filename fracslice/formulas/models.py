@@ -6,9 +6,8 @@ from typing import Any
 
 from ..common.parameters import MILLIMETRES, REQUIRED, Choice, Digest, File, Number
 from ..errors import MeshError, SceneError
-from ..expr.functions import InMemory
 from ..expr.vocabulary import solid_distance
-from ..fields.box import Box
+from ..fields.box import Box, Triple, three
 from ..fields.registry import Node, shape
 
 
@@ -23,12 +22,13 @@ from ..fields.registry import Node, shape
     units=Choice("mm", "unit of an STL, OBJ or PLY file; GLB and 3MF state their own", tuple(MILLIMETRES)),
     sha256=Digest(None, "hash of the file, by which a file that has changed is noticed"),
 )
-def model(x, y, z, solid):  # type: ignore[no-untyped-def]
+def model(x, y, z, origin, scale, inverse, solid):  # type: ignore[no-untyped-def]
     """A triangle model, closed and without self-intersections. L = 1: the exact distance to its triangles, on
     the side that Baerentzen and Aanaes 2005, "Signed Distance Computation Using the Angle Weighted
     Pseudonormal", have.
     """
-    return solid_distance(x, y, z, solid)
+    ox, oy, oz = origin
+    return scale * solid_distance((x - ox) * inverse, (y - oy) * inverse, (z - oz) * inverse, solid)
 
 
 @model.completed
@@ -42,22 +42,39 @@ def model_completed(values: dict[str, Any]) -> dict[str, Any]:
     return {**values, "file": file, "sha256": digest}
 
 
+@model.check
+def model_check(node: Node) -> None:
+    if node["units"] != "mm" and node["file"].lower().endswith((".3mf", ".glb")):
+        raise node.fail(f'units="{node["units"]}": expected none, as the file states its own')
+
+
 @model.arguments
-def model_arguments(node: Node) -> dict[str, InMemory]:
-    return {"solid": _solid(node)}
+def model_arguments(node: Node) -> dict[str, Any]:
+    origin, scale = _placement(node)
+    return {"origin": origin, "scale": scale, "inverse": 1 / scale, "solid": _solid(node)}
 
 
 @model.bounds
 def model_bounds(node: Node) -> Box:
+    box, (origin, scale) = _solid(node).box, _placement(node)
+    corners = [[o + scale * c for o, c in zip(origin, corner, strict=True)] for corner in (box.lo, box.hi)]
+    return Box.around([three(corner) for corner in corners])
+
+
+def _placement(node: Node) -> tuple[Triple, float]:
+    """Where the origin of the file's coordinates is, and the length of a mm of the file, scene units."""
     box: Box = _solid(node).box
-    return box
+    scale = MILLIMETRES[node["units"]] if node["size"] is None else node["size"] / max(box.size)
+    x, y, z = (-scale * c for c in box.centre)
+    places = {"as is": (0.0, 0.0, 0.0), "centre": (x, y, z), "bed": (x, y, -scale * box.lo[2])}
+    return places[node["place"]], scale
 
 
 def _solid(node: Node) -> Any:
-    """The placed solid of a node, a `mesh.models.Solid`."""
+    """The solid of a node, a `mesh.models.Solid`, in mm of its file."""
     from ..mesh.models import solid
 
     try:
-        return solid(**node.values)
+        return solid(node["file"], node["sha256"])
     except MeshError as error:
         raise node.fail(f'file="{node["file"]}": {error}') from error

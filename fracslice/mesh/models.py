@@ -1,4 +1,4 @@
-"""Triangle models as solids of scenes: files and their hashes, checks, placement, and signed distances."""
+"""Triangle models as solids of scenes: files and their hashes, checks, and signed distances."""
 
 from __future__ import annotations
 
@@ -14,21 +14,20 @@ from numpy.typing import NDArray
 from .. import _native
 from ..common.cache import Kept, cache_folder, key
 from ..common.files import open_regular
-from ..common.parameters import MILLIMETRES
 from ..errors import MeshError, SceneError
 from ..expr.functions import InMemory
 from ..fields.box import Box
 from ..fields.node import TriangleMesh
 from ..fields.registry import Node, get
-from .checks import check_mesh
+from .checks import MeshReport, check_mesh
 from .model import Mesh
 from .reading import READERS, read_mesh
 from .spatial import build
 
+LARGEST, MOST = 1 << 27, 1 << 21
+"""Most bytes of a file, half of them where a triangle takes less than in an STL file; and most triangles."""
 CHUNK = 1 << 20
 """Bytes that are hashed at once."""
-WITH_UNITS = frozenset({".3mf", ".glb"})
-"""Formats that state a unit, to which `read_mesh` scales."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +39,7 @@ class Solid(InMemory):
 
     @classmethod
     def of(cls, mesh: Mesh) -> Solid:
-        """Solid of a checked mesh, in scene units."""
+        """Solid of a checked mesh."""
         vertices, triangles = mesh.vertices, mesh.triangles
         # Triangles that are near each other lie together in memory.
         mesh = Mesh(vertices, triangles[build(mesh, halved=True).order]).in_order()
@@ -81,6 +80,10 @@ _SEEN = set[tuple[str, str]]()
 def _digest(path: str) -> str:
     try:
         with open_regular(path) as file:
+            most = LARGEST if path.lower().endswith((".stl", ".obj")) else LARGEST // 2
+            if (size := os.fstat(file.fileno()).st_size) > most:
+                large = f"a file of {size / 1e6:.0f} MB: expected at most {most / 1e6:.0f} MB"
+                raise MeshError(f"{large}, of fewer triangles or in a binary format")
             digest = hashlib.sha256()
             while data := file.read(CHUNK):
                 digest.update(data)
@@ -143,32 +146,24 @@ def from_trimesh(
     return made
 
 
+def faults(report: MeshReport) -> tuple[str, ...]:
+    """Faults by which a mesh is no solid: it may touch itself at vertices, and triangles may be an edge."""
+    return replace(report, nonmanifold_vertices=0, degenerate_triangles=0).problems
+
+
 @lru_cache(maxsize=8)
-def solid(file: str, sha256: str, size: float | None, place: str, units: str) -> Solid:
-    """Solid of a model file, placed and scaled; see `formulas.model`."""
-    mesh = _checked(file, sha256)
-    if units != "mm" and os.path.splitext(file)[1].lower() in WITH_UNITS:
-        raise MeshError(f"states its own unit: expected no units, found {units}")
-    low, high = mesh.bounds
-    scale = MILLIMETRES[units] if size is None else size / float((high - low).max())
-    middle = (low + high) / 2
-    origin = {"as is": np.zeros(3), "centre": middle, "bed": np.array([*middle[:2], low[2]])}[place]
-    return Solid.of(Mesh((mesh.vertices - origin) * scale, mesh.triangles))
-
-
-@lru_cache(maxsize=4)
-def _checked(file: str, sha256: str) -> Mesh:
-    """Mesh of a file that has a hash, if it encloses a solid, without triangles that are but an edge."""
+def solid(file: str, sha256: str) -> Solid:
+    """Solid of a model file with a hash, in mm; refused if it encloses none."""
     try:
         mesh = read_mesh(file)
     except MeshError as error:
         raise MeshError(str(error).removeprefix(f"{file}: ")) from None
     if _digest(file) != sha256:
         raise MeshError("the file was changed while it was read")
-    report = check_mesh(mesh)
-    # A surface may touch itself at vertices; triangles between two corners at one place are left out.
-    if problems := replace(report, nonmanifold_vertices=0, degenerate_triangles=0).problems:
+    if len(mesh.triangles) > MOST:
+        raise MeshError(f"{len(mesh.triangles):,} triangles: expected at most {MOST:,}")
+    if problems := faults(check_mesh(mesh)):
         mended = f"`fracslice repair {os.path.basename(file)} -o OUT` mends what it can"
         raise MeshError(f"{', '.join(problems)}: expected a solid; {mended}")
     a, b, c = mesh.triangles.T
-    return mesh.selected((a != b) & (b != c) & (c != a))
+    return Solid.of(mesh.selected((a != b) & (b != c) & (c != a)))

@@ -85,7 +85,7 @@ def test_scenes(text, message, folder, capfd):
         ("mesh out -o out/x.stl", "out: Is a directory"),
         ("mesh mandelblub -o out/x.stl", "mandelblub: no such scene; did you mean mandelbulb?"),
         ("mesh ball.xml", "Missing option '-o'"),
-        ("mesh -o out/x.stl", "Missing argument 'SCENE'"),
+        ("mesh -o out/x.stl", "Missing argument 'SCENE|MODEL'"),
         ("mesh ball.xml -o out/x.foo", "out/x.foo: unknown kind of file; known are .stl"),
         ("mesh ball.xml -o out", "unknown kind of file"),
         ("mesh ball.xml -o none/x.stl", "none/x.stl: the folder"),
@@ -211,11 +211,11 @@ def test_a_pipe(ending, folder, capfd):
     ],
 )
 def test_the_first_signal_ends_reading(number, reader, name, folder, capfd, monkeypatch):
-    def reading(_: object) -> None:
+    def reading(*_: object, **__: object) -> None:
         signal.raise_signal(number)
         pytest.fail("it goes on")
 
-    def going_on(_: object) -> None:
+    def going_on(*_: object, **__: object) -> None:
         with suppress(BaseException):
             signal.raise_signal(number)
 

@@ -68,3 +68,10 @@ def test_a_worker_reads_the_same_model(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.chdir("/")
     planned = MeshRecipe(to_xml(scene), "a", MeshJob(resolution=16)).plan()
     assert planned.root.key == scene.root.key
+
+
+def test_the_example_is_a_scene_of_its_model() -> None:
+    root = read(Path(__file__).parents[2] / "examples" / "filled-vase.xml").root
+    assert [node["place"] for node in root.walk() if node.formula.name == "model"] == ["bed", "bed"]
+    assert root.bounds.box.size[2] == pytest.approx(80, abs=0.1)
+    assert (root.distance([(-5, 5, 0.6), (-5, 5, -1), (0, -20, 40)]) < 0).tolist() == [True, False, False]

@@ -31,7 +31,7 @@ def test_fly_says_where_it_ended(
 
     monkeypatch.setattr("fracslice.viewer.fly", fly)
     assert run(["fly", str(ball), "--size", "80x60", "--set", "sphere.radius=2", "--device", "cpu"]) == 0
-    path, settings, size, work, device = asked[0]
+    path, settings, size, _, device, _ = asked[0]
     assert (path, settings, size, device) == (ball, ("sphere.radius=2",), (80, 60), "cpu")
     assert capsys.readouterr().out == '<camera eye="1.5 0 2" fov="30"/>\n'
 

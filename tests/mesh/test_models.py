@@ -181,8 +181,9 @@ def test_one_code_serves_all_models_and_keeps_theirs_alive(tmp_path: Path) -> No
     other = model(saved(shapes.cube(), tmp_path / "cube.stl"))
     assert link(other).source == link(model(BRACKET)).source and link(other) != link(model(BRACKET))
     assert other.key != model(BRACKET).key
+    assert link(other.changed(size=2, place="bed")).held[0][1] is link(other).held[0][1]
     made = cpu.CpuKernel(link(other))
-    alive = weakref.ref(models.solid(**other.values))
+    alive = weakref.ref(models.solid(other["file"], other["sha256"]))
     models.solid.cache_clear()
     gc.collect()
     assert alive() is not None
@@ -279,7 +280,7 @@ def test_a_model_lies_in_the_folder_of_its_scene(tmp_path: Path) -> None:
     [
         ("file='none.stl'", "no such file"),
         ("file='a.xml'", "not a model file that can be read; known are .3mf, .glb, .obj, .ply, .stl"),
-        ("file='cube.3mf' units='in'", "states its own unit: expected no units, found in"),
+        ("file='cube.3mf' units='in'", 'units="in": expected none, as the file states its own'),
         ("file='cube.3mf' units='furlong'", 'units="furlong": expected um'),
         ("file='cube.3mf' place='moon'", 'place="moon": expected as is, centre or bed'),
         ("file='cube.3mf' size='0'", 'size="0": expected a number > 0'),
@@ -302,6 +303,13 @@ def test_bad_input_is_one_line(values: str, message: str, tmp_path: Path) -> Non
         read(tmp_path / "a.xml")
     assert str(error.value).startswith(f"{tmp_path}/a.xml:1: <model> ") and message in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_too_large_a_file_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    with (tmp_path / "large.ply").open("wb") as file:
+        file.truncate((1 << 26) + 1)
+    with pytest.raises(SceneError, match="a file of 67 MB: expected at most 67 MB, of fewer triangles or"):
+        model(str(tmp_path / "large.ply"))
 
 
 def test_a_model_is_computed_on_the_cpu_and_that_is_said() -> None:

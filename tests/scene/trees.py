@@ -6,12 +6,24 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from fracslice.common.parameters import AUTO, REQUIRED, SMALLEST, Axis, Choice, Count, File, Number, Vector
+from fracslice.common.parameters import (
+    AUTO,
+    REQUIRED,
+    SMALLEST,
+    Axis,
+    Choice,
+    Count,
+    Digest,
+    File,
+    Number,
+    Vector,
+)
 from fracslice.errors import SceneError
 from fracslice.formulas import Node
 from fracslice.scene import scene
 from fracslice.scene.layout import formulas
 from fracslice.scene.model import computing
+from tests.examples import BRACKET
 
 SHAPES = [f for f in formulas() if f.children[1] == 0]
 OTHERS = [f for f in formulas() if f.children[1] != 0]
@@ -48,7 +60,8 @@ _POSSIBLE: dict[type, Any] = {
     Count: _count,
     Vector: _vector,
     Choice: lambda kind: st.sampled_from(kind.choices),
-    File: lambda kind: st.none(),
+    File: lambda kind: st.just(BRACKET) if kind.inside else st.none(),
+    Digest: lambda kind: st.none(),
     Axis: lambda kind: st.sampled_from("xyz"),
 }
 

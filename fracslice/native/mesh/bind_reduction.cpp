@@ -146,8 +146,8 @@ class BoundSolid {
         Array<double> values(points.shape(0), 1);
         {
             nb::gil_scoped_release released;
-            size_t guess = 0;
-            for (size_t i = 0; i < points.shape(0); ++i) values.data[i] = (*solid_)(points.data() + 3 * i, guess);
+            size_t found = 0;
+            for (size_t i = 0; i < points.shape(0); ++i) values.data[i] = (*solid_)(points.data() + 3 * i, found);
         }
         return to_numpy(std::move(values), {points.shape(0)});
     }

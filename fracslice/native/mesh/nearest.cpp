@@ -193,7 +193,7 @@ class Nearest::Run {
         found.boxes.squares(rounded.x, found.count, squares_);
         Neighbour best{guess_, nearest_.distance(guess_).square(p)};
         for (size_t i = 0; i < found.count; ++i) {
-            if (squares_[i] < best.square) nearest_.search(found.leaves[i], p, rounded.x, best);
+            if (squares_[i] < best.square) nearest_.search<false>(found.leaves[i], p, rounded.x, best);
         }
         return best;
     }
@@ -286,7 +286,12 @@ double Nearest::to_box(const double* p, size_t node) const {
     return total;
 }
 
-Neighbour Nearest::operator()(const double* p, size_t guess) const {
+Neighbour Nearest::operator()(const double* p, size_t guess) const { return found<false>(p, guess); }
+
+Neighbour Nearest::first(const double* p, size_t guess) const { return found<true>(p, guess); }
+
+template <bool kFirst>
+Neighbour Nearest::found(const double* p, size_t guess) const {
     struct Open {
         size_t node;
         float square;
@@ -299,7 +304,7 @@ Neighbour Nearest::operator()(const double* p, size_t guess) const {
         auto [node, square] = open[--height];
         if (square > best.square) continue;
         if (node >= wide_.size()) {
-            search(node - wide_.size(), p, rounded.x, best);
+            search<kFirst>(node - wide_.size(), p, rounded.x, best);
             continue;
         }
         float squares[kLeaf];
@@ -314,13 +319,14 @@ Neighbour Nearest::operator()(const double* p, size_t guess) const {
     return best;
 }
 
+template <bool kFirst>
 void Nearest::search(size_t leaf, const double* p, const float* rounded, Neighbour& best) const {
     float squares[kLeaf];
     circles_[leaf].squares(rounded, float(larger_), squares);
     for (size_t first = tree_.first(leaf), i = first; i < tree_.last(leaf); ++i) {
         if (squares[i - first] >= best.square) continue;
         size_t t = size_t(tree_.order[i]);
-        if (double d = distance(t).square(p); d < best.square || (d == best.square && t < best.triangle)) best = {t, d};
+        if (double d = distance(t).square(p); d < best.square || (kFirst && d == best.square && t < best.triangle)) best = {t, d};
     }
 }
 

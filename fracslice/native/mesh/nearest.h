@@ -13,8 +13,10 @@ class Nearest {
     Nearest(const MeshView& mesh, const TreeView& tree, bool closed);
 
     TriangleDistance distance(size_t t) const { return {mesh_, t}; }
-    // The triangle nearest to a point, of several the first; the search begins with a guess.
+    // The triangle nearest to a point; the search begins with a guess.
     Neighbour operator()(const double* p, size_t guess) const;
+    // Of several that are as near the first, whatever the guess.
+    Neighbour first(const double* p, size_t guess) const;
     // The same, or something whose distance has a square within a limit.
     Neighbour within(double limit, const double* p, size_t guess) const;
 
@@ -52,7 +54,10 @@ class Nearest {
     void widen();
     // The square of the distance to the box of a node.
     double to_box(const double* p, size_t node) const;
-    // Looks for a nearer triangle in a leaf.
+    template <bool kFirst>
+    Neighbour found(const double* p, size_t guess) const;
+    // Looks for a nearer triangle in a leaf; kFirst: or one as near and before.
+    template <bool kFirst>
     void search(size_t leaf, const double* p, const float* rounded, Neighbour& best) const;
     // The leaves whose boxes are within a distance of a point, given its square; false if there are too many.
     bool around(const double* p, double reach, Found& found) const;

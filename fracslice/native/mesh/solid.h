@@ -27,14 +27,17 @@ class Solid {
     Solid& operator=(const Solid&) = delete;
 
     const Distances* entry() const { return &entry_; }
-    // The distance of a point; NaN where it is not finite. The search begins with a guess, which becomes the triangle found.
-    double operator()(const double* p, size_t& guess) const;
+    // Another one for each solid of the process.
+    uint64_t number() const { return number_; }
+    // The distance of a point; NaN where it is not finite. The search begins with a triangle, which becomes the one found.
+    double operator()(const double* p, size_t& found) const;
 
   private:
     bool outside(const double* p, size_t triangle) const;
     // Sums of unit normals times angles; zero at vertices that join several fans.
     void set_normals();
 
+    uint64_t number_;
     MeshView mesh_;
     const double *low_, *high_;  // corners of its box
     Nearest nearest_;
