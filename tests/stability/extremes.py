@@ -13,6 +13,7 @@ from fracslice.common.parameters import (
     Axis,
     Choice,
     Count,
+    Digest,
     File,
     Number,
     Parameter,
@@ -24,7 +25,7 @@ from fracslice.formulas import Node
 
 def ends(kind: Parameter) -> list[object]:
     """The values at both ends of a parameter's range, and next to zero where it has both signs."""
-    if isinstance(kind, (Axis, Choice, File)):
+    if isinstance(kind, (Axis, Choice, Digest, File)):
         return []
     if isinstance(kind, Count):
         return [kind.least, min(kind.most, 1000)]

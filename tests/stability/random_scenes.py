@@ -29,7 +29,8 @@ ORBITS = {f.name for f in formulas() if "step" in f.hooks} - {"mandelbulb", "jul
 
 LOOKED = 4000
 TREES, TRIES = 100, 10
-LEAVES = [f for f in formulas() if f.kind == "shape"]
+LEAVES = [f for f in formulas() if f.kind == "shape" and "file" not in f.parameters]
+"""Shapes that numbers make."""
 OTHERS = [f for f in formulas() if f.kind != "shape" and f.name != "material"]
 Draw = Callable[[np.random.Generator, float], Any]
 
