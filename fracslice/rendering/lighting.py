@@ -362,7 +362,7 @@ class Lighting:
             return
         names = {"zenith": light.colour, "horizon": light.horizon, "ground": light.ground}
         values = {n: tuple(c * light.strength for c in linear(colour)) for n, colour in names.items()}
-        self.linker.bind("sky_", sky.radiance, values)
+        self.linker.bind("sky_", sky.sky, values)
 
     def fog(self, onward: bool) -> list[str]:
         """Lines for fog; see `fog_lines`."""

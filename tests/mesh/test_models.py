@@ -344,3 +344,11 @@ def test_meshes_of_python_are_shapes(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 def shapes_mesh(mesh: trimesh.Trimesh) -> Mesh:
     return Mesh(np.array(mesh.vertices), np.array(mesh.faces, np.int32))
+
+
+def test_far_away_a_model_is_a_point() -> None:
+    """Rays that have ended wait for others: a search from where they are would visit all triangles."""
+    solid = models.Solid.of(MODELS["torus"]())
+    for far in (1e3, 1e6, 1e9, 1e13, 1e22, 1e31):
+        values = solid.native.distances(np.full((4, 3), far))
+        np.testing.assert_allclose(values, 3**0.5 * far, rtol=0.01 if far < 1e6 else 1e-5)

@@ -103,7 +103,7 @@ def test_views_that_show_nothing_are_refused(root: Node, view: dict, message: st
         (Film, {"samples": 0}, "expected a whole number from 1"),
         (Light, {"position": (float("nan"), 0, 1)}, "expected 3 numbers"),
         (Light, {"strength": float("nan")}, "expected a number"),
-        (Light, {"kind": "laser"}, "expected sun, lamp, sky, environment or camera"),
+        (Light, {"kind": "laser"}, "expected camera, environment, lamp, sky or sun"),
         (Shading, {"mode": "cel"}, "expected light, normal"),
     ],
 )

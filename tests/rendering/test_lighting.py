@@ -15,7 +15,7 @@ from fracslice.rendering import Pass, Renderer, develop, progressive
 from fracslice.rendering.units.fog import height_fog
 from fracslice.rendering.units.pixel import linear
 from fracslice.rendering.units.shade import dielectric, goes_on, lacquer
-from fracslice.scene.lights.sky import radiance as sky
+from fracslice.scene.lights.sky import sky
 from fracslice.scene.view import Camera, Film, Fog, Light, Shading, View
 from fracslice.work import Work
 from tests.examples import stamped

@@ -44,6 +44,10 @@ float positive(float x) { return (x + std::abs(x)) / 2; }
 // twice as far. Squares of distances are compared after a factor that covers their own rounding, and that of other points.
 constexpr double kLarger = 1e-6;
 constexpr float kSure = 1 - 2e-6f, kUnsure = 4e-6f;
+// Times the largest coordinate, from where on they cover whole meshes.
+constexpr double kRemote = 256;
+// From where on a mesh is a point: its triangles are equally far.
+constexpr double kPoint = 1e11;
 
 // A point as floats.
 struct Rounded {
@@ -257,7 +261,7 @@ Nearest::Nearest(const MeshView& mesh, const TreeView& tree, bool closed) : mesh
     if (closed) across_ = opposite_corners(mesh);
     double scale = 0;
     for (size_t k = 0; k < 3; ++k) scale = std::max({scale, std::abs(tree.low[3 + k]), std::abs(tree.high[3 + k])});
-    larger_ = kLarger * scale;
+    larger_ = kLarger * scale, remote_ = kRemote * scale * kRemote * scale;
     tbb::parallel_for(size_t(0), tree.leaves, [&](size_t leaf) {
         for (size_t i = 0; i < kLeaf; ++i) circles_[leaf].set(i, mesh, size_t(tree.order[std::min(tree.first(leaf) + i, tree.count - 1)]), larger_);
     });
@@ -298,6 +302,7 @@ Neighbour Nearest::found(const double* p, size_t guess) const {
     } open[128];
     const Rounded rounded(p);
     Neighbour best{guess, distance(guess).square(p)};
+    if (best.square > remote_) return remote<kFirst>(p, best);
     int height = 0;
     for (size_t root = 0; root < roots_; ++root) open[height++] = {root, 0};
     while (height > 0) {
@@ -314,6 +319,27 @@ Neighbour Nearest::found(const double* p, size_t guess) const {
             size_t at = size_t(height++);
             for (; at > first && open[at - 1].square < squares[child]; --at) open[at] = open[at - 1];
             open[at] = {roots_ + kLeaf * node + child, squares[child]};
+        }
+    }
+    return best;
+}
+
+template <bool kFirst>
+Neighbour Nearest::remote(const double* p, Neighbour best) const {
+    constexpr double sure = 1 - 1e-12;
+    if (best.square > kPoint / kRemote * (kPoint / kRemote) * remote_) return {0, distance(0).square(p)};
+    size_t open[128] = {1};
+    for (int height = 1; height > 0;) {
+        const size_t node = open[--height];
+        if (to_box(p, node) * sure > best.square) continue;
+        if (node < tree_.leaves) {
+            const size_t nearer = 2 * node + size_t(to_box(p, 2 * node + 1) < to_box(p, 2 * node));
+            open[height++] = nearer ^ 1, open[height++] = nearer;
+            continue;
+        }
+        for (size_t i = tree_.first(node - tree_.leaves); i < tree_.last(node - tree_.leaves); ++i) {
+            const size_t t = size_t(tree_.order[i]);
+            if (double d = distance(t).square(p); d < best.square || (kFirst && d == best.square && t < best.triangle)) best = {t, d};
         }
     }
     return best;

@@ -56,6 +56,9 @@ class Nearest {
     double to_box(const double* p, size_t node) const;
     template <bool kFirst>
     Neighbour found(const double* p, size_t guess) const;
+    // The same from so far away that floats do not tell boxes apart.
+    template <bool kFirst>
+    Neighbour remote(const double* p, Neighbour best) const;
     // Looks for a nearer triangle in a leaf; kFirst: or one as near and before.
     template <bool kFirst>
     void search(size_t leaf, const double* p, const float* rounded, Neighbour& best) const;
@@ -67,6 +70,7 @@ class Nearest {
     TreeView tree_;
     std::vector<Circles> circles_;  // of the triangles of each leaf
     double larger_;                 // by what boxes and circles are larger
+    double remote_;                 // square of the distance from where on a search is `remote`
     // The tree with eight children of a node: those of node i are roots_ + 8 i and on. Leaves follow the inner nodes.
     std::vector<Boxes<kLeaf>> wide_;
     size_t roots_;

@@ -49,10 +49,13 @@ void distances(const Distances* entry, const Real* points, Real* values, size_t 
     if (recent.count != count || std::memcmp(recent.points, points, 3 * count * sizeof(Real)) != 0) {
         for (size_t i = 0; i < count; ++i) {
             Real away = 0, aside = 0;  // from the last point of this lane, and from this one of the lane before
+            bool same = recent.count == count;  // a lane whose ray has ended waits for the others
             for (size_t k = i; k < 3 * count; k += count) {
+                same = same && points[k] == recent.points[k];
                 away += (points[k] - recent.points[k]) * (points[k] - recent.points[k]);
                 aside += i > 0 ? (points[k] - points[k - 1]) * (points[k] - points[k - 1]) : 0;
             }
+            if (same) continue;
             if (i > 0 && aside < away) recent.found[i] = recent.found[i - 1];
             const double p[3] = {double(points[i]), double(points[count + i]), double(points[2 * count + i])};
             recent.values[i] = Real((*entry->solid)(p, recent.found[i]));

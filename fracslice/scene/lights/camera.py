@@ -6,14 +6,14 @@ import math
 from typing import TYPE_CHECKING
 
 from . import Kind, Point, Unit
-from .lamp import sharp
+from .lamp import sharp_lamp
 
 if TYPE_CHECKING:
     from ..view import Light
 
 
 def unit(light: Light, eye: Point, far: float) -> Unit:
-    return sharp, {"position": eye}
+    return sharp_lamp, {"position": eye}
 
 
 def scale(eye: Point, target: Point) -> float:

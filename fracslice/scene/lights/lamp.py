@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from ..view import Light
 
 
-def soft(x, y, z, u, v, position, radius):
+def lamp(x, y, z, u, v, position, radius):
     """Sample the surface of the ball."""
     px, py, pz = position
     h = 1.0 - 2.0 * u
@@ -25,7 +25,7 @@ def soft(x, y, z, u, v, position, radius):
     return lx * over, ly * over, lz * over, d2 * over, over * over
 
 
-def sharp(x, y, z, u, v, position):
+def sharp_lamp(x, y, z, u, v, position):
     """Sample a point lamp, which casts sharp shadows."""
     px, py, pz = position
     lx = px - x
@@ -38,8 +38,8 @@ def sharp(x, y, z, u, v, position):
 
 def unit(light: Light, eye: Point, far: float) -> Unit:
     if not light.size:
-        return sharp, {"position": light.position}
-    return soft, {"position": light.position, "radius": light.size}
+        return sharp_lamp, {"position": light.position}
+    return lamp, {"position": light.position, "radius": light.size}
 
 
 KIND = Kind("near", unit)

@@ -6,7 +6,7 @@ from ...expr.vocabulary import absolute, sqrt, where
 from . import Kind
 
 
-def radiance(dx, dy, dz, zenith, horizon, ground):
+def sky(dx, dy, dz, zenith, horizon, ground):
     """Return the sky's colour in a direction.
 
     The colour is interpolated from the horizon to the zenith above and to the ground below.

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from ..view import Light
 
 
-def soft(x, y, z, u, v, towards, spread, far):
+def sun(x, y, z, u, v, towards, spread, far):
     """Sample the disc."""
     lx, ly, lz = towards
     zero = 0.0 * x
@@ -24,7 +24,7 @@ def soft(x, y, z, u, v, towards, spread, far):
     return dx, dy, dz, far + zero, 1.0 + zero
 
 
-def sharp(x, y, z, u, v, towards, far):
+def sharp_sun(x, y, z, u, v, towards, far):
     """Sample a point-like sun, which casts sharp shadows."""
     lx, ly, lz = towards
     zero = 0.0 * x
@@ -35,8 +35,8 @@ def unit(light: Light, eye: Point, far: float) -> Unit:
     length = math.hypot(*light.position)
     values: dict[str, Any] = {"towards": tuple(p / length for p in light.position), "far": far}
     if not light.size:
-        return sharp, values
-    return soft, {**values, "spread": math.tan(math.radians(light.size) / 2)}
+        return sharp_sun, values
+    return sun, {**values, "spread": math.tan(math.radians(light.size) / 2)}
 
 
 KIND = Kind("far away", unit, is_disc=True)

@@ -66,7 +66,12 @@ def wrong(root: Node, mesh: Mesh, edge: float, points: int) -> int:
     on = mesh.vertices[RNG.integers(0, len(mesh.vertices), points // 2)]
     near, anywhere = on + RNG.normal(size=on.shape) * edge, RNG.uniform(*mesh.bounds, on.shape)
     tried = np.concatenate([near, anywhere])
-    return int(((root.distance(tried) < 0) != (MeshField(mesh).native.points(tried, False) < 0)).sum())
+    return int(
+        (
+            (root.distance(tried) < 0)
+            != (MeshField(mesh).native.points(*np.ascontiguousarray(tried.T), False) < 0)
+        ).sum()
+    )
 
 
 def rows(run: Run, levels: tuple[int, ...] = (5, 8), points: int = 10**6) -> Iterator[Row]:
