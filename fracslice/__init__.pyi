@@ -22,6 +22,7 @@ from .formulas import cone as cone
 from .formulas import cosine_bulb as cosine_bulb
 from .formulas import cylinder as cylinder
 from .formulas import difference as difference
+from .formulas import extrude as extrude
 from .formulas import fischer_koch_s as fischer_koch_s
 from .formulas import flake as flake
 from .formulas import frd as frd

@@ -29,6 +29,7 @@ from fracslice.formulas import (
     cosine_bulb,
     cylinder,
     difference,
+    extrude,
     fischer_koch_s,
     flake,
     frd,
@@ -104,6 +105,8 @@ BAR = box(size=(1.6, 0.3, 0.4))
 
 BRACKET = str(Path(__file__).parent / "models" / "bracket.stl")
 """A prism over an L, turned, of 0.576 cubic units and 20 triangles."""
+WASHER = str(Path(__file__).parent / "models" / "washer.svg")
+"""A square of 2 mm with a hole of a diamond of 0.5 square mm, in the middle."""
 
 EXAMPLES: dict[str, Node] = {
     "sphere": sphere(radius=0.8),
@@ -152,6 +155,7 @@ EXAMPLES: dict[str, Node] = {
     "thread": thread(radius=0.6, pitch=0.3),
     "apollonian": apollonian(level=3),
     "model": model(BRACKET),
+    "extrude": extrude(WASHER, size=1.4, height=0.6),
     "honeycomb": honeycomb(thickness=0.3, reach=0.9),
     "pseudo kleinian": cut(pseudo_kleinian(steps=5)),
     "tetrabrot": tetrabrot(iterations=7),
@@ -225,6 +229,9 @@ EXAMPLES: dict[str, Node] = {
     ),
 }
 
+OF_FILES = {"model", "extrude"}
+"""Examples that native code computes, on the CPU alone; each takes a file first."""
+
 _TURNED = "return scale * turn(fold(w, 1), (0, 0, 1), 20) + c"
 _EGG = "return sqrt(x**2 + y**2 + (flat * z)**2) - 1"
 DEFINED = {
@@ -235,7 +242,8 @@ DEFINED = {
 
 REPRESENTATIVES = {
     "a distance", "a step", "abox", "apollonian", "bend", "bounds", "bristorbrot julia", "burning ship",
-    "cone", "cosine bulb", "deep", "difference", "foam of walls", "gear", "gyroid wall", "honeycomb",
+    "cone", "cosine bulb", "deep", "difference", "extrude", "foam of walls", "gear", "gyroid wall",
+    "honeycomb",
     "hybrid transformed", "julia 4d", "kaleidoscopic octahedron", "kelvin struts", "koch",
     "lambda bulb", "mandelbox -1.5", "mandelbulb", "mandelbulb 7.5", "many", "material", "menger",
     "mirror", "model", "octahedron flake", "perlin noise", "prism", "pseudo kleinian", "quaternion julia 4",

@@ -328,6 +328,28 @@ def difference(*elements: Node, smooth: float = 0.0) -> Node:
     Node
     """
 
+def extrude(file: str, size: float | None = None, height: float = 1.0, place: Literal['centre', 'bed', 'as is'] = 'centre', sha256: str | None = None) -> Node:
+    """What an SVG file fills, extruded along z. L = 1: an exact distance, but for curves, which are segments
+    within 1/20000 of the longest side. Strokes, clipping and masks do not count.
+
+    Parameters
+    ----------
+    file : the name of a file
+        an SVG file, in the folder of the scene
+    size : a number > 0
+        the longest side of the outline; without it, a scene unit is a millimetre
+    height : a number > 0, default 1.0
+        along z
+    place : centre, bed or as is, default 'centre'
+        centred at the origin, or there from z = 0, or from z = 0 where the file has it, y up
+    sha256 : the SHA-256 of the file, 64 hexadecimal digits
+        hash of the file, by which a file that has changed is noticed
+
+    Returns
+    -------
+    Node
+    """
+
 def fischer_koch_s(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
     """A wall along the surface S of Fischer and Koch 1987. The gradient of its level function is at most
     2.444: L = 1.

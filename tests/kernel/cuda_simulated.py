@@ -13,7 +13,7 @@ from fracslice.fields import cuda
 from fracslice.fields.node import FORMULAS
 from fracslice.fields.reference import reference
 from fracslice.mesh.roots import LOOPS, Roots
-from tests.examples import DEFINED, EXAMPLES
+from tests.examples import DEFINED, EXAMPLES, OF_FILES
 from tests.kernel.idioms import HEAD, SAME, P, imported
 
 TOLERANCE = {"float32": 2e-5, "float64": 1e-13}
@@ -23,7 +23,7 @@ def main() -> None:
     assert cuda.available()
     with np.errstate(all="ignore"):
         known = EXAMPLES | DEFINED
-        del known["model"]  # no GPU computes it
+        known = {name: node for name, node in known.items() if name not in OF_FILES}  # no GPU computes it
         for name in sys.argv[1:] or known:
             for precision in ("float32", "float64"):
                 points(name, cuda.compile_scene(known[name], precision), reference(known[name]))

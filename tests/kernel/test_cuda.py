@@ -19,7 +19,7 @@ from fracslice.expr import cuda_loops, cuda_source
 from fracslice.fields import cuda
 from fracslice.fields.linker import link
 from fracslice.formulas import Node, sphere
-from tests.examples import DEFINED, EXAMPLES, STRUCTURES, stamped
+from tests.examples import DEFINED, EXAMPLES, OF_FILES, STRUCTURES, stamped
 from tests.kernel.cuda_ptx import compiled
 
 pytestmark = pytest.mark.once
@@ -37,7 +37,9 @@ SIMULATED = "hybrid transformed", "menger", "smooth union"
 class TestMachineCode:
     """PTX for an H100 or H200, which needs no GPU to be compiled."""
 
-    @pytest.mark.parametrize("name", stamped([n for n in EXAMPLES | DEFINED if n != "model"], STRUCTURES))
+    @pytest.mark.parametrize(
+        "name", stamped([n for n in EXAMPLES | DEFINED if n not in OF_FILES], STRUCTURES)
+    )
     def test_float32_kernels_hold_no_float64(self, name: str, tmp_path: Path) -> None:
         ptx = points_of((EXAMPLES | DEFINED)[name], 32, tmp_path)
         assert ".f32" in ptx

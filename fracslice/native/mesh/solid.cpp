@@ -26,22 +26,11 @@ double angle(const double* at, const double* one, const double* other) {
     return std::acos(std::clamp(dot(u, v.data()) / std::sqrt(dot(u, u.data()) * dot(v, v.data())), -1.0, 1.0));
 }
 
-// Neighbours in a packet are near each other, and so are packets: each search begins where the one before ended.
-thread_local size_t last_found = 0;
-
-template <class Real>
-void distances(const Distances* entry, const Real* points, Real* values, size_t count) {
-    for (size_t i = 0; i < count; ++i) {
-        const double p[3] = {double(points[i]), double(points[count + i]), double(points[2 * count + i])};
-        values[i] = Real((*entry->solid)(p, last_found));
-    }
-}
-
 }  // namespace
 
 Solid::Solid(const MeshView& mesh, const TreeView& tree)
     : mesh_(mesh), low_(tree.low + 3), high_(tree.high + 3), nearest_(mesh, tree, false), across_(opposite_corners(mesh)), normals_(mesh.vertices, Point{}),
-      entry_{&distances<float>, &distances<double>, this} {
+      entry_(entry_of(this)) {
     set_normals();
 }
 

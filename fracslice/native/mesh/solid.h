@@ -2,25 +2,18 @@
 #pragma once
 #include <optional>
 
+#include "distances.h"
 #include "mesh_field.h"
 
 namespace fracslice::mesh {
-
-class Solid;
-
-// What `fracslice.expr.emitter` calls, by its place in here: with this, the coordinates x, y and z of `count` points one after
-// the other, and where their distances go.
-struct Distances {
-    void (*floats)(const Distances*, const float* points, float* values, size_t count);
-    void (*doubles)(const Distances*, const double* points, double* values, size_t count);
-    const Solid* solid;
-};
 
 // Negative inside. The nearest triangle is found exactly; the side is that of the pseudonormal of its part that is nearest
 // (Baerentzen and Aanaes, "Signed Distance Computation Using the Angle Weighted Pseudonormal", 2005), and at vertices that join
 // several fans, which have none, that of the winding number.
 class Solid {
   public:
+    static constexpr size_t kAxes = 3;
+
     // A closed, oriented surface of triangles with an area that do not intersect, and its tree; both outlive this.
     Solid(const MeshView& mesh, const TreeView& tree);
     Solid(const Solid&) = delete;
