@@ -58,6 +58,7 @@ from .formulas import pseudo_kleinian as pseudo_kleinian
 from .formulas import quaternion_mandelbrot as quaternion_mandelbrot
 from .formulas import quaternion_power as quaternion_power
 from .formulas import repeat as repeat
+from .formulas import revolve as revolve
 from .formulas import schwarz_d as schwarz_d
 from .formulas import schwarz_p as schwarz_p
 from .formulas import shell as shell

@@ -65,6 +65,7 @@ from fracslice.formulas import (
     quaternion_mandelbrot,
     quaternion_power,
     repeat,
+    revolve,
     schwarz_d,
     schwarz_p,
     shell,
@@ -156,6 +157,7 @@ EXAMPLES: dict[str, Node] = {
     "apollonian": apollonian(level=3),
     "model": model(BRACKET),
     "extrude": extrude(WASHER, size=1.4, height=0.6),
+    "revolve": revolve(WASHER, size=0.6, offset=0.4),
     "honeycomb": honeycomb(thickness=0.3, reach=0.9),
     "pseudo kleinian": cut(pseudo_kleinian(steps=5)),
     "tetrabrot": tetrabrot(iterations=7),
@@ -229,7 +231,7 @@ EXAMPLES: dict[str, Node] = {
     ),
 }
 
-OF_FILES = {"model", "extrude"}
+OF_FILES = {"model", "extrude", "revolve"}
 """Examples that native code computes, on the CPU alone; each takes a file first."""
 
 _TURNED = "return scale * turn(fold(w, 1), (0, 0, 1), 20) + c"
@@ -247,7 +249,7 @@ REPRESENTATIVES = {
     "hybrid transformed", "julia 4d", "kaleidoscopic octahedron", "kelvin struts", "koch",
     "lambda bulb", "mandelbox -1.5", "mandelbulb", "mandelbulb 7.5", "many", "material", "menger",
     "mirror", "model", "octahedron flake", "perlin noise", "prism", "pseudo kleinian", "quaternion julia 4",
-    "repeat overlapping", "rounded box", "schwarz_d wall", "shell", "smooth intersection",
+    "repeat overlapping", "revolve", "rounded box", "schwarz_d wall", "shell", "smooth intersection",
     "smooth union", "snowflake", "sphere", "superquadric", "thread", "transform", "tree", "twist x",
 }  # fmt: skip
 """Examples of which none is built like another; tests that are stamped on all have the others in a night."""

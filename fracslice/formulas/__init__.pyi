@@ -1081,6 +1081,28 @@ def repeat(*elements: Node, period: Sequence[float], count: Sequence[int] = (0, 
     Node
     """
 
+def revolve(file: str, size: float | None = None, offset: float = 0.0, place: Literal['centre', 'bed'] = 'centre', sha256: str | None = None) -> Node:
+    """What an SVG file fills, turned around the z axis, with its left edge there and its y along z. L = 1: an
+    exact distance, with curves and fills as of `<extrude>`.
+
+    Parameters
+    ----------
+    file : the name of a file
+        an SVG file, in the folder of the scene
+    size : a number > 0
+        the longest side of the outline; without it, a scene unit is a millimetre
+    offset : a number >= 0, default 0.0
+        from the axis to the left edge of the outline
+    place : centre or bed, default 'centre'
+        centred at the origin, or from z = 0
+    sha256 : the SHA-256 of the file, 64 hexadecimal digits
+        hash of the file, by which a file that has changed is noticed
+
+    Returns
+    -------
+    Node
+    """
+
 def schwarz_d(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
     """A wall along the surface D of Schwarz 1890. The gradient of its level function is at most
     sqrt(3): L = 1.

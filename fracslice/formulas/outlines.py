@@ -65,6 +65,43 @@ def _extruded(node: Node) -> Outline:
         raise node.fail(f'file="{node["file"]}": {error}') from error
 
 
+@shape(
+    **_FILE,
+    offset=Number(0.0, "from the axis to the left edge of the outline", least=0),
+    place=Choice("centre", "centred at the origin, or from z = 0", ("centre", "bed")),
+    sha256=_DIGEST,
+)
+def revolve(x, y, z, outline):  # type: ignore[no-untyped-def]
+    """What an SVG file fills, turned around the z axis, with its left edge there and its y along z. L = 1: an
+    exact distance, with curves and fills as of `<extrude>`.
+    """
+    return outline_distance(sqrt(x * x + y * y), z, outline)
+
+
+@revolve.arguments
+def revolve_arguments(node: Node) -> dict[str, object]:
+    return {"outline": _revolved(node)}
+
+
+@revolve.bounds
+def revolve_bounds(node: Node) -> Box:
+    outline = _revolved(node)
+    radius = outline.high[0]
+    return Box((-radius, -radius, outline.low[1]), (radius, radius, outline.high[1]))
+
+
+def _revolved(node: Node) -> Outline:
+    from ..mesh.outlines import revolved
+
+    values = node.values
+    try:
+        return revolved(
+            values["file"], values["sha256"], values["size"], values["offset"], values["place"] == "centre"
+        )
+    except MeshError as error:
+        raise node.fail(f'file="{node["file"]}": {error}') from error
+
+
 def _identified(formula: Formula) -> None:
     """Let the values of a formula have the whole path and the hash of its file."""
 
@@ -79,4 +116,5 @@ def _identified(formula: Formula) -> None:
         return {**values, "file": file, "sha256": digest}
 
 
-_identified(extrude)
+for _formula in (extrude, revolve):
+    _identified(_formula)

@@ -56,10 +56,39 @@ class Outline(InMemory):
 @lru_cache(maxsize=8)
 def extruded(file: str, sha256: str, size: float | None, centred: bool) -> Outline:
     """Outline of a file, scaled, its box centred at the origin or where the file has it."""
+    area = _sized(file, sha256, size)
+    low, high = np.reshape(area.bounds, (2, 2))
+    return Outline.of(_rings(area, (low + high) / 2 if centred else np.zeros(2)))
+
+
+@lru_cache(maxsize=8)
+def revolved(file: str, sha256: str, size: float | None, offset: float, centred: bool) -> Outline:
+    """Outline of a file, scaled, its left edge at an offset from the y axis, its box centred or above y = 0.
+
+    At the axis it goes on as its mirror image: no edge there is one of the solid.
+    """
+    area = _sized(file, sha256, size)
+    import shapely
+
+    low, high = np.reshape(area.bounds, (2, 2))
+    origin = np.array([low[0] - offset, (low[1] + high[1]) / 2 if centred else low[1]])
+    if offset > 0:
+        return Outline.of(_rings(area, origin))
+    right = shapely.transform(area, lambda points: points - origin)
+    left = shapely.transform(right, lambda points: points * (-1, 1))
+    return Outline.of(_rings(shapely.union(right, left, grid_size=GRID * (high - low).max()), np.zeros(2)))
+
+
+def _sized(file: str, sha256: str, size: float | None) -> Geometry:
+    """What a file fills, scaled about the file's origin."""
     area = _area(file, sha256)
-    low, high = np.array(area.bounds).reshape(2, 2)
-    scale = 1.0 if size is None else size / float((high - low).max())
-    return Outline.of(_rings(area, (low + high) / 2 if centred else np.zeros(2), scale))
+    if size is None:
+        return area
+    import shapely
+
+    low, high = np.reshape(area.bounds, (2, 2))
+    scale = size / (high - low).max()
+    return shapely.transform(area, lambda points: points * scale)
 
 
 @lru_cache(maxsize=4)
@@ -179,8 +208,8 @@ def _winding(
     return winding
 
 
-def _rings(area: Geometry, origin: NDArray[np.float64], scale: float) -> list[NDArray[np.float64]]:
-    """Rings of polygons, moved and scaled, with the inside on their left."""
+def _rings(area: Geometry, origin: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Rings of polygons, from an origin, with the inside on their left."""
     import shapely
 
     rings = []
@@ -189,5 +218,5 @@ def _rings(area: Geometry, origin: NDArray[np.float64], scale: float) -> list[ND
             corners = shapely.get_coordinates(ring)[:-1]
             if shapely.is_ccw(ring) != (k == 0):
                 corners = corners[::-1]
-            rings.append(np.ascontiguousarray((corners - origin) * scale))
+            rings.append(np.ascontiguousarray(corners - origin))
     return rings

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib.util
 import math
+import sys
 import time
 from pathlib import Path
 
@@ -15,7 +17,7 @@ from fracslice import make_mesh
 from fracslice.errors import SceneError
 from fracslice.expr.intervals import ARRAYS, Interval
 from fracslice.fields.reference import enclosure, reference
-from fracslice.formulas import Node, extrude, shell, twist
+from fracslice.formulas import Node, cylinder, extrude, revolve, shell, twist
 from fracslice.mesh import outlines, svg
 from fracslice.scene import read, reads, scene, to_xml
 
@@ -247,6 +249,36 @@ def test_what_is_filled(name: str, tmp_path: Path) -> None:
     assert found.area == pytest.approx(size, rel=1e-3 if name == "quadratics" else 1e-9)
 
 
+def turned(points: np.ndarray) -> np.ndarray:
+    """Points [r, z] at random angles around the axis."""
+    angle = RNG.uniform(0, math.tau, len(points))
+    return np.column_stack([points[:, 0] * np.cos(angle), points[:, 0] * np.sin(angle), points[:, 1]])
+
+
+@pytest.mark.parametrize("offset", [0.0, 3.0])
+def test_a_revolution_is_an_exact_distance(offset: float, tmp_path: Path) -> None:
+    profile = Polygon([(0, 0), (8, 0), (6, 3), (9, 7), (0, 9), (0, 6), (3, 4), (0, 4)])
+    root = revolve(drawn(f"<path d='{path_of(profile)}'/>", tmp_path / "a.svg"), offset=offset, place="bed")
+    right = shapely.transform(profile, lambda points: points + (offset, 0))
+    section = right | shapely.transform(right, lambda points: points * (-1, 1))
+    points = abs(around(section, 20_000)) * (1, np.sign(RNG.uniform(-1, 5)))
+    assert np.abs(root.distance(turned(points)) - signed(section, points)).max() < 1e-9
+    assert root.bounds.box.hi == pytest.approx((9 + offset, 9 + offset, 9))
+    small = root.kernel().points(*turned(points).T.astype(np.float32))
+    assert np.abs(small - signed(section, points)).max() < 1e-5
+    a, b = (RNG.uniform(-15, 15, (3000, 3)) for _ in range(2))
+    b = a + (b - a) * RNG.uniform(0, 1, (3000, 1)) ** 4
+    change = abs(root.distance(a) - root.distance(b))
+    assert (change <= np.linalg.norm(a - b, axis=1) * (1 + 1e-12) + 1e-12).all()
+
+
+def test_a_turned_rectangle_is_a_cylinder(tmp_path: Path) -> None:
+    root = revolve(drawn("<rect x='5' width='3' height='8'/>", tmp_path / "a.svg"))
+    points = RNG.uniform(-8, 8, (10_000, 3))
+    assert np.abs(root.distance(points) - cylinder(radius=3, height=8).distance(points)).max() < 1e-12
+    assert make_mesh(root, resolution=97).volume == pytest.approx(72 * math.pi, rel=2e-4)
+
+
 @pytest.mark.parametrize(
     ("root", "mm"),
     [
@@ -352,6 +384,16 @@ BAD: dict[str, tuple[str | bytes, str]] = {
 def test_bad_input_is_one_line(name: str, tmp_path: Path) -> None:
     data, message = BAD[name]
     assert message in refused(data, tmp_path / "bad.svg")
+
+
+def test_without_shapely_that_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    message = 'outlines need shapely, which is not installed: pip install "shapely"'
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "shapely", None)
+    for make in (extrude, revolve):
+        made = make(drawn("<rect width='9' height='9'/>", tmp_path / f"{make.name}.svg"), size=1)
+        with pytest.raises(SceneError, match=message):
+            made.bounds  # noqa: B018
 
 
 def test_a_scene_knows_its_outline_by_the_hash(tmp_path: Path) -> None:
