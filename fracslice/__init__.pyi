@@ -67,6 +67,7 @@ from .formulas import split_p as split_p
 from .formulas import struts as struts
 from .formulas import superquadric as superquadric
 from .formulas import tetrabrot as tetrabrot
+from .formulas import text as text
 from .formulas import thread as thread
 from .formulas import torus as torus
 from .formulas import transform as transform

@@ -7,6 +7,7 @@ from functools import reduce
 from pathlib import Path
 from typing import Any
 
+import matplotlib
 import pytest
 
 from fracslice.common.parameters import Number
@@ -74,6 +75,7 @@ from fracslice.formulas import (
     struts,
     superquadric,
     tetrabrot,
+    text,
     thread,
     torus,
     transform,
@@ -108,6 +110,8 @@ BRACKET = str(Path(__file__).parent / "models" / "bracket.stl")
 """A prism over an L, turned, of 0.576 cubic units and 20 triangles."""
 WASHER = str(Path(__file__).parent / "models" / "washer.svg")
 """A square of 2 mm with a hole of a diamond of 0.5 square mm, in the middle."""
+
+FONT = str(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf")
 
 EXAMPLES: dict[str, Node] = {
     "sphere": sphere(radius=0.8),
@@ -157,6 +161,7 @@ EXAMPLES: dict[str, Node] = {
     "apollonian": apollonian(level=3),
     "model": model(BRACKET),
     "extrude": extrude(WASHER, size=1.4, height=0.6),
+    "text": text("o8", FONT, depth=0.4),
     "revolve": revolve(WASHER, size=0.6, offset=0.4),
     "honeycomb": honeycomb(thickness=0.3, reach=0.9),
     "pseudo kleinian": cut(pseudo_kleinian(steps=5)),
@@ -231,8 +236,8 @@ EXAMPLES: dict[str, Node] = {
     ),
 }
 
-OF_FILES = {"model", "extrude", "revolve"}
-"""Examples that native code computes, on the CPU alone; each takes a file first."""
+OF_FILES = {"model", "extrude", "revolve", "text"}
+"""Examples that native code computes, on the CPU alone; each is of a file."""
 
 _TURNED = "return scale * turn(fold(w, 1), (0, 0, 1), 20) + c"
 _EGG = "return sqrt(x**2 + y**2 + (flat * z)**2) - 1"
@@ -250,7 +255,7 @@ REPRESENTATIVES = {
     "lambda bulb", "mandelbox -1.5", "mandelbulb", "mandelbulb 7.5", "many", "material", "menger",
     "mirror", "model", "octahedron flake", "perlin noise", "prism", "pseudo kleinian", "quaternion julia 4",
     "repeat overlapping", "revolve", "rounded box", "schwarz_d wall", "shell", "smooth intersection",
-    "smooth union", "snowflake", "sphere", "superquadric", "thread", "transform", "tree", "twist x",
+    "smooth union", "snowflake", "sphere", "superquadric", "text", "thread", "transform", "tree", "twist x",
 }  # fmt: skip
 """Examples of which none is built like another; tests that are stamped on all have the others in a night."""
 

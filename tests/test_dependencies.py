@@ -29,7 +29,7 @@ WITHIN = {"vtkmodules": "pyvista", "Imath": "OpenEXR"}
 
 BLOCKED = (
     "pyvista vtkmodules matplotlib skimage numba_cuda manifold3d pymeshlab lxml networkx "
-    "hypothesis shapely imageio_ffmpeg pyoidn distributed dask fsspec"
+    "hypothesis shapely uharfbuzz imageio_ffmpeg pyoidn distributed dask fsspec"
 )
 
 

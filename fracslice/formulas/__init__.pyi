@@ -1241,6 +1241,32 @@ def tetrabrot(iterations: Union[int, Literal['auto']] = 'auto') -> Node:
     Node
     """
 
+def text(text: str, font: str, size: float = 1.0, depth: float = 1.0, place: Literal['centre', 'bed', 'as is'] = 'centre', variations: str = '', sha256: str | None = None) -> Node:
+    """A text, extruded along z, with ligatures and scripts in all directions by HarfBuzz. L = 1: an exact
+    distance, but for curves, which are segments within 1/20000 of the em.
+
+    Parameters
+    ----------
+    text : text in one line
+        the text, in one line and one direction of writing
+    font : the name of a file
+        a TrueType or OpenType font, in the folder of the scene
+    size : a number > 0, default 1.0
+        font size: the em, of which a capital letter is about 0.7
+    depth : a number > 0, default 1.0
+        along z
+    place : centre, bed or as is, default 'centre'
+        centred at the origin, or there from z = 0, or along the base line from the origin and from z = 0
+    variations : text in one line, default ''
+        where on its axes a variable font is, such as wght=700, wdth=80
+    sha256 : the SHA-256 of the file, 64 hexadecimal digits
+        hash of the font, by which a file that has changed is noticed
+
+    Returns
+    -------
+    Node
+    """
+
 def thread(radius: float = 0.5, pitch: float = 0.2, height: float = 1.5) -> Node:
     """A right-handed screw along the z axis with the basic profile of ISO metric threads (ISO 68-1).
 

@@ -16,6 +16,7 @@ from ..common.cache import key
 from ..common.messages import lacking
 from ..errors import MeshError
 from ..expr.functions import InMemory
+from .fonts import lettered
 from .models import file_hash
 from .svg import MOST_CURVES, Curve, Fill, read_svg
 
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from shapely import Geometry
 
 TOLERANCE = 5e-5
-"""Largest distance of a curve from its segments, in longest sides of all curves."""
+"""Largest distance of a curve from its segments, in longest sides of all curves; of texts, in ems."""
 GRID = 2.0**-40
 """Distance between the places that crossings of segments can have, in longest sides: no sliver is thinner."""
 RAYS = 1 << 10
@@ -59,6 +60,17 @@ def extruded(file: str, sha256: str, size: float | None, centred: bool) -> Outli
     area = _sized(file, sha256, size)
     low, high = np.reshape(area.bounds, (2, 2))
     return Outline.of(_rings(area, (low + high) / 2 if centred else np.zeros(2)))
+
+
+@lru_cache(maxsize=8)
+def written(file: str, sha256: str, text: str, variations: str, size: float, centred: bool) -> Outline:
+    """Outline of a text in a font, of a size of the em, its box centred or its base line from the origin."""
+    fills = lettered(file, text, variations)
+    if file_hash(file) != sha256:
+        raise MeshError("the file was changed while it was read")
+    area = area_of(fills, 1.0)
+    low, high = np.reshape(area.bounds, (2, 2))
+    return Outline.of([ring * size for ring in _rings(area, (low + high) / 2 if centred else np.zeros(2))])
 
 
 @lru_cache(maxsize=8)
@@ -102,8 +114,11 @@ def _area(file: str, sha256: str) -> Geometry:
     return area_of(fills)
 
 
-def area_of(fills: Iterable[Fill]) -> Geometry:
-    """The area of all fills, of which each may overlap itself and others."""
+def area_of(fills: Iterable[Fill], detail: float | None = None) -> Geometry:
+    """The area of all fills, of which each may overlap itself and others.
+
+    Curves are within `TOLERANCE` of the longest side, or of the size of a `detail`.
+    """
     import shapely
 
     given = list(fills)
@@ -115,7 +130,10 @@ def area_of(fills: Iterable[Fill]) -> Geometry:
     if extent == 0:
         raise MeshError("has no path with an area")
     grid = extent * GRID
-    rings = [([_ring(*ring, extent * TOLERANCE) for ring in fill.rings], fill.nonzero) for fill in given]
+    rings = [
+        ([_ring(*ring, (detail or extent) * TOLERANCE) for ring in fill.rings], fill.nonzero)
+        for fill in given
+    ]
     if (count := sum(len(ring) for fill, _ in rings for ring in fill)) > MOST_CURVES:
         raise MeshError(f"expected an outline of at most {MOST_CURVES} segments, found {count}")
     area = shapely.union_all([face for fill in rings for face in _faces(*fill, grid)], grid_size=grid)

@@ -51,11 +51,11 @@ def test_the_signature_is_the_registrys(name: str) -> None:
 def test_positions_fill_parameters_in_the_order_of_the_signature(name: str) -> None:
     required = [kind for kind in get(name).parameters.values() if kind.default is REQUIRED]
     given = list(EXAMPLES[name].values.values())[: len(required)] if name in OF_FILES else []
-    bound = inspect.signature(get(name)).bind(*(given))
+    bound = inspect.signature(get(name)).bind(*given)
     bound.apply_defaults()
     assert get(name)(*bound.args) == get(name)(*given)
-    first = next(iter(bound.arguments))
-    assert get(name)(bound.arguments[first]) == get(name)(**{first: bound.arguments[first]})
+    named = dict(list(bound.arguments.items())[: max(1, len(given))])
+    assert get(name)(*named.values()) == get(name)(**named)
 
 
 def test_a_shape_takes_its_values_by_position_or_name() -> None:
