@@ -27,8 +27,10 @@ TOLERANCE = 5e-5
 """Largest distance of a curve from its segments, in longest sides of all curves; of texts, in ems."""
 GRID = 2.0**-40
 """Distance between the places that crossings of segments can have, in longest sides: no sliver is thinner."""
-RAYS = 1 << 10
-"""Points whose winding numbers are found at once."""
+MOST_CROSSINGS = 1 << 15
+"""Most pairs of segments that meet, besides neighbours: each may be a corner of the outline."""
+RAYS, ASKED = 1 << 10, 32
+"""Points whose winding numbers, and segments whose crossings are found at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +138,9 @@ def area_of(fills: Iterable[Fill], detail: float | None = None) -> Geometry:
     ]
     if (count := sum(len(ring) for fill, _ in rings for ring in fill)) > MOST_CURVES:
         raise MeshError(f"expected an outline of at most {MOST_CURVES} segments, found {count}")
-    area = shapely.union_all([face for fill in rings for face in _faces(*fill, grid)], grid_size=grid)
+    _require_few_crossings([ring for fill, _ in rings for ring in fill])
+    areas = [shapely.coverage_union_all(_faces(*fill, grid)) for fill in rings]
+    area = shapely.set_precision(shapely.union_all(areas), grid)
     if area.area == 0:
         raise MeshError("has no path with an area")
     return area
@@ -199,12 +203,27 @@ def _faces(rings: list[NDArray[np.complex128]], nonzero: bool, grid: float) -> N
     closed = [np.append(ring, ring[0]) for ring in rings if len(ring) > 2]
     if not closed:
         return np.array([])
+    if len(closed) == 1 and (alone := shapely.Polygon(closed[0].view(float).reshape(-1, 2))).is_valid:
+        return np.array([alone])
     lines = [shapely.LineString(ring.view(float).reshape(-1, 2)) for ring in closed]
     faces = shapely.get_parts(shapely.polygonize([shapely.union_all(lines, grid_size=grid)]))
     inside = shapely.point_on_surface(faces)
     winding = _winding(closed, shapely.get_x(inside), shapely.get_y(inside))
     filled: NDArray[Any] = faces[winding != 0 if nonzero else winding % 2 != 0]
     return filled
+
+
+def _require_few_crossings(rings: list[NDArray[np.complex128]]) -> None:
+    """Raise the error about segments that cross others too often, of which a few make millions of faces."""
+    import shapely
+
+    pairs = [np.stack([ring, np.roll(ring, -1)], 1) for ring in rings]
+    segments = shapely.linestrings(np.concatenate(pairs).view(float).reshape(-1, 2, 2))
+    tree, met, most = shapely.STRtree(segments), 0, 3 * len(segments) + 2 * MOST_CROSSINGS
+    for first in range(0, len(segments), ASKED):
+        met += tree.query(segments[first : first + ASKED], predicate="intersects").shape[1]
+        if met > most:
+            raise MeshError(f"expected an outline whose segments cross at most {MOST_CROSSINGS} times")
 
 
 def _winding(

@@ -18,7 +18,7 @@ from xml.parsers import expat
 from ..common.files import open_regular
 from ..errors import MeshError
 
-LARGEST, MOST_ELEMENTS, DEEPEST, MOST_CURVES = 8 << 20, 1 << 16, 64, 1 << 18
+LARGEST, MOST_ELEMENTS, DEEPEST, MOST_CURVES = 8 << 20, 1 << 13, 64, 1 << 18
 """Most bytes of a file; elements that are drawn, copies counted; elements inside each other; and curves, or
 segments of them.
 """

@@ -355,6 +355,13 @@ BAD: dict[str, tuple[str | bytes, str]] = {
         svg_of("<path d='M0 0h1v1z" + "m0 0a1e6 1e6 0 1 1 1 1 1 1 0 1 1 1 1z" * 4000 + "'/>"),
         "expected an outline of at most 262144 segments, found ",
     ),
+    "crossings": (
+        svg_of(
+            "<path d='M0 0" + "".join(f"L{k * 7919 % 5003} {k * 104729 % 4999}" for k in range(5000)) + "z'/>"
+        ),
+        "expected an outline whose segments cross at most 32768 times",
+    ),
+    "elements": (svg_of("<rect width='1' height='1'/>" * 9000), "expected at most 8192 elements"),
     "odd": (svg_of("<path d='M0 0 10'/>"), "line 2: <path> d: M with 3 numbers"),
     "bad points": (
         svg_of("<polygon points='1 2 3'/>"),
@@ -368,7 +375,7 @@ BAD: dict[str, tuple[str | bytes, str]] = {
     ),
     "bad use": (svg_of("<use href='#none'/>"), 'line 2: <use> href="#none": expected the id'),
     "a loop": (svg_of("<g id='a'><use href='#a'/></g>"), "elements, 64 inside each other"),
-    "copies": (svg_of(BOMB + "<use href='#g11'/>"), "expected at most 65536 elements"),
+    "copies": (svg_of(BOMB + "<use href='#g11'/>"), "expected at most 8192 elements"),
     "entities": (LAUGHS + "]>" + svg_of("&e;"), "line 1: entities are not allowed in an SVG file"),
     "deep": (svg_of("<g>" * 90 + "</g>" * 90), "expected at most 64 elements inside each other"),
     "text": (svg_of("<text>A</text>"), "line 2: <text> expected paths"),
@@ -384,6 +391,11 @@ BAD: dict[str, tuple[str | bytes, str]] = {
 def test_bad_input_is_one_line(name: str, tmp_path: Path) -> None:
     data, message = BAD[name]
     assert message in refused(data, tmp_path / "bad.svg")
+
+
+def test_the_example_is_read() -> None:
+    plate = read(Path(__file__).parents[2] / "examples" / "name-plate.xml")
+    assert plate.root.bounds.box.size == pytest.approx((90, 93, 90))
 
 
 def test_without_shapely_that_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
