@@ -22,6 +22,7 @@ from .formulas import cone as cone
 from .formulas import cosine_bulb as cosine_bulb
 from .formulas import cylinder as cylinder
 from .formulas import difference as difference
+from .formulas import extrude as extrude
 from .formulas import fischer_koch_s as fischer_koch_s
 from .formulas import flake as flake
 from .formulas import frd as frd
@@ -57,6 +58,7 @@ from .formulas import pseudo_kleinian as pseudo_kleinian
 from .formulas import quaternion_mandelbrot as quaternion_mandelbrot
 from .formulas import quaternion_power as quaternion_power
 from .formulas import repeat as repeat
+from .formulas import revolve as revolve
 from .formulas import schwarz_d as schwarz_d
 from .formulas import schwarz_p as schwarz_p
 from .formulas import shell as shell
@@ -65,6 +67,7 @@ from .formulas import split_p as split_p
 from .formulas import struts as struts
 from .formulas import superquadric as superquadric
 from .formulas import tetrabrot as tetrabrot
+from .formulas import text as text
 from .formulas import thread as thread
 from .formulas import torus as torus
 from .formulas import transform as transform

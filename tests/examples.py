@@ -7,6 +7,7 @@ from functools import reduce
 from pathlib import Path
 from typing import Any
 
+import matplotlib
 import pytest
 
 from fracslice.common.parameters import Number
@@ -29,6 +30,7 @@ from fracslice.formulas import (
     cosine_bulb,
     cylinder,
     difference,
+    extrude,
     fischer_koch_s,
     flake,
     frd,
@@ -64,6 +66,7 @@ from fracslice.formulas import (
     quaternion_mandelbrot,
     quaternion_power,
     repeat,
+    revolve,
     schwarz_d,
     schwarz_p,
     shell,
@@ -72,6 +75,7 @@ from fracslice.formulas import (
     struts,
     superquadric,
     tetrabrot,
+    text,
     thread,
     torus,
     transform,
@@ -104,6 +108,10 @@ BAR = box(size=(1.6, 0.3, 0.4))
 
 BRACKET = str(Path(__file__).parent / "models" / "bracket.stl")
 """A prism over an L, turned, of 0.576 cubic units and 20 triangles."""
+WASHER = str(Path(__file__).parent / "models" / "washer.svg")
+"""A square of 2 mm with a hole of a diamond of 0.5 square mm, in the middle."""
+
+FONT = str(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf")
 
 EXAMPLES: dict[str, Node] = {
     "sphere": sphere(radius=0.8),
@@ -152,6 +160,9 @@ EXAMPLES: dict[str, Node] = {
     "thread": thread(radius=0.6, pitch=0.3),
     "apollonian": apollonian(level=3),
     "model": model(BRACKET),
+    "extrude": extrude(WASHER, size=1.4, height=0.6),
+    "text": text("o8", FONT, depth=0.4),
+    "revolve": revolve(WASHER, size=0.6, offset=0.4),
     "honeycomb": honeycomb(thickness=0.3, reach=0.9),
     "pseudo kleinian": cut(pseudo_kleinian(steps=5)),
     "tetrabrot": tetrabrot(iterations=7),
@@ -225,6 +236,9 @@ EXAMPLES: dict[str, Node] = {
     ),
 }
 
+OF_FILES = {"model", "extrude", "revolve", "text"}
+"""Examples that native code computes, on the CPU alone; each is of a file."""
+
 _TURNED = "return scale * turn(fold(w, 1), (0, 0, 1), 20) + c"
 _EGG = "return sqrt(x**2 + y**2 + (flat * z)**2) - 1"
 DEFINED = {
@@ -235,12 +249,13 @@ DEFINED = {
 
 REPRESENTATIVES = {
     "a distance", "a step", "abox", "apollonian", "bend", "bounds", "bristorbrot julia", "burning ship",
-    "cone", "cosine bulb", "deep", "difference", "foam of walls", "gear", "gyroid wall", "honeycomb",
+    "cone", "cosine bulb", "deep", "difference", "extrude", "foam of walls", "gear", "gyroid wall",
+    "honeycomb",
     "hybrid transformed", "julia 4d", "kaleidoscopic octahedron", "kelvin struts", "koch",
     "lambda bulb", "mandelbox -1.5", "mandelbulb", "mandelbulb 7.5", "many", "material", "menger",
     "mirror", "model", "octahedron flake", "perlin noise", "prism", "pseudo kleinian", "quaternion julia 4",
-    "repeat overlapping", "rounded box", "schwarz_d wall", "shell", "smooth intersection",
-    "smooth union", "snowflake", "sphere", "superquadric", "thread", "transform", "tree", "twist x",
+    "repeat overlapping", "revolve", "rounded box", "schwarz_d wall", "shell", "smooth intersection",
+    "smooth union", "snowflake", "sphere", "superquadric", "text", "thread", "transform", "tree", "twist x",
 }  # fmt: skip
 """Examples of which none is built like another; tests that are stamped on all have the others in a night."""
 

@@ -28,7 +28,7 @@ WITHIN = {"vtkmodules": "pyvista", "Imath": "OpenEXR"}
 
 BLOCKED = (
     "pyvista vtkmodules matplotlib skimage manifold3d pymeshlab lxml networkx "
-    "hypothesis shapely imageio_ffmpeg pyoidn distributed dask fsspec"
+    "hypothesis shapely uharfbuzz imageio_ffmpeg pyoidn distributed dask fsspec"
 )
 
 

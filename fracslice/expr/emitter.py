@@ -152,6 +152,7 @@ SPECIAL = {
     "gather": 2,
     "solid_distance": 4,
     "together": 0,
+    "outline_distance": 3,
 }
 """Special intrinsics and their numbers of arguments."""
 
@@ -261,23 +262,31 @@ class SpecialIntrinsics:
         return Vec(self.builder, tuple(parts))
 
     def intrinsic_solid_distance(self, x: Value, y: Value, z: Value, solid: Value) -> Value:
+        """Emit `solid_distance`."""
+        return self.distance(solid, x, y, z)
+
+    def intrinsic_outline_distance(self, x: Value, y: Value, outline: Value) -> Value:
+        """Emit `outline_distance`."""
+        return self.distance(outline, x, y)
+
+    def distance(self, place: Value, *at: Value) -> Value:
         """Emit a question to the native code at an address, given as words, about all lanes."""
-        words = [number(self.builder, word, WHOLE) for word in solid]
+        words = [number(self.builder, word, WHOLE) for word in place]
         shifted = (self.builder.shl(word, ir.Constant(WHOLE, 16 * k)) for k, word in enumerate(words))
-        address, point = reduce(self.builder.or_, shifted), self.numbers(x, y, z)
+        address, point = reduce(self.builder.or_, shifted), self.numbers(*at)
         if isinstance(point[0], Interval):
             return enclosed(lambda *middle: self.asked(address, middle), *point)
         return self.asked(address, point)
 
     def asked(self, address: Any, point: Sequence[Vec]) -> Vec:
-        """Emit the call of a function of `native/mesh/solid.h`: values at the points of all lanes."""
+        """Emit the call of a function of `native/mesh/distances.h`: values at the points of all lanes."""
         real, size, builder = self.lanes.scalar, self.lanes.width, self.builder
         # In the first block of its function: in a loop, the stack would grow.
-        rows = builder.alloca(real, 4 * size)
+        rows = builder.alloca(real, (len(point) + 1) * size)
         rows.align = 64
         for k, coordinate in enumerate(point):
             self.intrinsic_store(rows, ir.Constant(WHOLE, k * size), coordinate)
-        result, place = builder.gep(rows, [ir.Constant(WHOLE, 3 * size)]), ir.IntType(8).as_pointer()
+        result, place = builder.gep(rows, [ir.Constant(WHOLE, len(point) * size)]), ir.IntType(8).as_pointer()
         kind = ir.FunctionType(ir.VoidType(), [place, rows.type, rows.type, WHOLE]).as_pointer()
         entries = builder.inttoptr(address, kind.as_pointer())
         function = builder.load(builder.gep(entries, [ir.Constant(WHOLE, self.lanes.bits // 64)]))

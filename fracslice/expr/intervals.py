@@ -10,8 +10,10 @@ sign. Conditions become a `Possible`: a pair of masks. Where a condition holds i
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import reduce
 from types import FunctionType
 from typing import Any
 
@@ -307,14 +309,13 @@ class Interval:
         return Interval(low, high, self.of)
 
 
-def enclosed(distance: Callable[..., Bound], x: Interval, y: Interval, z: Interval) -> Interval:
+def enclosed(distance: Callable[..., Bound], *sides: Interval) -> Interval:
     """Values on cells of a function of points that is a distance: its L is 1."""
-    middle = [side.cell_middle() for side in (x, y, z)]
-    a, b, c = (side.cell_extent() for side in (x, y, z))
-    reach = (a * a + b * b + c * c).sqrt()
-    value = distance(*(side.lo for side in middle))
-    around = Interval(value, value, x.of).outward()
-    return Interval((around - reach).lo, (around + reach).hi, x.of)
+    of, extents = sides[0].of, [side.cell_extent() for side in sides]
+    reach = reduce(operator.add, (a * a for a in extents)).sqrt()
+    value = distance(*(side.cell_middle().lo for side in sides))
+    around = Interval(value, value, of).outward()
+    return Interval((around - reach).lo, (around + reach).hi, of)
 
 
 def on_cells(name: str) -> Callable[..., Any]:

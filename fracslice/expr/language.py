@@ -212,10 +212,10 @@ def intrinsic_name(value: Any) -> str | None:
     return _INTRINSICS.get(id(value))
 
 
-INTRINSICS = frozenset({*vocabulary.NAMES, *vocabulary.OF_CELLS, *vocabulary.OF_MODELS, *_PLAIN})
+INTRINSICS = frozenset({*vocabulary.NAMES, *vocabulary.OF_CELLS, *vocabulary.OF_FILES, *_PLAIN})
 """Names that a text in the language may use without a definition."""
 
-_OWN = (*vocabulary.NAMES, *vocabulary.OF_CELLS, *vocabulary.OF_MODELS, "orbit")
+_OWN = (*vocabulary.NAMES, *vocabulary.OF_CELLS, *vocabulary.OF_FILES, "orbit")
 _INTRINSICS = {id(getattr(vocabulary, name)): name for name in _OWN} | {
     id(getattr(module, name)): _PYTHON.get(name, name)
     for module in (builtins, math)

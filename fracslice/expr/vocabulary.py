@@ -142,10 +142,28 @@ def solid_distance(x: np.ndarray, y: np.ndarray, z: np.ndarray, solid: Any) -> n
     return distances
 
 
+def outline_distance(x: np.ndarray, y: np.ndarray, outline: Any) -> np.ndarray:
+    """Signed distance to an outline in a plane, by native code. For the formulas of outlines alone.
+
+    Parameters
+    ----------
+    x, y
+        Coordinates, of one shape.
+    outline
+        The outline, a `registry.InMemory` with a method `distances`.
+
+    Returns
+    -------
+    ndarray
+    """
+    distances: np.ndarray = outline.distances(*np.broadcast_arrays(x, y))
+    return distances
+
+
 _FUNCTIONS = ("where", "sqrt", "rsqrt", "ratio", "log", "exp", "sin", "cos", "atan2", "floor")
 NAMES = frozenset((*_FUNCTIONS, "minimum", "maximum", "absolute", "any_of"))
 OF_CELLS = frozenset(("cell_middle", "cell_extent"))
 """Functions that only code of the kernel calls."""
-OF_MODELS = frozenset(("solid_distance",))
-"""Functions that only the formula of models calls."""
+OF_FILES = frozenset(("solid_distance", "outline_distance"))
+"""Functions that only the formulas of models and outlines call: a point, and what lies in memory."""
 __all__ = sorted(NAMES)

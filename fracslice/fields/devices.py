@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..common.cache import warn
-from ..common.parameters import Choice, validate_value
+from ..common.parameters import Choice, File, validate_value
 from ..errors import DeviceError
 from .field import Device
 
@@ -32,11 +32,14 @@ def choose_device(device: str) -> Device:
 
 
 def for_field(root: Node, device: Device) -> Device:
-    """Select the CPU for a field with a triangle model, which lies in its memory, with one warning."""
-    if device == "cpu" or all(node.formula.name != "model" for node in root.solids()):
+    """Select the CPU for a field with a model or outline, which lies in its memory, with one warning."""
+    if device == "cpu":
         return device
-    warn("a scene with a <model> is computed on the CPU, in whose memory its triangles are")
-    return "cpu"
+    for node in root.solids():
+        if any(isinstance(kind, File) and kind.inside for kind in node.formula.parameters.values()):
+            warn(f"a scene with a <{node.formula.name}> is computed on the CPU, in whose memory that is")
+            return "cpu"
+    return device
 
 
 def for_picture(device: str, size: tuple[int, int], samples: int) -> str:

@@ -11,7 +11,17 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, Protocol, cast, runtime_checkable
 
 from ..common.messages import hint
-from ..common.parameters import REQUIRED, Choice, Count, Digest, File, Vector, parameter_lines, python_name
+from ..common.parameters import (
+    REQUIRED,
+    Choice,
+    Count,
+    Digest,
+    File,
+    Label,
+    Vector,
+    parameter_lines,
+    python_name,
+)
 from ..errors import SceneError
 from .box import Axis, Box, direction, three
 from .field import Bounds, Cells, Device, Field, Kernel, Loops, Precision
@@ -404,7 +414,7 @@ def annotation(parameter: Any) -> Any:
             type_ = float | several if 1 in sizes else several
         case Choice(choices=choices):
             type_ = Literal[*choices]
-        case File() | Digest():
+        case File() | Digest() | Label():
             type_ = str
         case _:
             type_ = float

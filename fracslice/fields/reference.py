@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -59,11 +58,19 @@ def _field(root: Node, scope: dict[str, Any]) -> Callable[..., Any]:
     linked = link(root)
     memory = {words(memory.digest): memory for _, memory in linked.held}
 
-    def solid_distance(x: Any, y: Any, z: Any, solid: tuple[float, ...]) -> Any:
-        distance = partial(vocabulary.solid_distance, solid=memory[tuple(solid)])
-        return enclosed(distance, x, y, z) if isinstance(x, Interval) else distance(x, y, z)
+    def asking(function: Callable[..., Any]) -> Callable[..., Any]:
+        def asked(*given: Any) -> Any:
+            *point, place = given
+            shape = memory[tuple(place)]
+            if isinstance(point[0], Interval):
+                return enclosed(lambda *middle: function(*middle, shape), *point)
+            return function(*point, shape)
 
-    scope |= {CALLED: lambda function: function, "solid_distance": solid_distance}
+        return asked
+
+    scope |= {CALLED: lambda function: function} | {
+        name: asking(getattr(vocabulary, name)) for name in vocabulary.OF_FILES
+    }
     exec(compile(linked.source, "<linked scene>", "exec"), scope)
 
     def evaluate(*points: Any) -> Any:

@@ -328,6 +328,28 @@ def difference(*elements: Node, smooth: float = 0.0) -> Node:
     Node
     """
 
+def extrude(file: str, size: float | None = None, height: float = 1.0, place: Literal['centre', 'bed', 'as is'] = 'centre', sha256: str | None = None) -> Node:
+    """What an SVG file fills, extruded along z. L = 1: an exact distance, but for curves, which are segments
+    within 1/20000 of the longest side. Strokes, clipping and masks do not count.
+
+    Parameters
+    ----------
+    file : the name of a file
+        an SVG file, in the folder of the scene
+    size : a number > 0
+        the longest side of the outline; without it, a scene unit is a millimetre
+    height : a number > 0, default 1.0
+        along z
+    place : centre, bed or as is, default 'centre'
+        centred at the origin, or there from z = 0, or from z = 0 where the file has it, y up
+    sha256 : the SHA-256 of the file, 64 hexadecimal digits
+        hash of the file, by which a file that has changed is noticed
+
+    Returns
+    -------
+    Node
+    """
+
 def fischer_koch_s(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
     """A wall along the surface S of Fischer and Koch 1987. The gradient of its level function is at most
     2.444: L = 1.
@@ -1059,6 +1081,28 @@ def repeat(*elements: Node, period: Sequence[float], count: Sequence[int] = (0, 
     Node
     """
 
+def revolve(file: str, size: float | None = None, offset: float = 0.0, place: Literal['centre', 'bed'] = 'centre', sha256: str | None = None) -> Node:
+    """What an SVG file fills, turned around the z axis, with its left edge there and its y along z. L = 1: an
+    exact distance, with curves and fills as of `<extrude>`.
+
+    Parameters
+    ----------
+    file : the name of a file
+        an SVG file, in the folder of the scene
+    size : a number > 0
+        the longest side of the outline; without it, a scene unit is a millimetre
+    offset : a number >= 0, default 0.0
+        from the axis to the left edge of the outline
+    place : centre or bed, default 'centre'
+        centred at the origin, or from z = 0
+    sha256 : the SHA-256 of the file, 64 hexadecimal digits
+        hash of the file, by which a file that has changed is noticed
+
+    Returns
+    -------
+    Node
+    """
+
 def schwarz_d(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
     """A wall along the surface D of Schwarz 1890. The gradient of its level function is at most
     sqrt(3): L = 1.
@@ -1191,6 +1235,32 @@ def tetrabrot(iterations: Union[int, Literal['auto']] = 'auto') -> Node:
     ----------
     iterations : a whole number from 1 to 10000 or "auto", default 'auto'
         steps of the orbit; "auto": until one more moves most by less than 1/512 of the size
+
+    Returns
+    -------
+    Node
+    """
+
+def text(text: str, font: str, size: float = 1.0, depth: float = 1.0, place: Literal['centre', 'bed', 'as is'] = 'centre', variations: str = '', sha256: str | None = None) -> Node:
+    """A text, extruded along z, with ligatures and scripts in all directions by HarfBuzz. L = 1: an exact
+    distance, but for curves, which are segments within 1/20000 of the em.
+
+    Parameters
+    ----------
+    text : text in one line
+        the text, in one line and one direction of writing
+    font : the name of a file
+        a TrueType or OpenType font, in the folder of the scene
+    size : a number > 0, default 1.0
+        font size: the em, of which a capital letter is about 0.7
+    depth : a number > 0, default 1.0
+        along z
+    place : centre, bed or as is, default 'centre'
+        centred at the origin, or there from z = 0, or along the base line from the origin and from z = 0
+    variations : text in one line, default ''
+        where on its axes a variable font is, such as wght=700, wdth=80
+    sha256 : the SHA-256 of the file, 64 hexadecimal digits
+        hash of the font, by which a file that has changed is noticed
 
     Returns
     -------

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
@@ -56,16 +57,18 @@ class Solid(InMemory):
         return self.native.distances(points).reshape(np.shape(x))
 
 
-def identify(file: str, digest: str | None) -> tuple[str, str]:
-    """Return the whole path of a model file and the SHA-256 of its contents.
+def identify(
+    file: str, digest: str | None, known: Iterable[str] = READERS, what: str = "a model file"
+) -> tuple[str, str]:
+    """Return the whole path of a file and the SHA-256 of its contents; `known`: extensions it may have.
 
     A file whose model is in memory is not looked at once more.
     """
     path = os.path.abspath(file)
-    if os.path.splitext(path)[1].lower() not in READERS:
-        raise MeshError(f"not a model file that can be read; known are {', '.join(sorted(READERS))}")
+    if os.path.splitext(path)[1].lower() not in known:
+        raise MeshError(f"not {what} that can be read; known are {', '.join(sorted(known))}")
     if digest is None or (path, digest) not in _SEEN:
-        found = _digest(path)
+        found = file_hash(path)
         if digest not in (None, found):
             raise MeshError(f"the file is another now: expected one with the hash {digest}")
         _SEEN.add((path, found))
@@ -77,7 +80,8 @@ _SEEN = set[tuple[str, str]]()
 """Files that had these hashes."""
 
 
-def _digest(path: str) -> str:
+def file_hash(path: str) -> str:
+    """SHA-256 of a file."""
     try:
         with open_regular(path) as file:
             most = LARGEST if path.lower().endswith((".stl", ".obj")) else LARGEST // 2
@@ -158,7 +162,7 @@ def solid(file: str, sha256: str) -> Solid:
         mesh = read_mesh(file)
     except MeshError as error:
         raise MeshError(str(error).removeprefix(f"{file}: ")) from None
-    if _digest(file) != sha256:
+    if file_hash(file) != sha256:
         raise MeshError("the file was changed while it was read")
     if len(mesh.triangles) > MOST:
         raise MeshError(f"{len(mesh.triangles):,} triangles: expected at most {MOST:,}")

@@ -15,7 +15,7 @@ from fracslice.common.parameters import REQUIRED, python_name
 from fracslice.errors import SceneError
 from fracslice.formulas import get, names
 from fracslice.scene.manual import package_stub, stub
-from tests.examples import BRACKET
+from tests.examples import EXAMPLES, OF_FILES
 
 SHIPPED = [name for name in names() if get(name).function.__module__.startswith("fracslice.")]
 
@@ -49,11 +49,13 @@ def test_the_signature_is_the_registrys(name: str) -> None:
 
 @pytest.mark.parametrize("name", [n for n in SHIPPED if get(n).kind == "shape" and n != "orbit"])
 def test_positions_fill_parameters_in_the_order_of_the_signature(name: str) -> None:
-    bound = inspect.signature(get(name)).bind(*([BRACKET] if name == "model" else []))
+    required = [kind for kind in get(name).parameters.values() if kind.default is REQUIRED]
+    given = list(EXAMPLES[name].values.values())[: len(required)] if name in OF_FILES else []
+    bound = inspect.signature(get(name)).bind(*given)
     bound.apply_defaults()
-    assert get(name)(*bound.args) == get(name)(*bound.args[: name == "model"])
-    first = next(iter(bound.arguments))
-    assert get(name)(bound.arguments[first]) == get(name)(**{first: bound.arguments[first]})
+    assert get(name)(*bound.args) == get(name)(*given)
+    named = dict(list(bound.arguments.items())[: max(1, len(given))])
+    assert get(name)(*named.values()) == get(name)(**named)
 
 
 def test_a_shape_takes_its_values_by_position_or_name() -> None:

@@ -189,7 +189,16 @@ L_SHAPE = f.union(
     f.transform(f.box((0.4, 1.4, 0.6)), translate=(-0.3, 0.1, 0)),
 )
 
+WASHER = EXAMPLES["extrude"]
+HOLED = f.difference(
+    f.box((1.4, 1.4, 0.6)), f.transform(f.box((0.35 * sqrt(2), 0.35 * sqrt(2), 1)), rotate=(0, 0, 1, 45))
+)
+"""The same of two boxes."""
+
 TRUTHS: dict[str, list[Truth]] = {
+    "revolve": [Volume(EXAMPLES["revolve"], 2 * pi * 0.7 * 0.6**2 * (1 - 0.5 / 4))],
+    "text": [Equal(EXAMPLES["text"].changed(size=2, depth=0.8), f.transform(EXAMPLES["text"], scale=2))],
+    "extrude": [Volume(WASHER, 1.4**2 * (1 - 0.5 / 4) * 0.6), Equal(WASHER, HOLED, sign=True)],
     "model": [Volume(BRACKET, 0.576), Equal(BRACKET, L_SHAPE, rotation(X, 20) @ rotation(Z, 35), sign=True)],
     "sphere": [Equal(BALL, lambda *p: np.linalg.norm(p, axis=0) - 0.7), Volume(BALL, 4 / 3 * pi * 0.343)],
     "box": [

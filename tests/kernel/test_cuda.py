@@ -26,7 +26,7 @@ from fracslice.fields.node import FORMULAS
 from fracslice.fields.reference import reference
 from fracslice.formulas import Node, sphere
 from fracslice.mesh.roots import LOOPS, Roots
-from tests.examples import DEFINED, EXAMPLES, STRUCTURES, stamped
+from tests.examples import DEFINED, EXAMPLES, OF_FILES, STRUCTURES, stamped
 from tests.kernel.cuda_host import H200, HostDriver, runs_on_cpu
 from tests.kernel.idioms import HEAD, SAME, P, imported
 
@@ -45,7 +45,7 @@ def ptx(root: Node, bits: int, loop: str = "bricks") -> str:
 
 
 class TestMachineCode:
-    @pytest.mark.parametrize("name", stamped([n for n in KNOWN if n != "model"], STRUCTURES))
+    @pytest.mark.parametrize("name", stamped([n for n in KNOWN if n not in OF_FILES], STRUCTURES))
     def test_float32_kernels_hold_no_float64(self, name: str) -> None:
         text = ptx(KNOWN[name], 32)
         assert ".f32" in text

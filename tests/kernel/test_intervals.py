@@ -19,7 +19,7 @@ from fracslice.fields.linker import link
 from fracslice.fields.reference import enclosure
 from fracslice.fields.tree import Enclosures
 from fracslice.formulas import Node, gyroid, mandelbox, mandelbulb, menger, sphere
-from tests.examples import EXAMPLES, stamped
+from tests.examples import EXAMPLES, OF_FILES, stamped
 
 pytestmark = pytest.mark.once
 
@@ -51,7 +51,7 @@ def cells(half: float) -> tuple[np.ndarray, np.ndarray]:
     return centres, centres[:, :, None] + offsets
 
 
-@pytest.mark.parametrize("name", stamped(sorted(EXAMPLES.keys() - {"model"})))  # see tests.mesh.test_models
+@pytest.mark.parametrize("name", stamped(sorted(EXAMPLES.keys() - OF_FILES)))  # see tests.mesh
 def test_bounds_enclose_the_exact_field(name: str) -> None:
     root = resolve_depths(EXAMPLES[name], 0.1)
     enclosed, field = enclosure(root), exact(root)

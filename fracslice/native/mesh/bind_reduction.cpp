@@ -1,7 +1,8 @@
-// Fewer triangles, how far they are, and a mesh as a field: classes of fracslice._native that keep the arrays they look into.
+// Fewer triangles, how far they are, a mesh as a field, and outlines: classes of fracslice._native that keep the arrays they look into.
 #include "../unlocked.h"
 #include "input.h"
 #include "mesh_field.h"
+#include "outline.h"
 #include "reduction.h"
 #include "solid.h"
 
@@ -128,6 +129,18 @@ class BoundMeshField {
     MeshField field_;
 };
 
+// Distances of points, one a row.
+template <class Shape>
+nb::object distances_of(const Shape& shape, const Rows<double, Shape::kAxes>& points) {
+    Array<double> values(points.shape(0), 1);
+    {
+        nb::gil_scoped_release released;
+        size_t guess = 0;
+        for (size_t i = 0; i < points.shape(0); ++i) values.data[i] = shape(points.data() + Shape::kAxes * i, guess);
+    }
+    return to_numpy(std::move(values), {points.shape(0)});
+}
+
 class BoundSolid {
   public:
     BoundSolid(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<int64_t>& order, const Rows<double>& low,
@@ -142,21 +155,34 @@ class BoundSolid {
 
     uintptr_t address() const { return reinterpret_cast<uintptr_t>(solid_->entry()); }
 
-    nb::object distances(const Rows<double>& points) const {
-        Array<double> values(points.shape(0), 1);
-        {
-            nb::gil_scoped_release released;
-            size_t found = 0;
-            for (size_t i = 0; i < points.shape(0); ++i) values.data[i] = (*solid_)(points.data() + 3 * i, found);
-        }
-        return to_numpy(std::move(values), {points.shape(0)});
-    }
+    nb::object distances(const Rows<double>& points) const { return distances_of(*solid_, points); }
 
   private:
     Rows<double> vertices_, low_, high_;
     Rows<int32_t> triangles_;
     Vector<int64_t> order_;
     std::optional<Solid> solid_;
+};
+
+class BoundOutline {
+  public:
+    BoundOutline(const Rows<double, 2>& corners, const Vector<int64_t>& ends)
+        : outline_(span_of(corners), (require_rings(span_of(ends), corners.shape(0)), span_of(ends))) {}
+
+    uintptr_t address() const { return reinterpret_cast<uintptr_t>(outline_.entry()); }
+    nb::object distances(const Rows<double, 2>& points) const { return distances_of(outline_, points); }
+
+  private:
+    static void require_rings(std::span<const int64_t> ends, size_t count) {
+        int64_t begin = 0;
+        for (int64_t end : ends) {
+            if (end < begin + 3) throw std::invalid_argument("a ring has at least three corners");
+            begin = end;
+        }
+        if (ends.empty() || size_t(begin) != count) throw std::invalid_argument("rings and corners differ in length");
+    }
+
+    Outline outline_;
 };
 
 }  // namespace
@@ -186,6 +212,10 @@ void bind_reduction(nb::module_& module) {
              "vertices"_a, "triangles"_a, "order"_a, "low"_a, "high"_a)
         .def("distances", &BoundSolid::distances, "points"_a)
         .def_prop_ro("address", &BoundSolid::address);
+    nb::class_<BoundOutline>(module, "Outline")
+        .def(nb::init<const Rows<double, 2>&, const Vector<int64_t>&>(), "corners"_a, "ends"_a)
+        .def("distances", &BoundOutline::distances, "points"_a)
+        .def_prop_ro("address", &BoundOutline::address);
 }
 
 }  // namespace fracslice::mesh

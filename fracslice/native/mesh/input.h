@@ -13,8 +13,8 @@ namespace fracslice::mesh {
 
 template <class T>
 using Vector = nb::ndarray<const T, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-template <class T>
-using Rows = nb::ndarray<const T, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+template <class T, size_t columns = 3>
+using Rows = nb::ndarray<const T, nb::shape<-1, nb::ssize_t(columns)>, nb::c_contig, nb::device::cpu>;
 
 template <class T, class... Shape>
 std::span<const T> span_of(const nb::ndarray<const T, Shape...>& values) {

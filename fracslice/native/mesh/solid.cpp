@@ -1,8 +1,6 @@
 #include "solid.h"
 
-#include <atomic>
 #include <cmath>
-#include <cstring>
 #include <limits>
 
 #include "topology.h"
@@ -28,51 +26,11 @@ double angle(const double* at, const double* one, const double* other) {
     return std::acos(std::clamp(dot(u, v.data()) / std::sqrt(dot(u, u.data()) * dot(v, v.data())), -1.0, 1.0));
 }
 
-// The last packet of a thread for a solid: a scene may ask for the same one again, and rays go on where they were.
-template <class Real>
-struct Recent {
-    static constexpr size_t kMost = 64;  // lanes
-    uint64_t solid = 0;
-    size_t count = 0, found[kMost];
-    Real points[3 * kMost] = {}, values[kMost];
-};
-
-template <class Real>
-void distances(const Distances* entry, const Real* points, Real* values, size_t count) {
-    thread_local Recent<Real> recents[4];
-    Recent<Real>& recent = recents[entry->solid->number() % std::size(recents)];
-    count = std::min(count, recent.kMost);
-    if (recent.solid != entry->solid->number()) {
-        recent.solid = entry->solid->number(), recent.count = 0;
-        std::fill_n(recent.found, recent.kMost, size_t(0));
-    }
-    if (recent.count != count || std::memcmp(recent.points, points, 3 * count * sizeof(Real)) != 0) {
-        for (size_t i = 0; i < count; ++i) {
-            Real away = 0, aside = 0;  // from the last point of this lane, and from this one of the lane before
-            bool same = recent.count == count;  // a lane whose ray has ended waits for the others
-            for (size_t k = i; k < 3 * count; k += count) {
-                same = same && points[k] == recent.points[k];
-                away += (points[k] - recent.points[k]) * (points[k] - recent.points[k]);
-                aside += i > 0 ? (points[k] - points[k - 1]) * (points[k] - points[k - 1]) : 0;
-            }
-            if (same) continue;
-            if (i > 0 && aside < away) recent.found[i] = recent.found[i - 1];
-            const double p[3] = {double(points[i]), double(points[count + i]), double(points[2 * count + i])};
-            recent.values[i] = Real((*entry->solid)(p, recent.found[i]));
-        }
-        std::copy_n(points, 3 * count, recent.points);
-        recent.count = count;
-    }
-    std::copy_n(recent.values, count, values);
-}
-
-std::atomic<uint64_t> solids = 0;
-
 }  // namespace
 
 Solid::Solid(const MeshView& mesh, const TreeView& tree)
-    : number_(++solids), mesh_(mesh), low_(tree.low + 3), high_(tree.high + 3), nearest_(mesh, tree, false), across_(opposite_corners(mesh)), normals_(mesh.vertices, Point{}),
-      entry_{&distances<float>, &distances<double>, this} {
+    : mesh_(mesh), low_(tree.low + 3), high_(tree.high + 3), nearest_(mesh, tree, false), across_(opposite_corners(mesh)), normals_(mesh.vertices, Point{}),
+      entry_(entry_of(this)) {
     set_normals();
 }
 

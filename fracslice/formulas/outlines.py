@@ -1,0 +1,173 @@
+"""Outlines of files in a plane as solids: extruded and revolved, and texts."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import TYPE_CHECKING, Any
+
+from ..common.parameters import REQUIRED, Choice, Digest, File, Label, Number
+from ..errors import MeshError, SceneError
+from ..expr.vocabulary import absolute, maximum, minimum, outline_distance, sqrt
+from ..fields.box import Box
+from ..fields.registry import Formula, Node, shape
+
+if TYPE_CHECKING:
+    from ..mesh.outlines import Outline
+
+_FILE: dict[str, Any] = {
+    "file": File(REQUIRED, "an SVG file, in the folder of the scene", inside=True),
+    "size": Number(
+        None, "the longest side of the outline; without it, a scene unit is a millimetre", above=0
+    ),
+}
+_DIGEST = Digest(None, "hash of the file, by which a file that has changed is noticed")
+
+
+def _prism(x, y, z, outline, middle, half):  # type: ignore[no-untyped-def]
+    """The exact distance of an outline that is extruded, after Quilez."""
+    d = outline_distance(x, y, outline)
+    h = absolute(z - middle) - half
+    od = maximum(d, 0.0)
+    oh = maximum(h, 0.0)
+    return sqrt(od * od + oh * oh) + minimum(maximum(d, h), 0.0)
+
+
+def _prism_arguments(outline: Outline, height: float, place: str) -> dict[str, object]:
+    return {"outline": outline, "middle": 0.0 if place == "centre" else height / 2, "half": height / 2}
+
+
+def _prism_box(outline: Outline, height: float, place: str) -> Box:
+    bottom = -height / 2 if place == "centre" else 0.0
+    return Box((*outline.low, bottom), (*outline.high, bottom + height))
+
+
+@shape(
+    **_FILE,
+    height=Number(1.0, "along z", above=0),
+    place=Choice(
+        "centre",
+        "centred at the origin, or there from z = 0, or from z = 0 where the file has it, y up",
+        ("centre", "bed", "as is"),
+    ),
+    sha256=_DIGEST,
+)
+def extrude(x, y, z, outline, middle, half):  # type: ignore[no-untyped-def]
+    """What an SVG file fills, extruded along z. L = 1: an exact distance, but for curves, which are segments
+    within 1/20000 of the longest side. Strokes, clipping and masks do not count.
+    """
+    return _prism(x, y, z, outline, middle, half)
+
+
+@extrude.arguments
+def extrude_arguments(node: Node) -> dict[str, object]:
+    return _prism_arguments(_extruded(node), node["height"], node["place"])
+
+
+@extrude.bounds
+def extrude_bounds(node: Node) -> Box:
+    return _prism_box(_extruded(node), node["height"], node["place"])
+
+
+def _extruded(node: Node) -> Outline:
+    from ..mesh.outlines import extruded
+
+    try:
+        return extruded(node["file"], node["sha256"], node["size"], node["place"] != "as is")
+    except MeshError as error:
+        raise node.fail(f'file="{node["file"]}": {error}') from error
+
+
+@shape(
+    **_FILE,
+    offset=Number(0.0, "from the axis to the left edge of the outline", least=0),
+    place=Choice("centre", "centred at the origin, or from z = 0", ("centre", "bed")),
+    sha256=_DIGEST,
+)
+def revolve(x, y, z, outline):  # type: ignore[no-untyped-def]
+    """What an SVG file fills, turned around the z axis, with its left edge there and its y along z. L = 1: an
+    exact distance, with curves and fills as of `<extrude>`.
+    """
+    return outline_distance(sqrt(x * x + y * y), z, outline)
+
+
+@revolve.arguments
+def revolve_arguments(node: Node) -> dict[str, object]:
+    return {"outline": _revolved(node)}
+
+
+@revolve.bounds
+def revolve_bounds(node: Node) -> Box:
+    outline = _revolved(node)
+    radius = outline.high[0]
+    return Box((-radius, -radius, outline.low[1]), (radius, radius, outline.high[1]))
+
+
+def _revolved(node: Node) -> Outline:
+    from ..mesh.outlines import revolved
+
+    values = node.values
+    try:
+        return revolved(
+            values["file"], values["sha256"], values["size"], values["offset"], values["place"] == "centre"
+        )
+    except MeshError as error:
+        raise node.fail(f'file="{node["file"]}": {error}') from error
+
+
+@shape(
+    text=Label(REQUIRED, "the text, in one line and one direction of writing"),
+    font=File(REQUIRED, "a TrueType or OpenType font, in the folder of the scene", inside=True),
+    size=Number(1.0, "font size: the em, of which a capital letter is about 0.7", above=0),
+    depth=Number(1.0, "along z", above=0),
+    place=Choice(
+        "centre",
+        "centred at the origin, or there from z = 0, or along the base line from the origin and from z = 0",
+        ("centre", "bed", "as is"),
+    ),
+    variations=Label("", "where on its axes a variable font is, such as wght=700, wdth=80"),
+    sha256=Digest(None, "hash of the font, by which a file that has changed is noticed"),
+)
+def text(x, y, z, outline, middle, half):  # type: ignore[no-untyped-def]
+    """A text, extruded along z, with ligatures and scripts in all directions by HarfBuzz. L = 1: an exact
+    distance, but for curves, which are segments within 1/20000 of the em.
+    """
+    return _prism(x, y, z, outline, middle, half)
+
+
+@text.arguments
+def text_arguments(node: Node) -> dict[str, object]:
+    return _prism_arguments(_written(node), node["depth"], node["place"])
+
+
+@text.bounds
+def text_bounds(node: Node) -> Box:
+    return _prism_box(_written(node), node["depth"], node["place"])
+
+
+def _written(node: Node) -> Outline:
+    from ..mesh.outlines import written
+
+    names = ("font", "sha256", "text", "variations", "size")
+    try:
+        return written(*(node[name] for name in names), node["place"] != "as is")
+    except MeshError as error:
+        raise node.fail(f'font="{node["font"]}": {error}') from error
+
+
+def _identified(formula: Formula, name: str, known: Collection[str], what: str) -> None:
+    """Let the values of a formula have the whole path and the hash of its file."""
+
+    @formula.completed
+    def outline_completed(values: dict[str, Any]) -> dict[str, Any]:
+        from ..mesh.models import identify
+
+        try:
+            file, digest = identify(values[name], values["sha256"], known, what)
+        except MeshError as error:
+            raise SceneError(f'<{formula.name}> {name}="{values[name]}": {error}') from error
+        return {**values, name: file, "sha256": digest}
+
+
+for _formula in (extrude, revolve):
+    _identified(_formula, "file", {".svg"}, "an outline")
+_identified(text, "font", {".ttf", ".otf", ".ttc", ".otc"}, "a font")

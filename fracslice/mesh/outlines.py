@@ -1,0 +1,259 @@
+"""Outlines in a plane as solids of scenes: curves to segments, fills to one area, and signed distances."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import _native
+from ..common.cache import key
+from ..common.messages import lacking
+from ..errors import MeshError
+from ..expr.functions import InMemory
+from .fonts import lettered
+from .models import file_hash
+from .svg import MOST_CURVES, Curve, Fill, read_svg
+
+if TYPE_CHECKING:
+    from shapely import Geometry
+
+TOLERANCE = 5e-5
+"""Largest distance of a curve from its segments, in longest sides of all curves; of texts, in ems."""
+GRID = 2.0**-40
+"""Distance between the places that crossings of segments can have, in longest sides: no sliver is thinner."""
+MOST_CROSSINGS = 1 << 15
+"""Most pairs of segments that meet, besides neighbours: each may be a corner of the outline."""
+RAYS, ASKED = 1 << 10, 32
+"""Points whose winding numbers, and segments whose crossings are found at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outline(InMemory):
+    """Closed rings whose signed distances machine code asks for; see `native/mesh/outline.h`."""
+
+    low: tuple[float, float]  # corners of its box
+    high: tuple[float, float]
+    native: _native.Outline  # what lies at the address
+
+    @classmethod
+    def of(cls, rings: Sequence[NDArray[np.float64]]) -> Outline:
+        """Outline of rings [n, 2] that do not cross, with the inside on their left."""
+        corners = np.concatenate(rings)
+        ends = np.cumsum([len(ring) for ring in rings])
+        native, digest = _native.Outline(corners, ends), int(key("outline", corners, ends)[:16], 16)
+        low, high = corners.min(0).tolist(), corners.max(0).tolist()
+        return cls(digest, native.address, tuple(low), tuple(high), native)
+
+    def distances(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Signed distances of points; see `vocabulary.outline_distance`."""
+        points = np.stack([np.asarray(a, np.float64).ravel() for a in (x, y)], 1)
+        return self.native.distances(points).reshape(np.shape(x))
+
+
+@lru_cache(maxsize=8)
+def extruded(file: str, sha256: str, size: float | None, centred: bool) -> Outline:
+    """Outline of a file, scaled, its box centred at the origin or where the file has it."""
+    area = _sized(file, sha256, size)
+    low, high = np.reshape(area.bounds, (2, 2))
+    return Outline.of(_rings(area, (low + high) / 2 if centred else np.zeros(2)))
+
+
+@lru_cache(maxsize=8)
+def written(file: str, sha256: str, text: str, variations: str, size: float, centred: bool) -> Outline:
+    """Outline of a text in a font, of a size of the em, its box centred or its base line from the origin."""
+    fills = lettered(file, text, variations)
+    if file_hash(file) != sha256:
+        raise MeshError("the file was changed while it was read")
+    area = area_of(fills, 1.0)
+    low, high = np.reshape(area.bounds, (2, 2))
+    return Outline.of([ring * size for ring in _rings(area, (low + high) / 2 if centred else np.zeros(2))])
+
+
+@lru_cache(maxsize=8)
+def revolved(file: str, sha256: str, size: float | None, offset: float, centred: bool) -> Outline:
+    """Outline of a file, scaled, its left edge at an offset from the y axis, its box centred or above y = 0.
+
+    At the axis it goes on as its mirror image: no edge there is one of the solid.
+    """
+    area = _sized(file, sha256, size)
+    import shapely
+
+    low, high = np.reshape(area.bounds, (2, 2))
+    origin = np.array([low[0] - offset, (low[1] + high[1]) / 2 if centred else low[1]])
+    if offset > 0:
+        return Outline.of(_rings(area, origin))
+    right = shapely.transform(area, lambda points: points - origin)
+    left = shapely.transform(right, lambda points: points * (-1, 1))
+    return Outline.of(_rings(shapely.union(right, left, grid_size=GRID * (high - low).max()), np.zeros(2)))
+
+
+def _sized(file: str, sha256: str, size: float | None) -> Geometry:
+    """What a file fills, scaled about the file's origin."""
+    area = _area(file, sha256)
+    if size is None:
+        return area
+    import shapely
+
+    low, high = np.reshape(area.bounds, (2, 2))
+    scale = size / (high - low).max()
+    return shapely.transform(area, lambda points: points * scale)
+
+
+@lru_cache(maxsize=4)
+def _area(file: str, sha256: str) -> Geometry:
+    """What a file fills, mm."""
+    if reason := lacking("shapely", "outlines need"):
+        raise MeshError(reason)
+    fills = read_svg(file)
+    if file_hash(file) != sha256:
+        raise MeshError("the file was changed while it was read")
+    return area_of(fills)
+
+
+def area_of(fills: Iterable[Fill], detail: float | None = None) -> Geometry:
+    """The area of all fills, of which each may overlap itself and others.
+
+    Curves are within `TOLERANCE` of the longest side, or of the size of a `detail`.
+    """
+    import shapely
+
+    given = list(fills)
+    points = np.array([p for fill in given for start, curves in fill.rings for p in _samples(start, curves)])
+    if not np.isfinite(points).all() or not np.isfinite(
+        extent := np.ptp(points.view(float).reshape(-1, 2), axis=0).max()
+    ):
+        raise MeshError("has a coordinate that is not a finite number")
+    if extent == 0:
+        raise MeshError("has no path with an area")
+    grid = extent * GRID
+    rings = [
+        ([_ring(*ring, (detail or extent) * TOLERANCE) for ring in fill.rings], fill.nonzero)
+        for fill in given
+    ]
+    if (count := sum(len(ring) for fill, _ in rings for ring in fill)) > MOST_CURVES:
+        raise MeshError(f"expected an outline of at most {MOST_CURVES} segments, found {count}")
+    _require_few_crossings([ring for fill, _ in rings for ring in fill])
+    areas = [shapely.coverage_union_all(_faces(*fill, grid)) for fill in rings]
+    area = shapely.set_precision(shapely.union_all(areas), grid)
+    if area.area == 0:
+        raise MeshError("has no path with an area")
+    return area
+
+
+def _samples(start: complex, curves: list[Curve]) -> Iterable[complex]:
+    """Points of a ring that have nearly its box."""
+    yield start
+    for curve in curves:
+        if len(curve) > 1:
+            yield from _points(start, curve, 8)
+        yield (end := _end(curve))
+        start = end
+
+
+def _end(curve: Curve) -> complex:
+    return curve[-1] if len(curve) != 4 else complex(_points(0, curve, 1)[0])
+
+
+def _points(start: complex, curve: Curve, count: int) -> NDArray[np.complex128]:
+    """Points of a cubic or arc after its start, the last at its end."""
+    t = np.arange(1, count + 1) / count
+    if len(curve) == 4:
+        centre, one, other, ends = curve
+        angle = ends.real + (ends.imag - ends.real) * t
+        return np.asarray(centre + one * np.cos(angle) + other * np.sin(angle))
+    a, b, c = curve
+    s = 1 - t
+    return np.asarray(s * s * s * start + 3 * s * s * t * a + 3 * s * t * t * b + t * t * t * c)
+
+
+def _pieces(start: complex, curve: Curve, tolerance: float) -> int:
+    """Segments that a cubic or arc is split into, which stay within a tolerance of it."""
+    if len(curve) == 4:
+        _, one, other, ends = curve
+        radius = math.sqrt(abs(one) ** 2 + abs(other) ** 2)  # at least the larger half axis
+        turn = 2 * math.acos(max(1 - tolerance / radius, 0.0)) if radius else math.pi
+        return max(1, math.ceil(abs(ends.imag - ends.real) / turn))
+    a, b, c = curve
+    bend = 6 * max(abs(start - 2 * a + b), abs(a - 2 * b + c))  # of the second derivative
+    return max(1, math.ceil(math.sqrt(bend / (8 * tolerance))))
+
+
+def _ring(start: complex, curves: list[Curve], tolerance: float) -> NDArray[np.complex128]:
+    """Corners of a ring."""
+    points, at = [start], start
+    for curve in curves:
+        if len(curve) == 1:
+            points.append(at := curve[0])
+        else:
+            points.extend(_points(at, curve, _pieces(at, curve, tolerance)).tolist())
+            at = points[-1]
+    return np.array(points)
+
+
+def _faces(rings: list[NDArray[np.complex128]], nonzero: bool, grid: float) -> NDArray[Any]:
+    """Polygons of all that rings fill, which do not overlap."""
+    import shapely
+
+    closed = [np.append(ring, ring[0]) for ring in rings if len(ring) > 2]
+    if not closed:
+        return np.array([])
+    if len(closed) == 1 and (alone := shapely.Polygon(closed[0].view(float).reshape(-1, 2))).is_valid:
+        return np.array([alone])
+    lines = [shapely.LineString(ring.view(float).reshape(-1, 2)) for ring in closed]
+    faces = shapely.get_parts(shapely.polygonize([shapely.union_all(lines, grid_size=grid)]))
+    inside = shapely.point_on_surface(faces)
+    winding = _winding(closed, shapely.get_x(inside), shapely.get_y(inside))
+    filled: NDArray[Any] = faces[winding != 0 if nonzero else winding % 2 != 0]
+    return filled
+
+
+def _require_few_crossings(rings: list[NDArray[np.complex128]]) -> None:
+    """Raise the error about segments that cross others too often, of which a few make millions of faces."""
+    import shapely
+
+    pairs = [np.stack([ring, np.roll(ring, -1)], 1) for ring in rings]
+    segments = shapely.linestrings(np.concatenate(pairs).view(float).reshape(-1, 2, 2))
+    tree, met, most = shapely.STRtree(segments), 0, 3 * len(segments) + 2 * MOST_CROSSINGS
+    for first in range(0, len(segments), ASKED):
+        met += tree.query(segments[first : first + ASKED], predicate="intersects").shape[1]
+        if met > most:
+            raise MeshError(f"expected an outline whose segments cross at most {MOST_CROSSINGS} times")
+
+
+def _winding(
+    closed: list[NDArray[np.complex128]], x: NDArray[np.float64], y: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """Winding numbers of rings around points, by the segments that rays to the right cross."""
+    import shapely
+
+    a, b = (np.concatenate([ring[part] for ring in closed]) for part in (slice(None, -1), slice(1, None)))
+    tree = shapely.STRtree(shapely.linestrings(np.stack([a, b], 1).view(float).reshape(-1, 2, 2)))
+    winding, far = np.zeros(len(x), np.int64), max(a.real.max(), x.max(initial=0.0))
+    for first in range(0, len(x), RAYS):
+        part = slice(first, first + RAYS)
+        ray, segment = tree.query(shapely.box(x[part], y[part], far, y[part]))
+        s, e, px, py = a[segment], b[segment], x[part][ray], y[part][ray]
+        left = (e.real - s.real) * (py - s.imag) - (px - s.real) * (e.imag - s.imag) > 0
+        up, down = (s.imag <= py) & (py < e.imag) & left, (e.imag <= py) & (py < s.imag) & ~left
+        np.add.at(winding[part], ray, up.astype(int) - down)
+    return winding
+
+
+def _rings(area: Geometry, origin: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Rings of polygons, from an origin, with the inside on their left."""
+    import shapely
+
+    rings = []
+    for polygon in shapely.get_parts(shapely.normalize(area)):
+        for k, ring in enumerate((polygon.exterior, *polygon.interiors)):
+            corners = shapely.get_coordinates(ring)[:-1]
+            if shapely.is_ccw(ring) != (k == 0):
+                corners = corners[::-1]
+            rings.append(np.ascontiguousarray(corners - origin))
+    return rings
