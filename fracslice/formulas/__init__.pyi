@@ -329,8 +329,9 @@ def difference(*elements: Node, smooth: float = 0.0) -> Node:
     """
 
 def extrude(file: str, size: float | None = None, height: float = 1.0, place: Literal['centre', 'bed', 'as is'] = 'centre', sha256: str | None = None) -> Node:
-    """What an SVG file fills, extruded along z. L = 1: an exact distance, but for curves, which are segments
-    within 1/20000 of the longest side. Strokes, clipping and masks do not count.
+    """What an SVG file fills, extruded along z (Quilez 2008, "Distance functions"). L = 1: an exact distance,
+    but for curves, which are segments within 1/20000 of the longest side. Strokes, clipping and masks do not
+    count.
 
     Parameters
     ----------
@@ -1082,8 +1083,8 @@ def repeat(*elements: Node, period: Sequence[float], count: Sequence[int] = (0, 
     """
 
 def revolve(file: str, size: float | None = None, offset: float = 0.0, place: Literal['centre', 'bed'] = 'centre', sha256: str | None = None) -> Node:
-    """What an SVG file fills, turned around the z axis, with its left edge there and its y along z. L = 1: an
-    exact distance, with curves and fills as of `<extrude>`.
+    """What an SVG file fills, turned around the z axis, with its left edge there and its y along z (after
+    Quilez 2008, "Distance functions"). L = 1: an exact distance, with curves and fills as of `<extrude>`.
 
     Parameters
     ----------
@@ -1242,8 +1243,9 @@ def tetrabrot(iterations: Union[int, Literal['auto']] = 'auto') -> Node:
     """
 
 def text(text: str, font: str, size: float = 1.0, depth: float = 1.0, place: Literal['centre', 'bed', 'as is'] = 'centre', variations: str = '', sha256: str | None = None) -> Node:
-    """A text, extruded along z, with ligatures and scripts in all directions by HarfBuzz. L = 1: an exact
-    distance, but for curves, which are segments within 1/20000 of the em.
+    """A text, extruded along z (Quilez 2008, "Distance functions"), with ligatures and scripts in all
+    directions by HarfBuzz. L = 1: an exact distance, but for curves, which are segments within 1/20000 of the
+    em.
 
     Parameters
     ----------

@@ -52,8 +52,9 @@ def _prism_box(outline: Outline, height: float, place: str) -> Box:
     sha256=_DIGEST,
 )
 def extrude(x, y, z, outline, middle, half):  # type: ignore[no-untyped-def]
-    """What an SVG file fills, extruded along z. L = 1: an exact distance, but for curves, which are segments
-    within 1/20000 of the longest side. Strokes, clipping and masks do not count.
+    """What an SVG file fills, extruded along z (Quilez 2008, "Distance functions"). L = 1: an exact distance,
+    but for curves, which are segments within 1/20000 of the longest side. Strokes, clipping and masks do not
+    count.
     """
     return _prism(x, y, z, outline, middle, half)
 
@@ -84,8 +85,8 @@ def _extruded(node: Node) -> Outline:
     sha256=_DIGEST,
 )
 def revolve(x, y, z, outline):  # type: ignore[no-untyped-def]
-    """What an SVG file fills, turned around the z axis, with its left edge there and its y along z. L = 1: an
-    exact distance, with curves and fills as of `<extrude>`.
+    """What an SVG file fills, turned around the z axis, with its left edge there and its y along z (after
+    Quilez 2008, "Distance functions"). L = 1: an exact distance, with curves and fills as of `<extrude>`.
     """
     return outline_distance(sqrt(x * x + y * y), z, outline)
 
@@ -128,8 +129,9 @@ def _revolved(node: Node) -> Outline:
     sha256=Digest(None, "hash of the font, by which a file that has changed is noticed"),
 )
 def text(x, y, z, outline, middle, half):  # type: ignore[no-untyped-def]
-    """A text, extruded along z, with ligatures and scripts in all directions by HarfBuzz. L = 1: an exact
-    distance, but for curves, which are segments within 1/20000 of the em.
+    """A text, extruded along z (Quilez 2008, "Distance functions"), with ligatures and scripts in all
+    directions by HarfBuzz. L = 1: an exact distance, but for curves, which are segments within 1/20000 of the
+    em.
     """
     return _prism(x, y, z, outline, middle, half)
 

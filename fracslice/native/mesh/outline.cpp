@@ -133,6 +133,8 @@ double Outline::operator()(const double* p, size_t& guess) const {
     const Found found = nearest(p, guess);
     guess = found.segment;
     const double distance = std::sqrt(found.square);
+    const Box& all = boxes_[1];  // from far away its corners are one point, which has no sides
+    if (p[0] < all.low.x || p[0] > all.high.x || p[1] < all.low.y || p[1] > all.high.y) return distance;
     return distance != 0 && inside(p, found) ? -distance : distance;
 }
 

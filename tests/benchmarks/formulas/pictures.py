@@ -10,11 +10,11 @@ from PIL import ExifTags, Image, ImageDraw
 from fracslice import render
 from fracslice.formulas import Node, bounds
 from fracslice.volume import extent, with_depths
-from tests.examples import EXAMPLES
+from tests.examples import EXAMPLES, OF_FILES
 
 SIZE, COLUMNS, SAMPLES = (150, 128), 8, 8
 SHEET = Path(__file__).parents[3] / "docs/figures/elements.webp"
-SHOWN = [name for name, root in EXAMPLES.items() if root.bounds.box.finite and name != "model"]
+SHOWN = [name for name, root in EXAMPLES.items() if root.bounds.box.finite and name not in OF_FILES]
 
 
 def picture(root: Node) -> Image.Image:
