@@ -15,6 +15,7 @@ from fracslice.common.parameters import (
     Count,
     Digest,
     File,
+    Label,
     Number,
     Parameter,
     Vector,
@@ -25,7 +26,7 @@ from fracslice.formulas import Node
 
 def ends(kind: Parameter) -> list[object]:
     """The values at both ends of a parameter's range, and next to zero where it has both signs."""
-    if isinstance(kind, (Axis, Choice, Digest, File)):
+    if isinstance(kind, (Axis, Choice, Digest, File, Label)):
         return []
     if isinstance(kind, Count):
         return [kind.least, min(kind.most, 1000)]

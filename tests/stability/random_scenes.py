@@ -14,6 +14,7 @@ from fracslice.errors import FracsliceError
 from fracslice.fields.reference import reference
 from fracslice.formulas import Formula, Node, bounds, orbit
 from fracslice.scene.layout import formulas
+from tests.examples import OF_FILES
 
 from .draws import number
 from .random_hybrids import hybrid
@@ -29,7 +30,7 @@ ORBITS = {f.name for f in formulas() if "step" in f.hooks} - {"mandelbulb", "jul
 
 LOOKED = 4000
 TREES, TRIES = 100, 10
-LEAVES = [f for f in formulas() if f.kind == "shape" and "file" not in f.parameters]
+LEAVES = [f for f in formulas() if f.kind == "shape" and f.name not in OF_FILES]
 """Shapes that numbers make."""
 OTHERS = [f for f in formulas() if f.kind != "shape" and f.name != "material"]
 Draw = Callable[[np.random.Generator, float], Any]

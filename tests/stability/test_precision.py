@@ -10,7 +10,7 @@ import pytest
 from fracslice.fields.cpu import compile_scene
 from fracslice.fields.field import Precision
 from fracslice.formulas import names, sphere, transform
-from tests.examples import EXAMPLES, STRUCTURES, stamped
+from tests.examples import EXAMPLES, OF_FILES, STRUCTURES, stamped
 from tests.stability.random_scenes import ORBITS
 
 from .extremes import ends
@@ -48,7 +48,7 @@ def test_a_thousand_steps(name: str, precision: Precision) -> None:
 def test_every_formula_is_scaled() -> None:
     fractals = {name for name in names() if name not in LENGTHS}
     by_hand = {"mandelbulb", "julia", "menger", "flake", "cells", "jerusalem", "tetrabrot", "hilbert", "tree"}
-    assert fractals == by_hand | {"apollonian", "honeycomb", "pseudo_kleinian", "orbit", "model", *ORBITS}
+    assert fractals == by_hand | {"apollonian", "honeycomb", "pseudo_kleinian", "orbit", *OF_FILES, *ORBITS}
     assert scaled(sphere(radius=2), 3.0) == sphere(radius=6)
     assert scaled(transform(sphere(), translate=(1, 0, 0)), 2.0).values["translate"] == (2, 0, 0)
 
