@@ -9,8 +9,7 @@ from pathlib import Path
 
 import llvmlite
 
-from ..common.cache import Kept, cache_folder, key, texts
-from . import vocabulary
+from ..common.cache import PACKAGE, Kept, cache_folder, key, texts
 
 REGISTERS = 2
 """Vector registers per value: independent instructions in flight hide the latency of the arithmetic."""
@@ -20,6 +19,9 @@ MOST = 1 << 14
 """Characters that the first processor takes at most."""
 DESCRIBED = {"vendor_id", "cpu family", "model", "model name", "stepping", "flags"}
 """Lines of a processor in the file, from which LLVM's name and features follow."""
+
+TRANSLATORS = "expr", "fields"
+"""Packages that make texts of formulas and scenes, and code of these; it is kept under their own text."""
 
 
 def lane_count(bits: int) -> int:
@@ -51,7 +53,7 @@ def description() -> tuple[str, str, str]:
 @lru_cache(maxsize=1)
 def toolchain() -> str:
     """Return the key of everything that machine code depends on besides the linked text."""
-    own = texts(*sorted(Path(__file__).parent.glob("*.py")), Path(vocabulary.__file__))
+    own = texts(*(path for name in TRANSLATORS for path in sorted((PACKAGE / name).glob("*.py"))))
     return key(own, description(), llvmlite.__version__)
 
 

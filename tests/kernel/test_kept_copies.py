@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 
-from fracslice.fields import source
+from fracslice.expr import emitter, host, language
+from fracslice.fields import depth, growth, linker, orbit_code, source, steps
 from fracslice.fields.source import Copy, shared_copy
 
 TEXT = """
@@ -78,3 +79,12 @@ def test_a_damaged_copy_is_made_again(makes: list[str], tmp_path: Path) -> None:
     (kept,) = (tmp_path / "cache" / "copies").glob("*.txt")
     kept.write_bytes(kept.read_bytes()[:-2])
     assert copied(own.formula) == whole and makes == ["formula"] * 2
+
+
+@pytest.mark.parametrize("module", [source, linker, steps, orbit_code, growth, depth, language, emitter])
+def test_what_makes_texts_is_in_their_key(module: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another version of it must not read what this one has kept."""
+    read = list[Path]()
+    monkeypatch.setattr(host, "texts", lambda *files: read.extend(files) or "")
+    host.toolchain.__wrapped__()
+    assert module.__file__ and Path(module.__file__) in read
