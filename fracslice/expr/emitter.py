@@ -281,8 +281,8 @@ class SpecialIntrinsics:
     def asked(self, address: Any, point: Sequence[Vec]) -> Vec:
         """Emit the call of a function of `native/mesh/distances.h`: values at the points of all lanes."""
         real, size, builder = self.lanes.scalar, self.lanes.width, self.builder
-        # In the first block of its function: in a loop, the stack would grow.
-        rows = builder.alloca(real, (len(point) + 1) * size)
+        with builder.goto_entry_block():  # in a loop, the stack would grow
+            rows = builder.alloca(real, (len(point) + 1) * size)
         rows.align = 64
         for k, coordinate in enumerate(point):
             self.intrinsic_store(rows, ir.Constant(WHOLE, k * size), coordinate)
