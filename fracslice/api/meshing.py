@@ -23,26 +23,7 @@ from .options import MeshKeywords, Source, as_scene, job_of, keywords, work_of
 
 
 def distance(shape: Node, points: ArrayLike) -> NDArray[np.floating]:
-    """Signed distance field of a shape at points, as `Node.distance`.
-
-    Parameters
-    ----------
-    shape : Node
-        The shape.
-    points : array of float32 or float64, [..., 3]
-        Coordinates in scene units.
-
-    Returns
-    -------
-    ndarray [...]
-        Values in the precision of the points; float64 for other numeric types.
-
-    Raises
-    ------
-    SceneError
-        If the last axis of the points is not x, y, z, or an unbounded shape contains a fractal with
-        automatic iterations.
-    """
+    """See `Node.distance`."""
     array = _points(points)
     kernel = _with_depths(shape).kernel("cpu", "float32" if array.dtype == np.float32 else "float64")
     flat, values = array.reshape(-1, 3), np.empty(array.size // 3, array.dtype)
