@@ -9,6 +9,8 @@ from functools import lru_cache
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
+import numpy as np
+
 
 def parameters(function: Callable[..., Any]) -> list[str]:
     """Return the names of a function's parameters."""
@@ -91,12 +93,23 @@ class InMemory:
     ----------
     digest : int
         64 bits of a hash of the contents.
-    address : int
-        Where they are, while this object exists.
+    native : object
+        Native object that owns them, with `address`, where they are, and `distances` of points [n, axes].
     """
 
     digest: int
-    address: int
+    native: Any
+
+    @property
+    def address(self) -> int:
+        """Where the contents are, while this object exists."""
+        address: int = self.native.address
+        return address
+
+    def distances(self, *coordinates: np.ndarray) -> np.ndarray:
+        """Signed distances of points, by their coordinates along each axis, arrays of one shape."""
+        points = np.stack([np.asarray(a, np.float64).ravel() for a in coordinates], 1)
+        return np.asarray(self.native.distances(points)).reshape(np.shape(coordinates[0]))
 
 
 def words(number: int) -> tuple[float, ...]:

@@ -132,7 +132,7 @@ def solid_distance(x: np.ndarray, y: np.ndarray, z: np.ndarray, solid: Any) -> n
     x, y, z
         Coordinates, of one shape.
     solid
-        The model, a `registry.InMemory` with a method `distances`.
+        The model, a `functions.InMemory`.
 
     Returns
     -------
@@ -150,7 +150,7 @@ def outline_distance(x: np.ndarray, y: np.ndarray, outline: Any) -> np.ndarray:
     x, y
         Coordinates, of one shape.
     outline
-        The outline, a `registry.InMemory` with a method `distances`.
+        The outline, a `functions.InMemory`.
 
     Returns
     -------

@@ -1,14 +1,42 @@
-"""Triangle models of files as solids."""
+"""Triangle models of files as solids, and what shapes of files have in common."""
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from typing import Any
 
-from ..common.parameters import MILLIMETRES, REQUIRED, Choice, Digest, File, Number
+from ..common.parameters import MILLIMETRES, MODELS, REQUIRED, Choice, Digest, File, Number
 from ..errors import MeshError, SceneError
 from ..expr.vocabulary import solid_distance
 from ..fields.box import Box, Triple, three
-from ..fields.registry import Node, shape
+from ..fields.registry import Formula, Node, shape
+
+
+def identify_file(formula: Formula, name: str, known: Collection[str], what: str) -> None:
+    """Let the values of a formula have the whole path and the hash of its file.
+
+    `name`: parameter of the file; `known`: extensions that it may have; `what`: what it is, for errors.
+    """
+
+    @formula.completed
+    def identified(values: dict[str, Any]) -> dict[str, Any]:
+        from ..mesh.models import identify
+
+        try:
+            file, digest = identify(values[name], values["sha256"], known, what)
+        except MeshError as error:
+            raise SceneError(f'<{formula.name}> {name}="{values[name]}": {error}') from error
+        return {**values, name: file, "sha256": digest}
+
+
+@contextmanager
+def reading(node: Node, name: str) -> Iterator[None]:
+    """Give errors about the file of a node its place; `name`: parameter of the file."""
+    try:
+        yield
+    except MeshError as error:
+        raise node.fail(f'{name}="{node[name]}": {error}') from error
 
 
 @shape(
@@ -31,15 +59,7 @@ def model(x, y, z, origin, scale, inverse, solid):  # type: ignore[no-untyped-de
     return scale * solid_distance((x - ox) * inverse, (y - oy) * inverse, (z - oz) * inverse, solid)
 
 
-@model.completed
-def model_completed(values: dict[str, Any]) -> dict[str, Any]:
-    from ..mesh.models import identify
-
-    try:
-        file, digest = identify(values["file"], values["sha256"])
-    except MeshError as error:
-        raise SceneError(f'<model> file="{values["file"]}": {error}') from error
-    return {**values, "file": file, "sha256": digest}
+identify_file(model, "file", MODELS, "a model file")
 
 
 @model.check
@@ -74,7 +94,5 @@ def _solid(node: Node) -> Any:
     """The solid of a node, a `mesh.models.Solid`, in mm of its file."""
     from ..mesh.models import solid
 
-    try:
+    with reading(node, "file"):
         return solid(node["file"], node["sha256"])
-    except MeshError as error:
-        raise node.fail(f'file="{node["file"]}": {error}') from error

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from typing import TYPE_CHECKING, Any
 
 from ..common.parameters import REQUIRED, Choice, Digest, File, Label, Number
-from ..errors import MeshError, SceneError
 from ..expr.vocabulary import absolute, maximum, minimum, outline_distance, sqrt
 from ..fields.box import Box
-from ..fields.registry import Formula, Node, shape
+from ..fields.registry import Node, shape
+from .models import identify_file, reading
 
 if TYPE_CHECKING:
     from ..mesh.outlines import Outline
@@ -72,10 +71,8 @@ def extrude_bounds(node: Node) -> Box:
 def _extruded(node: Node) -> Outline:
     from ..mesh.outlines import extruded
 
-    try:
+    with reading(node, "file"):
         return extruded(node["file"], node["sha256"], node["size"], node["place"] != "as is")
-    except MeshError as error:
-        raise node.fail(f'file="{node["file"]}": {error}') from error
 
 
 @shape(
@@ -106,13 +103,9 @@ def revolve_bounds(node: Node) -> Box:
 def _revolved(node: Node) -> Outline:
     from ..mesh.outlines import revolved
 
-    values = node.values
-    try:
-        return revolved(
-            values["file"], values["sha256"], values["size"], values["offset"], values["place"] == "centre"
-        )
-    except MeshError as error:
-        raise node.fail(f'file="{node["file"]}": {error}') from error
+    names = ("file", "sha256", "size", "offset")
+    with reading(node, "file"):
+        return revolved(*(node[name] for name in names), node["place"] == "centre")
 
 
 @shape(
@@ -150,26 +143,10 @@ def _written(node: Node) -> Outline:
     from ..mesh.outlines import written
 
     names = ("font", "sha256", "text", "variations", "size")
-    try:
+    with reading(node, "font"):
         return written(*(node[name] for name in names), node["place"] != "as is")
-    except MeshError as error:
-        raise node.fail(f'font="{node["font"]}": {error}') from error
-
-
-def _identified(formula: Formula, name: str, known: Collection[str], what: str) -> None:
-    """Let the values of a formula have the whole path and the hash of its file."""
-
-    @formula.completed
-    def outline_completed(values: dict[str, Any]) -> dict[str, Any]:
-        from ..mesh.models import identify
-
-        try:
-            file, digest = identify(values[name], values["sha256"], known, what)
-        except MeshError as error:
-            raise SceneError(f'<{formula.name}> {name}="{values[name]}": {error}') from error
-        return {**values, name: file, "sha256": digest}
 
 
 for _formula in (extrude, revolve):
-    _identified(_formula, "file", {".svg"}, "an outline")
-_identified(text, "font", {".ttf", ".otf", ".ttc", ".otc"}, "a font")
+    identify_file(_formula, "file", {".svg"}, "an outline")
+identify_file(text, "font", {".ttf", ".otf", ".ttc", ".otc"}, "a font")

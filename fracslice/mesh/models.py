@@ -10,7 +10,6 @@ from functools import lru_cache
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import _native
 from ..common.cache import Kept, cache_folder, key
@@ -22,7 +21,7 @@ from ..fields.node import TriangleMesh
 from ..fields.registry import Node, get
 from .checks import MeshReport, check_mesh
 from .model import Mesh
-from .reading import READERS, read_mesh
+from .reading import read_mesh
 from .spatial import build
 
 LARGEST, MOST = 1 << 27, 1 << 21
@@ -36,7 +35,6 @@ class Solid(InMemory):
     """Closed mesh whose signed distances machine code asks for; see `native/mesh/solid.h`."""
 
     box: Box  # bounds
-    native: _native.Solid  # what lies at the address
 
     @classmethod
     def of(cls, mesh: Mesh) -> Solid:
@@ -47,19 +45,10 @@ class Solid(InMemory):
         native = _native.Solid(mesh.vertices, mesh.triangles, *build(mesh, halved=True))
         low, high = mesh.bounds.tolist()
         digest = int(key("solid", vertices, triangles)[:16], 16)
-        return cls(digest, native.address, Box(tuple(low), tuple(high)), native)
-
-    def distances(
-        self, x: NDArray[np.float64], y: NDArray[np.float64], z: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """Signed distances of points; see `vocabulary.solid_distance`."""
-        points = np.stack([np.asarray(a, np.float64).ravel() for a in (x, y, z)], 1)
-        return self.native.distances(points).reshape(np.shape(x))
+        return cls(digest, native, Box(tuple(low), tuple(high)))
 
 
-def identify(
-    file: str, digest: str | None, known: Iterable[str] = READERS, what: str = "a model file"
-) -> tuple[str, str]:
+def identify(file: str, digest: str | None, known: Iterable[str], what: str) -> tuple[str, str]:
     """Return the whole path of a file and the SHA-256 of its contents; `known`: extensions it may have.
 
     A file whose model is in memory is not looked at once more.
@@ -96,6 +85,12 @@ def file_hash(path: str) -> str:
         raise MeshError("no such file") from None
     except OSError as error:
         raise MeshError(error.strerror or str(error)) from None
+
+
+def require_unchanged(file: str, sha256: str) -> None:
+    """Raise the error about a file that has another hash since it was identified."""
+    if file_hash(file) != sha256:
+        raise MeshError("the file was changed while it was read")
 
 
 def from_trimesh(
@@ -162,8 +157,7 @@ def solid(file: str, sha256: str) -> Solid:
         mesh = read_mesh(file)
     except MeshError as error:
         raise MeshError(str(error).removeprefix(f"{file}: ")) from None
-    if file_hash(file) != sha256:
-        raise MeshError("the file was changed while it was read")
+    require_unchanged(file, sha256)
     if len(mesh.triangles) > MOST:
         raise MeshError(f"{len(mesh.triangles):,} triangles: expected at most {MOST:,}")
     if problems := faults(check_mesh(mesh)):

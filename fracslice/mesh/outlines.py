@@ -17,7 +17,7 @@ from ..common.messages import lacking
 from ..errors import MeshError
 from ..expr.functions import InMemory
 from .fonts import lettered
-from .models import file_hash
+from .models import require_unchanged
 from .svg import MOST_CURVES, Curve, Fill, read_svg
 
 if TYPE_CHECKING:
@@ -39,7 +39,6 @@ class Outline(InMemory):
 
     low: tuple[float, float]  # corners of its box
     high: tuple[float, float]
-    native: _native.Outline  # what lies at the address
 
     @classmethod
     def of(cls, rings: Sequence[NDArray[np.float64]]) -> Outline:
@@ -48,12 +47,7 @@ class Outline(InMemory):
         ends = np.cumsum([len(ring) for ring in rings])
         native, digest = _native.Outline(corners, ends), int(key("outline", corners, ends)[:16], 16)
         low, high = corners.min(0).tolist(), corners.max(0).tolist()
-        return cls(digest, native.address, tuple(low), tuple(high), native)
-
-    def distances(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Signed distances of points; see `vocabulary.outline_distance`."""
-        points = np.stack([np.asarray(a, np.float64).ravel() for a in (x, y)], 1)
-        return self.native.distances(points).reshape(np.shape(x))
+        return cls(digest, native, tuple(low), tuple(high))
 
 
 @lru_cache(maxsize=8)
@@ -68,8 +62,7 @@ def extruded(file: str, sha256: str, size: float | None, centred: bool) -> Outli
 def written(file: str, sha256: str, text: str, variations: str, size: float, centred: bool) -> Outline:
     """Outline of a text in a font, of a size of the em, its box centred or its base line from the origin."""
     fills = lettered(file, text, variations)
-    if file_hash(file) != sha256:
-        raise MeshError("the file was changed while it was read")
+    require_unchanged(file, sha256)
     area = area_of(fills, 1.0)
     low, high = np.reshape(area.bounds, (2, 2))
     return Outline.of([ring * size for ring in _rings(area, (low + high) / 2 if centred else np.zeros(2))])
@@ -111,8 +104,7 @@ def _area(file: str, sha256: str) -> Geometry:
     if reason := lacking("shapely", "outlines need"):
         raise MeshError(reason)
     fills = read_svg(file)
-    if file_hash(file) != sha256:
-        raise MeshError("the file was changed while it was read")
+    require_unchanged(file, sha256)
     return area_of(fills)
 
 
