@@ -41,15 +41,31 @@ class BoundReduction {
     Reduction reduction_;
 };
 
+// A mesh and its tree: the arrays that searches look into.
+struct BoundMesh {
+    Rows<double> vertices;
+    Rows<int32_t> triangles;
+    Vector<int64_t> order;
+    Rows<double> low, high;
+
+    // What make(mesh, tree) returns, on all threads. empty: the error about a mesh without triangles.
+    template <class Make>
+    auto made(const char* empty, const Make& make) const {
+        return unlocked(0, [&] {
+            const MeshView mesh = mesh_of(vertices, triangles);
+            require(mesh.count > 0, empty);
+            return make(mesh, tree_of(mesh, order, low, high));
+        });
+    }
+};
+
 class BoundNearest {
   public:
     BoundNearest(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<int64_t>& order,
                  const Rows<double>& low, const Rows<double>& high, bool closed)
-        : vertices_(vertices), low_(low), high_(high), triangles_(triangles), order_(order), nearest_(unlocked(0, [&] {
-              MeshView mesh = mesh_of(vertices, triangles);
-              if (!mesh.count) throw std::invalid_argument("nothing is near an empty mesh");
-              return Nearest(mesh, tree_of(mesh, order, low, high), closed);
-          })) {}
+        : mesh_{vertices, triangles, order, low, high},
+          nearest_(mesh_.made("nothing is near an empty mesh",
+                              [&](const MeshView& mesh, const TreeView& tree) { return Nearest(mesh, tree, closed); })) {}
 
     nb::tuple bounds(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Rows<int32_t>& hints, double tolerance,
                      int threads) const {
@@ -58,7 +74,7 @@ class BoundNearest {
         auto beyond = unlocked(threads, [&] {
             MeshView mesh = mesh_of(vertices, triangles);
             if (hints.shape(0) > 0 && hints.shape(0) != mesh.count) throw std::invalid_argument("triangles and hints differ in length");
-            require_below(span_of(hints), triangles_.shape(0), "a hint names a triangle that does not exist");
+            require_below(span_of(hints), mesh_.triangles.shape(0), "a hint names a triangle that does not exist");
             return nearest_.bounds(mesh, span_of(hints), tolerance, distances.data.get());
         });
         return nb::make_tuple(to_numpy(std::move(distances), {count}), to_numpy<int32_t>(beyond));
@@ -78,9 +94,7 @@ class BoundNearest {
     }
 
   private:
-    Rows<double> vertices_, low_, high_;
-    Rows<int32_t> triangles_;
-    Vector<int64_t> order_;
+    BoundMesh mesh_;
     Nearest nearest_;
 };
 
@@ -90,11 +104,9 @@ class BoundMeshField {
   public:
     BoundMeshField(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<int64_t>& order,
                    const Rows<double>& low, const Rows<double>& high)
-        : vertices_(vertices), low_(low), high_(high), triangles_(triangles), order_(order), field_(unlocked(0, [&] {
-              MeshView mesh = mesh_of(vertices, triangles);
-              if (!mesh.count) throw std::invalid_argument("an empty mesh is no field");
-              return MeshField(mesh, tree_of(mesh, order, low, high));
-          })) {}
+        : mesh_{vertices, triangles, order, low, high},
+          field_(mesh_.made("an empty mesh is no field",
+                            [](const MeshView& mesh, const TreeView& tree) { return MeshField(mesh, tree); })) {}
 
     // Calls come from many threads: each takes one.
     nb::object points(const Strided& x, const Strided& y, const Strided& z, bool measured) const {
@@ -123,9 +135,7 @@ class BoundMeshField {
     }
 
   private:
-    Rows<double> vertices_, low_, high_;
-    Rows<int32_t> triangles_;
-    Vector<int64_t> order_;
+    BoundMesh mesh_;
     MeshField field_;
 };
 
@@ -145,12 +155,8 @@ class BoundSolid {
   public:
     BoundSolid(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<int64_t>& order, const Rows<double>& low,
                const Rows<double>& high)
-        : vertices_(vertices), low_(low), high_(high), triangles_(triangles), order_(order) {
-        unlocked(0, [&] {
-            MeshView mesh = mesh_of(vertices, triangles);
-            if (!mesh.count) throw std::invalid_argument("an empty mesh is no solid");
-            solid_.emplace(mesh, tree_of(mesh, order, low, high));
-        });
+        : mesh_{vertices, triangles, order, low, high} {
+        mesh_.made("an empty mesh is no solid", [&](const MeshView& mesh, const TreeView& tree) { solid_.emplace(mesh, tree); });
     }
 
     uintptr_t address() const { return reinterpret_cast<uintptr_t>(solid_->entry()); }
@@ -158,9 +164,7 @@ class BoundSolid {
     nb::object distances(const Rows<double>& points) const { return distances_of(*solid_, points); }
 
   private:
-    Rows<double> vertices_, low_, high_;
-    Rows<int32_t> triangles_;
-    Vector<int64_t> order_;
+    BoundMesh mesh_;
     std::optional<Solid> solid_;
 };
 

@@ -11,16 +11,6 @@
 
 namespace fracslice::mesh {
 
-template <class T>
-using Vector = nb::ndarray<const T, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-template <class T, size_t columns = 3>
-using Rows = nb::ndarray<const T, nb::shape<-1, nb::ssize_t(columns)>, nb::c_contig, nb::device::cpu>;
-
-template <class T, class... Shape>
-std::span<const T> span_of(const nb::ndarray<const T, Shape...>& values) {
-    return {values.data(), values.size()};
-}
-
 // Throws std::invalid_argument unless all values are at least `least`, which is not positive, and below `end`.
 template <class T>
 void require_below(std::span<const T> values, size_t end, const char* what, std::type_identity_t<T> least = 0) {

@@ -1,5 +1,6 @@
 // Functions of fracslice._native on sampled solids.
 #include "../disjoint_sets.h"
+#include "../mesh/input.h"
 #include "../volume/brick_arrays.h"
 #include "capsules.h"
 #include "sampled_field.h"
@@ -12,48 +13,18 @@
 namespace fracslice::printing {
 namespace {
 
+using mesh::require_below;
 using volume::IjkArray;
 using volume::IndexArray;
 using volume::ValuesArray;
 
+using Points = Rows<double>;
 template <class T>
-using Vector = nb::ndarray<const T, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Points = nb::ndarray<const double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
-template <class T>
-using Samples = nb::ndarray<const T, nb::shape<-1, volume::kSamples>, nb::c_contig, nb::device::cpu>;
-
-template <class T>
-std::span<const T> span_of(const Vector<T>& values) {
-    return {values.data(), values.size()};
-}
+using Samples = Rows<T, volume::kSamples>;
 
 template <class Row = Point>
-std::span<const Row> rows_of(const nb::ndarray<const double, nb::shape<-1, std::tuple_size_v<Row>>, nb::c_contig, nb::device::cpu>& rows) {
+std::span<const Row> rows_of(const Rows<double, std::tuple_size_v<Row>>& rows) {
     return {reinterpret_cast<const Row*>(rows.data()), rows.shape(0)};
-}
-
-void require(bool holds, const char* what) {
-    if (!holds) throw std::invalid_argument(what);
-}
-
-template <class T>
-void require_below(std::span<const T> numbers, size_t end, const char* what) {
-    for (T number : numbers) require(number >= 0 && size_t(number) < end, what);
-}
-
-// What act() returns; other threads of Python run meanwhile.
-template <class Do>
-auto unlocked(const Do& act) {
-    nb::gil_scoped_release released;
-    return act();
-}
-
-template <class T, class From>
-nb::object numbers(const std::vector<From>& values, std::initializer_list<size_t> shape) {
-    static_assert(sizeof(T) == sizeof(From));
-    Array<T> array(values.size(), 1);
-    if (!values.empty()) std::memcpy(array.data.get(), values.data(), values.size() * sizeof(T));
-    return to_numpy(std::move(array), shape);
 }
 
 Rays rays_of(const Points& start, const Points& directions) {
@@ -76,33 +47,33 @@ class Bound {
     nb::object free(const Points& start, const Points& directions, const Vector<double>& far) const {
         const Rays rays = rays_of(start, directions);
         require(far.size() == rays.start.size(), "starts and distances differ in length");
-        return numbers<double>(unlocked([&] { return field_.free(rays, span_of(far)); }), {far.size()});
+        return to_numpy<double>(released([&] { return field_.free(rays, span_of(far)); }), {far.size()});
     }
     nb::object through(const Points& start, const Points& directions, double limit, double towards) const {
         const Rays rays = rays_of(start, directions);
-        return numbers<double>(unlocked([&] { return field_.through(rays, limit, towards); }), {rays.start.size()});
+        return to_numpy<double>(released([&] { return field_.through(rays, limit, towards); }), {rays.start.size()});
     }
     nb::tuple crossings(const Vector<int64_t>& rows) const {
         require_below(span_of(rows), ijk_.shape(0), "a row is of no brick");
-        const Crossings found = unlocked([&] { return field_.crossings(span_of(rows)); });
+        const Crossings found = released([&] { return field_.crossings(span_of(rows)); });
         return nb::make_tuple(to_numpy<double>(found.points), to_numpy<double>(found.normals),
-                              numbers<double>(found.area, {found.area.size()}));
+                              to_numpy<double>(found.area, {found.area.size()}));
     }
     bool may_be_deep(double depth, double lipschitz) const {
-        return unlocked([&] { return field_.may_be_deep(depth, lipschitz); });
+        return released([&] { return field_.may_be_deep(depth, lipschitz); });
     }
 
   private:
     volume::Bricks checked() const {
         const volume::Bricks bricks = volume::view(ijk_, values_, index_);
-        unlocked([&] { check(bricks); });
+        released([&] { check(bricks); });
         return bricks;
     }
     template <class Value>
     static nb::object at(const Vector<double>& x, const Vector<double>& y, const Vector<double>& z, const Value& value) {
         require(x.size() == y.size() && y.size() == z.size(), "coordinates differ in length");
         Array<double> out(x.size(), 1);
-        unlocked([&] {
+        released([&] {
             for (size_t n = 0; n < x.size(); ++n) out.data[n] = value({x.data()[n], y.data()[n], z.data()[n]});
         });
         return to_numpy(std::move(out), {x.size()});
@@ -117,16 +88,16 @@ class Bound {
 volume::Layout checked(const IjkArray& ijk, const IndexArray& index, size_t rows) {
     require(ijk.shape(0) == rows, "ijk and values differ in length");
     const volume::Layout layout = volume::layout(ijk, index);
-    unlocked([&] { check(layout); });
+    released([&] { check(layout); });
     return layout;
 }
 
 template <class Index, class Value>
 nb::tuple components_as(const volume::Layout& layout, const Samples<Value>& values) {
-    auto found = unlocked([&] { return solid_components<Index>(layout, values.data()); });
+    auto found = released([&] { return solid_components<Index>(layout, values.data()); });
     const size_t elements = found.of.rows, count = found.sizes.size();
-    return nb::make_tuple(to_numpy(std::move(found.of), {elements}), numbers<int64_t>(found.sizes, {count}),
-                          numbers<bool>(found.inside, {count}));
+    return nb::make_tuple(to_numpy(std::move(found.of), {elements}), to_numpy<int64_t>(found.sizes, {count}),
+                          to_numpy<bool>(found.inside, {count}));
 }
 
 template <class Value>
@@ -142,14 +113,14 @@ nb::object bind_crossings(const IjkArray& ijk, const Samples<Value>& values, con
     const volume::Layout layout = checked(ijk, index, values.shape(0));
     require(labels.shape(0) == values.shape(0), "labels and values differ in length");
     require_below(std::span<const Index>(labels.data(), labels.size()), count, "a label names no component");
-    return numbers<int64_t>(unlocked([&] { return crossings_by_component(layout, values.data(), labels.data(), count); }), {count});
+    return to_numpy<int64_t>(released([&] { return crossings_by_component(layout, values.data(), labels.data(), count); }), {count});
 }
 
 nb::tuple bind_graph(size_t count, const Vector<int64_t>& some, const Vector<int64_t>& others) {
     require(some.size() == others.size(), "the ends of edges differ in number");
     for (const auto& ends : {span_of(some), span_of(others)}) require_below(ends, count, "an edge has an end that is no node");
     Array<int64_t> of(count, 1);
-    const int64_t components = unlocked([&] {
+    const int64_t components = released([&] {
         std::span<int64_t> parent(of.data.get(), count);
         std::iota(parent.begin(), parent.end(), 0);
         DisjointSets<int64_t> sets(parent);
@@ -192,11 +163,11 @@ nb::object bind_near(const Points& points, double reach, const std::array<int, 3
             require(point[k] >= reach && point[k] + reach < 8.0 * shape[k], "a point is too near to the border");
         }
     }
-    return numbers<bool>(unlocked([&] { return bricks_near(rows_of(points), reach, shape); }),
+    return to_numpy<bool>(released([&] { return bricks_near(rows_of(points), reach, shape); }),
                          {size_t(shape[0]), size_t(shape[1]), size_t(shape[2])});
 }
 
-using Lines = nb::ndarray<const double, nb::shape<-1, 7>, nb::c_contig, nb::device::cpu>;
+using Lines = Rows<double, 7>;
 
 nb::object bind_squares(const Lines& lines, const Points& points, const Vector<int32_t>& of, double reach, const IjkArray& ijk,
                         const IndexArray& index) {
@@ -205,13 +176,13 @@ nb::object bind_squares(const Lines& lines, const Points& points, const Vector<i
     const volume::Layout layout = checked(ijk, index, ijk.shape(0));
     Array<float> squares(layout.count, volume::kSamples);
     std::fill_n(squares.data.get(), layout.count * volume::kSamples, float(reach * reach));
-    unlocked([&] { lower_squares(rows_of<Line>(lines), rows_of(points), span_of(of), reach, layout, squares.data.get()); });
+    released([&] { lower_squares(rows_of<Line>(lines), rows_of(points), span_of(of), reach, layout, squares.data.get()); });
     return to_numpy(std::move(squares), {layout.count, volume::kSamples});
 }
 
 nb::object bind_steps(const IjkArray& ijk, const IndexArray& index, const Samples<bool>& seeds) {
     const volume::Layout layout = checked(ijk, index, seeds.shape(0));
-    return numbers<uint8_t>(unlocked([&] { return steps_to(layout, seeds.data()); }), {layout.count, volume::kSamples});
+    return to_numpy<uint8_t>(released([&] { return steps_to(layout, seeds.data()); }), {layout.count, volume::kSamples});
 }
 
 }  // namespace

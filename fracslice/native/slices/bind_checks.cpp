@@ -9,15 +9,8 @@ namespace fracslice::slices {
 namespace {
 
 template <class T>
-using Vector = nb::ndarray<const T, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-template <class T>
 using Pixels = nb::ndarray<const T, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Edges = nb::ndarray<const int64_t, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
-
-template <class T>
-std::span<const T> span_of(const Vector<T>& values) {
-    return {values.data(), values.size()};
-}
+using Edges = Rows<int64_t, 2>;
 
 std::span<const Edge> edges_of(const Edges& edges) { return {reinterpret_cast<const Edge*>(edges.data()), edges.shape(0)}; }
 
@@ -26,34 +19,15 @@ ImageView<T> image_of(const Pixels<T>& image) {
     return {int(image.shape(0)), int(image.shape(1)), image.data()};
 }
 
-void require(bool holds, const char* what) {
-    if (!holds) throw std::invalid_argument(what);
-}
-
 void require_nodes(std::span<const int64_t> nodes, size_t count) {
     for (int64_t node : nodes) require(node >= 0 && size_t(node) < count, "a node does not exist");
 }
 
 void require_nodes(const Edges& edges, size_t count) { require_nodes({edges.data(), edges.size()}, count); }
 
-// What act() returns; other threads of Python run meanwhile.
-template <class Do>
-auto unlocked(const Do& act) {
-    nb::gil_scoped_release released;
-    return act();
-}
-
 template <class T, class From>
-nb::object numbers(const std::vector<From>& values, std::initializer_list<size_t> shape) {
-    static_assert(sizeof(From) % sizeof(T) == 0);
-    Array<T> array(values.size(), sizeof(From) / sizeof(T));
-    if (!values.empty()) std::memcpy(array.data.get(), values.data(), values.size() * sizeof(From));
-    return to_numpy(std::move(array), shape);
-}
-
-template <class T, class From>
-nb::object numbers(const Image<From>& image) {
-    return numbers<T>(image.pixels, {size_t(image.height), size_t(image.width)});
+nb::object pixels(const Image<From>& image) {
+    return to_numpy<T>(image.pixels, {size_t(image.height), size_t(image.width)});
 }
 
 // An object of fracslice.slicing.runs.Runs.
@@ -84,21 +58,21 @@ void require_like(const RunsArrays& one, const RunsArrays& other) {
 }
 
 nb::tuple arrays(const OwnedRuns& runs) {
-    return nb::make_tuple(numbers<int32_t>(runs.rows, {runs.rows.size()}), numbers<int32_t>(runs.begin, {runs.begin.size()}),
-                          numbers<int32_t>(runs.end, {runs.end.size()}));
+    return nb::make_tuple(to_numpy<int32_t>(runs.rows, {runs.rows.size()}), to_numpy<int32_t>(runs.begin, {runs.begin.size()}),
+                          to_numpy<int32_t>(runs.end, {runs.end.size()}));
 }
 
 nb::tuple bind_gaps(const nb::object& runs) {
     const RunsArrays of(runs);
-    return arrays(unlocked([&] { return gaps(of.view); }));
+    return arrays(released([&] { return gaps(of.view); }));
 }
 
 nb::tuple bind_components(const nb::object& runs, int reach) {
     const RunsArrays of(runs);
-    const RunComponents found = unlocked([&] { return components(of.view, reach); });
+    const RunComponents found = released([&] { return components(of.view, reach); });
     const size_t count = found.area.size();
-    return nb::make_tuple(numbers<int64_t>(found.label, {found.label.size()}), numbers<int64_t>(found.area, {count}),
-                          numbers<double>(found.middle, {count, 2}), numbers<bool>(found.open, {count}));
+    return nb::make_tuple(to_numpy<int64_t>(found.label, {found.label.size()}), to_numpy<int64_t>(found.area, {count}),
+                          to_numpy<double>(found.middle, {count, 2}), to_numpy<bool>(found.open, {count}));
 }
 
 nb::object bind_overlaps(const nb::object& below, const Vector<int64_t>& labels_below, const nb::object& above,
@@ -106,53 +80,53 @@ nb::object bind_overlaps(const nb::object& below, const Vector<int64_t>& labels_
     const RunsArrays a(below), b(above);
     require_like(a, b);
     require(labels_below.size() == a.view.begin.size() && labels_above.size() == b.view.begin.size(), "runs and labels differ in number");
-    const auto pairs = unlocked([&] { return overlaps(a.view, span_of(labels_below), b.view, span_of(labels_above)); });
-    return numbers<int64_t>(pairs, {pairs.size(), 2});
+    const auto pairs = released([&] { return overlaps(a.view, span_of(labels_below), b.view, span_of(labels_above)); });
+    return to_numpy<int64_t>(pairs, {pairs.size(), 2});
 }
 
 nb::tuple bind_unsupported(const nb::object& below, const nb::object& above, double reach) {
     const RunsArrays a(below), b(above);
     require_like(a, b);
-    return arrays(unlocked([&] { return unsupported(a.view, b.view, reach); }));
+    return arrays(released([&] { return unsupported(a.view, b.view, reach); }));
 }
 
 nb::object bind_count(const nb::object& runs, int times) {
     require(times >= 1, "a coarse pixel has pixels");
     const RunsArrays of(runs);
-    return numbers<int32_t>(unlocked([&] { return count_pixels(of.view, times); }));
+    return pixels<int32_t>(released([&] { return count_pixels(of.view, times); }));
 }
 
 nb::object bind_narrow(const nb::object& runs, bool gaps, int times, const std::array<int64_t, 2>& longest) {
     require(times >= 1, "a coarse pixel has pixels");
     const RunsArrays of(runs);
-    return numbers<bool>(unlocked([&] { return narrow_pixels(of.view, gaps, times, longest); }));
+    return pixels<bool>(released([&] { return narrow_pixels(of.view, gaps, times, longest); }));
 }
 
 nb::object bind_painted(const nb::object& runs, std::array<int, 2> at, std::array<int, 2> shape) {
     const RunsArrays of(runs);
-    return numbers<bool>(unlocked([&] { return painted(of.view, at[0], at[1], shape[0], shape[1]); }));
+    return pixels<bool>(released([&] { return painted(of.view, at[0], at[1], shape[0], shape[1]); }));
 }
 
 nb::object bind_distances(const Pixels<bool>& region, std::array<double, 2> pixel) {
-    return numbers<double>(unlocked([&] { return distances(image_of(region), pixel[1], pixel[0]); }));
+    return pixels<double>(released([&] { return distances(image_of(region), pixel[1], pixel[0]); }));
 }
 
 nb::object bind_dilated(const Pixels<uint8_t>& image, const Pixels<double>& cone) {
     require(cone.shape(0) == cone.shape(1) && cone.shape(0) % 2 == 1, "a cone is a square of an odd number of pixels");
-    return numbers<uint8_t>(unlocked([&] { return dilated(image_of(image), image_of(cone)); }));
+    return pixels<uint8_t>(released([&] { return dilated(image_of(image), image_of(cone)); }));
 }
 
 nb::object bind_closed(const Edges& edges, const Vector<int64_t>& later, const Vector<int64_t>& layer, const Vector<bool>& free) {
     require_nodes(edges, layer.size());
     require(later.size() == edges.shape(0) && free.size() == layer.size(), "arrays differ in length");
-    return numbers<bool>(unlocked([&] { return closed_nodes(edges_of(edges), span_of(later), span_of(layer), span_of(free)); }),
+    return to_numpy<bool>(released([&] { return closed_nodes(edges_of(edges), span_of(later), span_of(layer), span_of(free)); }),
                          {layer.size()});
 }
 
 nb::object bind_held(const Edges& edges, const Vector<int64_t>& roots, size_t count) {
     require_nodes(edges, count);
     require_nodes(span_of(roots), count);
-    return numbers<bool>(unlocked([&] { return held_nodes(edges_of(edges), span_of(roots), count); }), {count});
+    return to_numpy<bool>(released([&] { return held_nodes(edges_of(edges), span_of(roots), count); }), {count});
 }
 
 nb::tuple bind_weakest(const Vector<double>& area, const Vector<double>& firm, const Edges& edges, const Vector<int64_t>& starts,
@@ -160,7 +134,7 @@ nb::tuple bind_weakest(const Vector<double>& area, const Vector<double>& firm, c
     require(firm.size() == area.size(), "arrays differ in length");
     require_nodes(edges, area.size());
     require_nodes(span_of(starts), edges.shape(0) + 1);
-    const WeakestCut cut = unlocked([&] {
+    const WeakestCut cut = released([&] {
         return weakest_cut(span_of(area), span_of(firm), edges_of(edges), span_of(starts), foot, least);
     });
     return nb::make_tuple(cut.contact, cut.carried, cut.cut, cut.node);
@@ -168,12 +142,12 @@ nb::tuple bind_weakest(const Vector<double>& area, const Vector<double>& firm, c
 
 nb::object bind_spans(const Pixels<bool>& solid, const Pixels<bool>& held, std::array<int, 2> step) {
     require(solid.shape(0) == held.shape(0) && solid.shape(1) == held.shape(1), "pictures differ in size");
-    return numbers<float>(unlocked([&] { return spans(image_of(solid), image_of(held), step[0], step[1]); }));
+    return pixels<float>(released([&] { return spans(image_of(solid), image_of(held), step[0], step[1]); }));
 }
 
 nb::object bind_connected(const Pixels<bool>& solid, const Pixels<bool>& held) {
     require(solid.shape(0) == held.shape(0) && solid.shape(1) == held.shape(1), "pictures differ in size");
-    return numbers<bool>(unlocked([&] { return connected_to(image_of(solid), image_of(held)); }));
+    return pixels<bool>(released([&] { return connected_to(image_of(solid), image_of(held)); }));
 }
 
 }  // namespace
