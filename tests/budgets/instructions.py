@@ -50,7 +50,7 @@ def assembly(linked: Linked, bits: int, loops: Sequence[Loop] = (points,)) -> li
     machine, compiler._machine = compiler._machine, Text
     try:
         target = compiler.Target(bits, LANES[bits], REGISTERS, CPU, FEATURES)
-        text = compiler.compile_object(linked, target, loops).decode()
+        text = compiler.compile_object(linked.source, target, loops).decode()
     finally:
         compiler._machine = machine
     return [line for line in text.splitlines() if _LABEL.match(line) or re.match(r"^\t[a-z]", line)]
