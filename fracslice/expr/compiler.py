@@ -17,7 +17,7 @@ from llvmlite import ir
 
 from . import lanes_math
 from .emitter import Emitter
-from .language import CALLED, Linked, parse
+from .language import CALLED, parse
 from .loop_linker import link_loops
 from .loops import OWN, Loop, element_type, is_array
 from .values import DOUBLE, FLOAT, WHOLE, Lanes
@@ -37,11 +37,14 @@ class Target:
     features: str
 
 
-def compile_object(linked: Linked, target: Target, loops: Sequence[Loop]) -> bytes:
-    """Compile loops over a scene's field to an object file with one C function per loop."""
+def compile_object(source: str, target: Target, loops: Sequence[Loop]) -> bytes:
+    """Compile loops over a scene's field to an object file with one C function per loop.
+
+    `source`: text of the linked scene; empty for loops without a field.
+    """
     lanes_math.HOST_FEATURES = frozenset(f[1:] for f in target.features.split(",") if f.startswith("+"))
     lanes = Lanes(target.bits, target.width, target.registers)
-    text = _text(linked, lanes, llvm.get_process_triple(), loops)
+    text = _text(source, lanes, llvm.get_process_triple(), loops)
     # Stack frames are aligned to whole registers; otherwise registers spilled to the stack would straddle two
     # cache lines.
     module = llvm.parse_assembly(re.sub(r"(?m)^define .*$", r'\g<0> "stackrealign"', text))
@@ -54,12 +57,12 @@ ARCHITECTURES = {50: 15, 60: 15, 70: 15, 75: 15, 80: 15, 86: 15, 89: 16, 90: 16,
 """Compute capabilities, tenfold, that LLVM knows from a version on. Code for one runs on newer GPUs, too."""
 
 
-def compile_ptx(linked: Linked, bits: int, capability: tuple[int, int], loops: Sequence[Loop]) -> bytes:
+def compile_ptx(source: str, bits: int, capability: tuple[int, int], loops: Sequence[Loop]) -> bytes:
     """Compile loops over a scene's field to PTX with one kernel per loop.
 
-    `capability`: compute capability of the GPU.
+    `source`: see `compile_object`; `capability`: compute capability of the GPU.
     """
-    module = llvm.parse_assembly(_text(linked, Lanes(bits, 1, 1, on_gpu=True), GPU, loops))
+    module = llvm.parse_assembly(_text(source, Lanes(bits, 1, 1, on_gpu=True), GPU, loops))
     version, most = llvm.llvm_version_info[0], 10 * capability[0] + capability[1]
     chosen = max(number for number, since in ARCHITECTURES.items() if since <= version and number <= most)
     features = "+ptx60" if chosen < 70 else ""  # has the barrier of a warp
@@ -76,9 +79,9 @@ def _gpu_target() -> llvm.Target:
     return llvm.Target.from_triple(GPU)
 
 
-def _text(linked: Linked, lanes: Lanes, triple: str, loops: Sequence[Loop]) -> str:
+def _text(source: str, lanes: Lanes, triple: str, loops: Sequence[Loop]) -> str:
     """LLVM IR of the loops and of the scene's functions that they call."""
-    trees = [tree for tree in parse(linked.source).body if isinstance(tree, ast.FunctionDef)]
+    trees = [tree for tree in parse(source).body if isinstance(tree, ast.FunctionDef)]
     called = frozenset(tree.name for tree in trees if CALLED in map(ast.unparse, tree.decorator_list))
     own = link_loops(tuple(loops))
     functions = {tree.name: tree for tree in (*trees, *(linked.tree for linked in own.values()))}

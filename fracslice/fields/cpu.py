@@ -25,18 +25,18 @@ if TYPE_CHECKING:
     from .node import Node
 
 
-def object_code(linked: Linked, bits: int, width: int, loops: Sequence[Loop]) -> bytes:
-    """Return the object file of loops over a linked scene: cached, or compiled and cached.
+def object_code(source: str, bits: int, width: int, loops: Sequence[Loop]) -> bytes:
+    """Return the object file of loops over the text of a linked scene: cached, or compiled and cached.
 
     A file that other users could have written is not used.
     """
-    texts_of_all = linked.source, loop_source(loops), [loop.arguments for loop in loops]
+    texts_of_all = source, loop_source(loops), [loop.arguments for loop in loops]
     name = f"{key(*texts_of_all, bits, width, toolchain())}.o"
 
     def compiled() -> bytes:
         from ..expr.compiler import Target, compile_object
 
-        return compile_object(linked, Target(bits, width, min(REGISTERS, width), *host()), loops)
+        return compile_object(source, Target(bits, width, min(REGISTERS, width), *host()), loops)
 
     return Kept(cache_folder()).cached(name, compiled)  # incomplete code would crash the process
 
@@ -66,7 +66,7 @@ class CpuKernel(Kernel):
     def __init__(self, linked: Linked, precision: Precision = "float32") -> None:
         self.dtype = np.dtype(precision)
         self.width = lane_count(self.dtype.itemsize * 8)
-        functions = load_functions(linked, self.dtype.itemsize * 8, self.width, (points, bricks))
+        functions = load_functions(linked.source, self.dtype.itemsize * 8, self.width, (points, bricks))
         self._points, self._bricks = functions["points"], functions["bricks"]
         self._parameters = constant(linked.parameters, self.dtype, linked.held)
         self._offsets = constant(np.indices((8, 8, 8)).reshape(3, 512), self.dtype)
@@ -144,10 +144,10 @@ def compile_loops(linked: Linked, loops: tuple[Loop, ...], precision: Precision)
     parameters = constant(linked.parameters, precision, linked.held)
     bits = parameters.dtype.itemsize * 8
     width = lane_count(bits)
-    functions = load_functions(linked, bits, width, loops)
+    functions = load_functions(linked.source, bits, width, loops)
     return Loops(width, BATCH, {name: CompiledLoop(f, parameters) for name, f in functions.items()})
 
 
-def load_functions(linked: Linked, bits: int, width: int, loops: Sequence[Loop]) -> dict[str, Function]:
-    """Load or compile the functions of loops over a linked scene."""
-    return load_object(object_code(linked, bits, width, loops), loops, np.dtype(f"float{bits}"))
+def load_functions(source: str, bits: int, width: int, loops: Sequence[Loop]) -> dict[str, Function]:
+    """Load or compile the functions of loops over the text of a linked scene, or over none."""
+    return load_object(object_code(source, bits, width, loops), loops, np.dtype(f"float{bits}"))

@@ -60,10 +60,10 @@ def _word(letter: str, dtype: np.dtype, value: Any) -> bytes:
     return np.array(value, dtype).tobytes().ljust(8, b"\0")
 
 
-def load_functions(linked: Linked, precision: Precision, loops: Sequence[Loop]) -> Mapping[str, CudaFunction]:
-    """Load or compile the functions of loops over a linked scene; see `cpu.load_functions`."""
+def load_functions(source: str, precision: Precision, loops: Sequence[Loop]) -> Mapping[str, CudaFunction]:
+    """Load or compile the functions of loops; see `cpu.load_functions`."""
     require()
-    return _functions(linked.source, precision, tuple(loops))
+    return _functions(source, precision, tuple(loops))
 
 
 @lru_cache(maxsize=64)
@@ -87,7 +87,7 @@ def machine_code(source: str, precision: Precision, loops: tuple[Loop, ...]) -> 
         from ..expr.compiler import compile_ptx
 
         bits = 8 * np.dtype(precision).itemsize
-        ptx = compile_ptx(Linked(source, np.zeros(1)), bits, capability, loops)
+        ptx = compile_ptx(source, bits, capability, loops)
         return cuda_driver.assemble(ptx, REGISTERS[precision])
 
     return Kept(cache_folder()).cached(name, compiled)
@@ -111,7 +111,7 @@ class CudaKernel(Kernel):
 
     def __init__(self, linked: Linked, precision: Precision = "float32") -> None:
         self.dtype = np.dtype(precision)
-        functions = load_functions(linked, precision, (points, bricks))
+        functions = load_functions(linked.source, precision, (points, bricks))
         self._points, self._bricks = functions["points"], functions["bricks"]
         self._parameters = parameters(linked, precision)
         self._offsets = to_device(np.indices((8, 8, 8)).reshape(3, 512).astype(precision))
@@ -191,6 +191,6 @@ class CudaLoop:
 def compile_loops(linked: Linked, loops: tuple[Loop, ...], precision: Precision) -> Loops:
     """Compile loops for the GPU, with one lane; see `cpu.compile_loops`."""
     placed = parameters(linked, precision)
-    functions = load_functions(linked, precision, loops)
+    functions = load_functions(linked.source, precision, loops)
     runs = {name: CudaLoop(function, placed) for name, function in functions.items()}
     return Loops(1, LANES, runs, on_gpu=True)

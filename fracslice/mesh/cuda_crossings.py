@@ -9,7 +9,6 @@ import numpy as np
 
 from .._native import Cells
 from ..expr.cuda_driver import device_array, pinned_array, require, to_device
-from ..expr.language import Linked
 from ..fields.cuda import CudaFunction, CudaLoop, load_functions
 from .root_loops import collect, lay, start
 from .roots import SURE, Roots
@@ -52,13 +51,12 @@ class CudaSearch:
     ) -> None:
         require()
         self._cells, self._placement = cells, (*origin, voxel)
-        nothing = Linked("", np.zeros(1))
-        self._lay = load_functions(nothing, "float64", (lay,))["lay"]
+        self._lay = load_functions("", "float64", (lay,))["lay"]
         self._edges = device_array((MOST_EDGES, 4), np.int16)
         self._fast, self._exact = (
             Find(
                 *self._loop(roots, "find"), Table(6, roots.dtype), self._row(roots.dtype),
-                **load_functions(nothing, roots.precision, (start, collect)),
+                **load_functions("", roots.precision, (start, collect)),
             )
             for roots in (fast, exact)
         )  # fmt: skip

@@ -15,7 +15,6 @@ from numpy.lib.npyio import NpzFile
 
 from ..errors import RenderError
 from ..expr.host import lane_count
-from ..expr.language import Linked
 from ..expr.loops import WIDTH, load, loop, store
 from ..expr.machine import Function
 from ..expr.vocabulary import maximum, where
@@ -43,7 +42,7 @@ from .units.pixel import UNKNOWN, squared_error
 def _loops(dtype: np.dtype) -> dict[str, Function]:
     """Compiled loops of a float type."""
     bits = dtype.itemsize * 8
-    return load_functions(Linked("", np.zeros(1)), bits, lane_count(bits), LOOPS)
+    return load_functions("", bits, lane_count(bits), LOOPS)
 
 
 @dataclass(eq=False)

@@ -18,7 +18,6 @@ from fracslice.expr.machine import Function
 from fracslice.fields import cpu as lanes
 from fracslice.fields import cuda
 from fracslice.fields.field import Precision
-from fracslice.fields.linker import Linked
 
 H200 = (9, 0)
 
@@ -136,7 +135,7 @@ def runs_on_cpu(patch: pytest.MonkeyPatch) -> Iterator[HostDriver]:
 
     def functions(source: str, precision: Precision, loops: tuple[Loop, ...]) -> Mapping[str, Threads]:
         real = np.dtype(precision)
-        made = lanes.load_functions(Linked(source, np.zeros(1)), 8 * real.itemsize, 1, loops)
+        made = lanes.load_functions(source, 8 * real.itemsize, 1, loops)
         return {loop.name: Threads(made[loop.name], loop, real) for loop in loops}
 
     for host in driven(patch):

@@ -147,7 +147,7 @@ SCALED = replace(scaled, own=1)
 class TestLaunches:
     def function(self, source: str = "", precision: Precision = "float32") -> cuda.CudaFunction:
         cuda._functions.cache_clear()  # as in another process
-        return cuda.load_functions(Linked(source, np.zeros(1)), precision, (SCALED,))["scaled"]
+        return cuda.load_functions(source, precision, (SCALED,))["scaled"]
 
     def test_give_all_parameters_but_what_a_thread_has_to_itself(self, host: HostDriver) -> None:
         array = cuda_driver.device_array(300, np.float32)

@@ -16,7 +16,6 @@ from fracslice.errors import KernelError
 from fracslice.expr import loop_linker
 from fracslice.expr import loops as intrinsics
 from fracslice.expr.host import lane_count
-from fracslice.expr.language import Linked
 from fracslice.expr.loop_linker import loop_source
 from fracslice.expr.loops import Loop, load, loop, store
 from fracslice.fields.cpu import load_functions
@@ -27,7 +26,6 @@ from fracslice.mesh import roots
 from fracslice.rendering import packets
 
 STEP = 3
-NOTHING = Linked("", np.zeros(1))
 
 
 class Place(IntEnum):
@@ -121,7 +119,7 @@ def test_packets_followed_by_python_are_those_of_the_machine_code(monkeypatch: p
     rows[packets.Row.dz] = np.where(np.arange(m) % 7 == 3, 1.0, -1.0)
     rows[packets.Row.end] = np.where(np.arange(m) % 5 == 1, -1.0, 9.0)
     follow = Loop(packets.follow, "rrinnnr").fix(step=to_the_floor)
-    compiled = load_functions(NOTHING, 64, width, [follow])["follow"]
+    compiled = load_functions("", 64, width, [follow])["follow"]
     for module in (intrinsics, packets):
         monkeypatch.setattr(module, "WIDTH", width)
     result = []

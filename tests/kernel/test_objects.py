@@ -16,7 +16,6 @@ import pytest
 from fracslice.errors import FracsliceWarning
 from fracslice.expr import compiler
 from fracslice.expr.host import toolchain
-from fracslice.expr.language import Linked
 from fracslice.expr.loops import Loop, points
 from fracslice.fields.cpu import object_code
 from fracslice.fields.linker import link
@@ -36,7 +35,7 @@ def compiled(monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
     """What was compiled: a stand-in for machine code, another one each time."""
     made: list[bytes] = []
 
-    def compile_object(linked: Linked, target: compiler.Target, loops: Sequence[Loop]) -> bytes:
+    def compile_object(source: str, target: compiler.Target, loops: Sequence[Loop]) -> bytes:
         made.append(b"code %d" % len(made))
         return made[-1]
 
@@ -44,8 +43,8 @@ def compiled(monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
     return made
 
 
-def code(linked: Linked = LINKED, bits: int = 32, loops: Sequence[Loop] = (points,)) -> bytes:
-    return object_code(linked, bits, 16, loops)
+def code(source: str = LINKED.source, bits: int = 32, loops: Sequence[Loop] = (points,)) -> bytes:
+    return object_code(source, bits, 16, loops)
 
 
 def test_it_is_compiled_once_for_this_user_alone(folder: Path, compiled: list[bytes]) -> None:
@@ -62,7 +61,7 @@ def test_it_is_known_by_all_that_it_was_made_of(
     code()
     code(bits=64)
     code(loops=[replace(points, arguments="rrrrin")])
-    code(Linked(LINKED.source + "#", LINKED.parameters))
+    code(LINKED.source + "#")
     monkeypatch.setattr("llvmlite.__version__", "another")
     toolchain.cache_clear()
     code()

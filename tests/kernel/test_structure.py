@@ -55,7 +55,9 @@ def instructions(root: Node) -> int:
     """Of LLVM's, in the kernel."""
     target = compiler.Target(32, 32, REGISTERS, *host())
     lanes = Lanes(target.bits, target.width, target.registers)
-    module = llvm.parse_assembly(compiler._text(link(root), lanes, llvm.get_process_triple(), [points]))
+    module = llvm.parse_assembly(
+        compiler._text(link(root).source, lanes, llvm.get_process_triple(), [points])
+    )
     compiler._optimise(module, compiler._target_machine(target))
     return sum(1 for f in module.functions for b in f.blocks for _ in b.instructions)
 

@@ -12,19 +12,12 @@ from fracslice import _slices
 from fracslice.slicing.runs import Runs, layer_components, overlaps
 from fracslice.slicing.thickness import _largest_near
 
+from .test_checks import runs_of
+
 pytestmark = pytest.mark.once
 
 RNG = np.random.default_rng(7)
 EIGHT = np.ones((3, 3))
-
-
-def runs_of(image: np.ndarray) -> Runs:
-    """The pixels of an image that are not 0."""
-    turns = np.diff(image.astype(bool), axis=1, prepend=False, append=False)
-    rows, columns = np.nonzero(turns)
-    ends = np.searchsorted(rows[::2], np.arange(len(image) + 1)).astype(np.int32)
-    begin, end = (np.ascontiguousarray(columns[k::2], np.int32) for k in (0, 1))
-    return Runs(ends, begin, end, image.shape[1])
 
 
 def image_of(runs: Runs) -> np.ndarray:
