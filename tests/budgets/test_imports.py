@@ -26,7 +26,15 @@ JOBS = {
     "check": ("check", "plate.stl"),
 }
 UNUSED = {
-    "help": ("numpy", "llvmlite", "concurrent", "json", "fracslice.scene", "fracslice.fields"),
+    "help": (
+        "numpy",
+        "llvmlite",
+        "concurrent",
+        "json",
+        "fracslice.scene",
+        "fracslice.fields",
+        "fracslice.expr",
+    ),
     "mesh": (
         "scipy",
         "email",
