@@ -97,7 +97,7 @@ class Affine(NamedTuple):
 
 @dataclass
 class SvgElement:
-    """SvgElement of an SVG file."""
+    """Element of an SVG file: its attributes, its line, and the elements and the text inside."""
 
     name: str
     given: dict[str, str]
@@ -392,10 +392,8 @@ class _PathReader:
     def __init__(self, element: SvgElement) -> None:
         self.element, self.rings = element, list[tuple[complex, list[Curve]]]()
         self.at = self.start = 0j
-        self.control: tuple[str, complex] = (
-            "",
-            0j,
-        )  # last control point, and whether of cubics or quadratics
+        # Last control point, after the letter of its curve: C, Q, or none.
+        self.control: tuple[str, complex] = ("", 0j)
         self.curves: list[Curve] | None = None  # of the ring that is open
         text = element.given.get("d", "")
         if rest := text[: text.find(first[0]) if (first := _COMMAND.search(text)) else None].strip():

@@ -164,8 +164,6 @@ def standing(made: Plan, how: Print, scale: float, work: Work) -> Plan:
     return replace(made, root=root, box=extents, outer=outer)
 
 
-# Measuring needs SciPy, whose import takes as long as a small mesh: import where needed.
-
 REPEATS = 4
 """Maximum number of times that fragments are joined."""
 
