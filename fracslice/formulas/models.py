@@ -20,7 +20,7 @@ def identify_file(formula: Formula, name: str, known: Collection[str], what: str
     """
 
     @formula.completed
-    def identified(values: dict[str, Any]) -> dict[str, Any]:
+    def file_completed(values: dict[str, Any]) -> dict[str, Any]:
         from ..mesh.models import identify
 
         try:
