@@ -4,7 +4,6 @@ assembles. Imported only if the kernel is not cached.
 
 from __future__ import annotations
 
-import ast
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,13 +16,10 @@ from llvmlite import ir
 
 from . import lanes_math
 from .emitter import Emitter
-from .language import CALLED, parse
-from .loop_linker import link_loops
+from .frontend import loop_function
+from .graph import Program
 from .loops import OWN, Loop, element_type, is_array
 from .values import DOUBLE, FLOAT, WHOLE, Lanes
-
-PART = ["x", "y", "z", "P", "P0"]
-"""Arguments of a part's function."""
 
 
 @dataclass(frozen=True)
@@ -37,14 +33,14 @@ class Target:
     features: str
 
 
-def compile_object(source: str, target: Target, loops: Sequence[Loop]) -> bytes:
+def compile_object(program: Program, target: Target, loops: Sequence[Loop]) -> bytes:
     """Compile loops over a scene's field to an object file with one C function per loop.
 
-    `source`: text of the linked scene; empty for loops without a field.
+    `program`: linked scene; an empty one for loops without a field.
     """
     lanes_math.HOST_FEATURES = frozenset(f[1:] for f in target.features.split(",") if f.startswith("+"))
     lanes = Lanes(target.bits, target.width, target.registers)
-    text = _text(source, lanes, llvm.get_process_triple(), loops)
+    text = _text(program, lanes, llvm.get_process_triple(), loops)
     # Stack frames are aligned to whole registers; otherwise registers spilled to the stack would straddle two
     # cache lines.
     module = llvm.parse_assembly(re.sub(r"(?m)^define .*$", r'\g<0> "stackrealign"', text))
@@ -57,12 +53,12 @@ ARCHITECTURES = {50: 15, 60: 15, 70: 15, 75: 15, 80: 15, 86: 15, 89: 16, 90: 16,
 """Compute capabilities, tenfold, that LLVM knows from a version on. Code for one runs on newer GPUs, too."""
 
 
-def compile_ptx(source: str, bits: int, capability: tuple[int, int], loops: Sequence[Loop]) -> bytes:
+def compile_ptx(program: Program, bits: int, capability: tuple[int, int], loops: Sequence[Loop]) -> bytes:
     """Compile loops over a scene's field to PTX with one kernel per loop.
 
-    `source`: see `compile_object`; `capability`: compute capability of the GPU.
+    `program`: see `compile_object`; `capability`: compute capability of the GPU.
     """
-    module = llvm.parse_assembly(_text(source, Lanes(bits, 1, 1, on_gpu=True), GPU, loops))
+    module = llvm.parse_assembly(_text(program, Lanes(bits, 1, 1, on_gpu=True), GPU, loops))
     version, most = llvm.llvm_version_info[0], 10 * capability[0] + capability[1]
     chosen = max(number for number, since in ARCHITECTURES.items() if since <= version and number <= most)
     features = "+ptx60" if chosen < 70 else ""  # has the barrier of a warp
@@ -79,20 +75,16 @@ def _gpu_target() -> llvm.Target:
     return llvm.Target.from_triple(GPU)
 
 
-def _text(source: str, lanes: Lanes, triple: str, loops: Sequence[Loop]) -> str:
+def _text(program: Program, lanes: Lanes, triple: str, loops: Sequence[Loop]) -> str:
     """LLVM IR of the loops and of the scene's functions that they call."""
-    trees = [tree for tree in parse(source).body if isinstance(tree, ast.FunctionDef)]
-    called = frozenset(tree.name for tree in trees if CALLED in map(ast.unparse, tree.decorator_list))
-    own = link_loops(tuple(loops))
-    functions = {tree.name: tree for tree in (*trees, *(linked.tree for linked in own.values()))}
-    emitter = Emitter(lanes, functions, called, {name: linked.file for name, linked in own.items()})
-    for tree in trees:  # innermost elements first, so that the recursion is not as deep as the scene
-        if [a.arg for a in tree.args.args] == PART:
-            for points in sorted({loop.points for loop in loops}):
-                emitter.function(tree.name, (points, points, points, lanes.scalar.as_pointer(), WHOLE))
+    emitter = Emitter(lanes, program.functions, program.called)
+    for part in program.parts:  # innermost elements first, so that the recursion is not as deep as the scene
+        for points in sorted({loop.points for loop in loops}):
+            emitter.function(part, (points, points, points, lanes.scalar.as_pointer(), WHOLE))
     for loop in loops:
         own_arrays = {k: loop.own for k, letter in enumerate(loop.arguments) if letter in OWN}
-        emitter.entry(loop.name, tuple(_kind(letter, lanes) for letter in loop.arguments), own_arrays)
+        kinds = tuple(_kind(letter, lanes) for letter in loop.arguments)
+        emitter.entry(loop_function(loop), kinds, own_arrays)
     emitter.module.triple = triple
     return str(emitter.module)
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import builtins
+import linecache
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
+from enum import Enum
 from functools import lru_cache
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
@@ -60,6 +62,73 @@ def _mark(value: Any, attributes: tuple[str, ...] = ()) -> Hashable:
     if isinstance(value, ModuleType):
         return value, tuple(_mark(vars(value).get(name)) for name in attributes)
     return type(value), repr(value) if isinstance(value, (int, float, tuple)) else None
+
+
+def identity(*values: Any) -> str:
+    """Describe functions, the functions that they call, and all values that these use from outside."""
+    described = _Described()
+    for value in sorted(values, key=lambda value: not isinstance(value, FunctionType)):
+        described.add(value, tuple(sorted(described.names)))
+    return "\n".join(described.lines)
+
+
+class _Described:
+    """Lines on values and on everything that they refer to, each once."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.seen: dict[tuple[int, tuple[str, ...]], Any] = {}
+        self.names = set[str]()
+        """Names that the functions so far use: their arguments are used by these."""
+
+    def add(self, value: Any, names: tuple[str, ...]) -> None:
+        """Add a value; of a module, class or record the attributes with some names."""
+        if value is None or isinstance(value, (bool, int, float, str, Enum)):
+            self.lines.append(repr(value))
+            return
+        self.lines.append(_label(value))
+        if isinstance(value, FunctionType):
+            names = outer_names(value.__code__)
+        if (id(value), names) in self.seen:
+            return
+        self.seen[id(value), names] = value
+        if isinstance(value, FunctionType):
+            self.names.update(names)
+            self.lines += _source(value.__code__)
+            outside = scope(value)
+            self.named({name: outside[name] for name in names if name in outside}, names)
+        elif type(value) is tuple:
+            for item in value:
+                self.add(item, names)
+        elif isinstance(value, (ModuleType, type, tuple)) or is_dataclass(value):
+            self.named({name: getattr(value, name) for name in names if hasattr(value, name)}, names)
+
+    def named(self, values: dict[str, Any], names: tuple[str, ...]) -> None:
+        """Add values with their names."""
+        for name, value in values.items():
+            self.lines.append(name)
+            self.add(value, names)
+
+
+def _label(value: Any) -> str:
+    """Kind and name of a value, without its address."""
+    name = getattr(value, "__qualname__", getattr(value, "__name__", ""))
+    return f"{type(value).__qualname__} {getattr(value, '__module__', '')}.{name}"
+
+
+def _source(code: CodeType) -> list[str]:
+    """Lines of a function; its instructions if it has none."""
+    linecache.checkcache(code.co_filename)
+    lines, first = linecache.getlines(code.co_filename), code.co_firstlineno
+    if not lines:
+        return [code.co_code.hex(), repr(code.co_consts), repr(code.co_names), repr(code.co_varnames)]
+    return [line.rstrip() for line in lines[first - 1 : _last_line(code)]]
+
+
+def _last_line(code: CodeType) -> int:
+    """Last line of a function with an instruction."""
+    inner = [_last_line(c) for c in code.co_consts if isinstance(c, CodeType)]
+    return max([code.co_firstlineno, *(line for *_, line in code.co_lines() if line), *inner])
 
 
 EVALUATED: set[Callable[..., Any]] = set()

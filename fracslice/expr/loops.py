@@ -106,6 +106,9 @@ def field(x: Any, y: Any, z: Any, P: Any) -> Any:
     return P(x, y, z)
 
 
+OPERATIONS = frozenset(("load", "store", "around", "lower", "upper", "gather", "together"))
+"""Intrinsics that are operations of a graph; the others are functions of the scene."""
+
 _ELEMENTS = {
     "i": "int32",
     "v": "int32",

@@ -13,7 +13,6 @@ its condition may be branched on.
 
 from __future__ import annotations
 
-import ast
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
@@ -22,14 +21,11 @@ import numpy as np
 from llvmlite import ir
 
 from . import lanes_math, thread_math
+from .graph import MismatchError
 from .intervals import TINY, Interval, Numbers, Possible
 from .registers import Vec, splat, vector
 
 BOOL, WHOLE, FLOAT, DOUBLE = ir.IntType(1), ir.IntType(64), ir.FloatType(), ir.DoubleType()
-
-
-class MismatchError(Exception):
-    """Incompatible values; the message names them."""
 
 
 def only_lane(value: Any) -> Any:
@@ -91,52 +87,48 @@ def truth(builder: ir.IRBuilder, value: Any) -> Any:
     return builder.fcmp_unordered("!=", value, zero)
 
 
-_COMPARISONS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
+_COMPARISONS = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="}
 _WHOLE = {
-    ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.BitAnd: "and_", ast.BitOr: "or_", ast.BitXor: "xor",
-    ast.LShift: "shl", ast.RShift: "ashr",
+    "add": "add", "sub": "sub", "mul": "mul", "and_": "and_", "or_": "or_", "xor": "xor", "lshift": "shl",
+    "rshift": "ashr",
 }  # fmt: skip
-_REAL = {ast.Add: "fadd", ast.Sub: "fsub", ast.Mult: "fmul", ast.Div: "fdiv"}
+_REAL = {"add": "fadd", "sub": "fsub", "mul": "fmul", "truediv": "fdiv"}
 
 
-def operate(builder: ir.IRBuilder, op: ast.operator, a: Any, b: Any) -> Any:
-    """Emit arithmetic on two scalars."""
-    if isinstance(op, (ast.BitAnd, ast.BitOr, ast.BitXor)) and a.type == b.type == BOOL:
-        return getattr(builder, _WHOLE[type(op)])(a, b)
+def operate(builder: ir.IRBuilder, op: str, a: Any, b: Any) -> Any:
+    """Emit arithmetic or a comparison of two scalars.
+
+    `op`: name in Python's `operator`.
+    """
+    if op in ("and_", "or_", "xor") and a.type == b.type == BOOL:
+        return getattr(builder, _WHOLE[op])(a, b)
     kind = common(a.type, b.type)
-    if isinstance(op, ast.Div) and kind == WHOLE:
+    if op == "truediv" and isinstance(kind, ir.IntType):
         kind = DOUBLE
     a, b = number(builder, a, kind), number(builder, b, kind)
-    if kind == WHOLE and isinstance(op, (ast.FloorDiv, ast.Mod)):
+    is_whole = isinstance(kind, ir.IntType)
+    if op in _COMPARISONS:
+        how = _COMPARISONS[op]
+        if is_whole:
+            return builder.icmp_signed(how, a, b)
+        return (builder.fcmp_unordered if how == "!=" else builder.fcmp_ordered)(how, a, b)
+    if is_whole and op in ("floordiv", "mod"):
         return _floor_division(builder, op, a, b)
-    name = (_WHOLE if kind == WHOLE else _REAL).get(type(op))
+    name = (_WHOLE if is_whole else _REAL).get(op)
     if name is None:
         raise MismatchError("this is for whole numbers only")
     return getattr(builder, name)(a, b)
 
 
-def _floor_division(builder: ir.IRBuilder, op: ast.operator, a: Any, b: Any) -> Any:
+def _floor_division(builder: ir.IRBuilder, op: str, a: Any, b: Any) -> Any:
     """Python's floored quotient, or remainder with the sign of b."""
     rest = builder.srem(a, b)
     zero = ir.Constant(WHOLE, 0)
     other = builder.icmp_signed("<", builder.xor(rest, b), zero)
     over = builder.and_(builder.icmp_signed("!=", rest, zero), other)
-    if isinstance(op, ast.Mod):
+    if op == "mod":
         return builder.select(over, builder.add(rest, b), rest)
     return builder.sub(builder.sdiv(a, b), builder.zext(over, WHOLE))
-
-
-def compare(builder: ir.IRBuilder, op: ast.cmpop, a: Any, b: Any) -> Any:
-    """Emit a comparison of two scalars.
-
-    `op`: operator; `a`, `b`: scalars.
-    """
-    kind = common(a.type, b.type)
-    a, b = number(builder, a, kind), number(builder, b, kind)
-    how = _COMPARISONS[type(op)]
-    if kind == WHOLE:
-        return builder.icmp_signed(how, a, b)
-    return (builder.fcmp_unordered if how == "!=" else builder.fcmp_ordered)(how, a, b)
 
 
 Value = Any

@@ -166,4 +166,5 @@ OF_CELLS = frozenset(("cell_middle", "cell_extent"))
 """Functions that only code of the kernel calls."""
 OF_FILES = frozenset(("solid_distance", "outline_distance"))
 """Functions that only the formulas of models and outlines call: a point, and what lies in memory."""
+ALL = NAMES | OF_CELLS | OF_FILES
 __all__ = sorted(NAMES)

@@ -13,30 +13,30 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..common.cache import Kept, cache_folder, key
+from ..expr.frontend import loop_function
+from ..expr.graph import Program
 from ..expr.host import REGISTERS, host, lane_count, toolchain
-from ..expr.language import Linked
-from ..expr.loop_linker import loop_source
 from ..expr.loops import Loop, bricks, points
 from ..expr.machine import Function, constant, load_object
 from .field import Kernel, Loops, Precision
-from .linker import link
+from .linker import Linked, link
 
 if TYPE_CHECKING:
     from .node import Node
 
 
-def object_code(source: str, bits: int, width: int, loops: Sequence[Loop]) -> bytes:
-    """Return the object file of loops over the text of a linked scene: cached, or compiled and cached.
+def object_code(program: Program, bits: int, width: int, loops: Sequence[Loop]) -> bytes:
+    """Return the object file of loops over the program of a scene: cached, or compiled and cached.
 
     A file that other users could have written is not used.
     """
-    texts_of_all = source, loop_source(loops), [loop.arguments for loop in loops]
-    name = f"{key(*texts_of_all, bits, width, toolchain())}.o"
+    about = program.identity, [(loop_function(loop).identity, loop.arguments) for loop in loops]
+    name = f"{key(*about, bits, width, toolchain())}.o"
 
     def compiled() -> bytes:
         from ..expr.compiler import Target, compile_object
 
-        return compile_object(source, Target(bits, width, min(REGISTERS, width), *host()), loops)
+        return compile_object(program, Target(bits, width, min(REGISTERS, width), *host()), loops)
 
     return Kept(cache_folder()).cached(name, compiled)  # incomplete code would crash the process
 
@@ -66,7 +66,7 @@ class CpuKernel(Kernel):
     def __init__(self, linked: Linked, precision: Precision = "float32") -> None:
         self.dtype = np.dtype(precision)
         self.width = lane_count(self.dtype.itemsize * 8)
-        functions = load_functions(linked.source, self.dtype.itemsize * 8, self.width, (points, bricks))
+        functions = load_functions(linked.program, self.dtype.itemsize * 8, self.width, (points, bricks))
         self._points, self._bricks = functions["points"], functions["bricks"]
         self._parameters = constant(linked.parameters, self.dtype, linked.held)
         self._offsets = constant(np.indices((8, 8, 8)).reshape(3, 512), self.dtype)
@@ -144,10 +144,10 @@ def compile_loops(linked: Linked, loops: tuple[Loop, ...], precision: Precision)
     parameters = constant(linked.parameters, precision, linked.held)
     bits = parameters.dtype.itemsize * 8
     width = lane_count(bits)
-    functions = load_functions(linked.source, bits, width, loops)
+    functions = load_functions(linked.program, bits, width, loops)
     return Loops(width, BATCH, {name: CompiledLoop(f, parameters) for name, f in functions.items()})
 
 
-def load_functions(source: str, bits: int, width: int, loops: Sequence[Loop]) -> dict[str, Function]:
-    """Load or compile the functions of loops over the text of a linked scene, or over none."""
-    return load_object(object_code(source, bits, width, loops), loops, np.dtype(f"float{bits}"))
+def load_functions(program: Program, bits: int, width: int, loops: Sequence[Loop]) -> dict[str, Function]:
+    """Load or compile the functions of loops over the program of a scene, or over none."""
+    return load_object(object_code(program, bits, width, loops), loops, np.dtype(f"float{bits}"))

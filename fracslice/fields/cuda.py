@@ -18,12 +18,12 @@ import numpy as np
 from ..common.cache import Kept, cache_folder, key
 from ..expr import cuda_driver
 from ..expr.cuda_driver import DeviceArray, address, device_array, require, to_device
+from ..expr.frontend import loop_function
+from ..expr.graph import Program
 from ..expr.host import toolchain
-from ..expr.language import Linked
-from ..expr.loop_linker import loop_source
 from ..expr.loops import OWN, Loop, bricks, element_type, is_array, points
 from .field import Kernel, Loops, Precision
-from .linker import link
+from .linker import Linked, link
 
 if TYPE_CHECKING:
     from .node import Node
@@ -60,15 +60,17 @@ def _word(letter: str, dtype: np.dtype, value: Any) -> bytes:
     return np.array(value, dtype).tobytes().ljust(8, b"\0")
 
 
-def load_functions(source: str, precision: Precision, loops: Sequence[Loop]) -> Mapping[str, CudaFunction]:
+def load_functions(
+    program: Program, precision: Precision, loops: Sequence[Loop]
+) -> Mapping[str, CudaFunction]:
     """Load or compile the functions of loops; see `cpu.load_functions`."""
     require()
-    return _functions(source, precision, tuple(loops))
+    return _functions(program, precision, tuple(loops))
 
 
 @lru_cache(maxsize=64)
-def _functions(source: str, precision: Precision, loops: tuple[Loop, ...]) -> Mapping[str, CudaFunction]:
-    code = machine_code(source, precision, loops)
+def _functions(program: Program, precision: Precision, loops: tuple[Loop, ...]) -> Mapping[str, CudaFunction]:
+    code = machine_code(program, precision, loops)
     loaded = cuda_driver.load_code(code, [loop.name for loop in loops])
     real, functions = np.dtype(precision), {}
     for loop, function in zip(loops, loaded, strict=True):
@@ -77,17 +79,17 @@ def _functions(source: str, precision: Precision, loops: tuple[Loop, ...]) -> Ma
     return functions
 
 
-def machine_code(source: str, precision: Precision, loops: tuple[Loop, ...]) -> bytes:
+def machine_code(program: Program, precision: Precision, loops: tuple[Loop, ...]) -> bytes:
     """Return the machine code of loops: cached, or compiled and cached; see `cpu.object_code`."""
     capability = cuda_driver.capability()
-    texts_of_all = source, loop_source(loops), [(loop.arguments, loop.own) for loop in loops]
-    name = f"{key(*texts_of_all, precision, capability, toolchain())}.cubin"
+    about = program.identity, [(loop_function(one).identity, one.arguments, one.own) for one in loops]
+    name = f"{key(*about, precision, capability, toolchain())}.cubin"
 
     def compiled() -> bytes:
         from ..expr.compiler import compile_ptx
 
         bits = 8 * np.dtype(precision).itemsize
-        ptx = compile_ptx(source, bits, capability, loops)
+        ptx = compile_ptx(program, bits, capability, loops)
         return cuda_driver.assemble(ptx, REGISTERS[precision])
 
     return Kept(cache_folder()).cached(name, compiled)
@@ -111,7 +113,7 @@ class CudaKernel(Kernel):
 
     def __init__(self, linked: Linked, precision: Precision = "float32") -> None:
         self.dtype = np.dtype(precision)
-        functions = load_functions(linked.source, precision, (points, bricks))
+        functions = load_functions(linked.program, precision, (points, bricks))
         self._points, self._bricks = functions["points"], functions["bricks"]
         self._parameters = parameters(linked, precision)
         self._offsets = to_device(np.indices((8, 8, 8)).reshape(3, 512).astype(precision))
@@ -191,6 +193,6 @@ class CudaLoop:
 def compile_loops(linked: Linked, loops: tuple[Loop, ...], precision: Precision) -> Loops:
     """Compile loops for the GPU, with one lane; see `cpu.compile_loops`."""
     placed = parameters(linked, precision)
-    functions = load_functions(linked.source, precision, loops)
+    functions = load_functions(linked.program, precision, loops)
     runs = {name: CudaLoop(function, placed) for name, function in functions.items()}
     return Loops(1, LANES, runs, on_gpu=True)

@@ -1,4 +1,4 @@
-"""Expression graphs of scenes: the linked text executed on symbols, with all loops unrolled.
+"""Operations of a scene without loops: its program evaluated on symbols.
 
 A loop over an orbit has as many steps as its depth. Points that have escaped go on, as in arrays, and do not
 change the value.
@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from ..errors import KernelError
-from ..expr.language import CALLED, FIELD
-from .linker import link
+from ..expr.graph import Evaluator
+from .linker import FIELD, link
 
 if TYPE_CHECKING:
     from .node import Node
@@ -53,14 +53,15 @@ def graph(
         if node.formula.name == "model":
             raise node.fail("is made of triangles: expected formulas alone, or a mesh of them")
     linked, made = link(root), _Graph()
-    scope: dict[str, Any] = {name: made.function(name) for name in FUNCTIONS}
-    scope |= {"where": made.where, "any_of": made.any_of, CALLED: lambda function: function}
-    scope |= {"rsqrt": lambda a: 1.0 / made.call("sqrt", a), "ratio": lambda a, b: a / b}
-    exec(compile(linked.source, "<linked scene>", "exec"), scope)
+    operations: dict[str, Any] = {name: made.function(name) for name in FUNCTIONS}
+    operations |= {"where": made.where, "any_of": made.any_of}
+    operations |= {"rsqrt": lambda a: 1.0 / made.call("sqrt", a), "ratio": lambda a, b: a / b}
     inputs = [_Symbol(made, made.add(Operation(name))) for name in INPUTS]
     points = [(p - o) * (1.0 / scale) for p, o in zip(inputs, offset, strict=True)]
+    named = linked.program.functions
     try:
-        value = scope[FIELD](*points, linked.parameters.tolist()) * (scale / root.bounds.lipschitz)
+        value = Evaluator(operations, named)(named[FIELD], *points, linked.parameters.tolist())
+        value = value * (scale / root.bounds.lipschitz)
     except (ArithmeticError, ValueError) as error:
         raise KernelError(f"the formulas have a constant that is not finite: {error}") from None
     return made.needed(made.index(value))

@@ -1,14 +1,13 @@
-"""Linking of a scene to a self-contained Python module: its functions, one for all parts of the same
-structure.
+"""Linking of a scene to one program: its functions, one for all parts of the same structure.
 
 Parts of a scene that differ in numbers only share one function, ``N0(x, y, z, P, P0)``. Their numbers lie in
 the parameter array P from offset P0, followed by those of their child elements. A union of a hundred spheres
-is thus one sphere and a loop, and scenes that differ in numbers only have the same text: editing a value
+is thus one sphere and a loop, and scenes that differ in numbers only have the same program: editing a value
 compiles nothing.
 
-Shapes and CSG operators are called with their arguments read from P. `Fixed` arguments are substituted in a
-copy of the function, where dead branches are dropped and loops over fixed tuples are unrolled. A domain
-operator's copy calls its child by name. Identities are omitted.
+Shapes and CSG operators are called with their arguments read from P. `Fixed` arguments are known when the
+function is read, so that dead branches are dropped and loops over fixed tuples are unrolled. A domain operator
+is read with its child in the place of ``child``. Identities are omitted.
 """
 
 from __future__ import annotations
@@ -16,6 +15,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import groupby
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -24,10 +24,10 @@ import numpy as np
 from ..common.parameters import AUTO
 from ..errors import KernelError
 from ..expr import functions
-from ..expr.functions import Fixed, InMemory
-from ..expr.language import CALLED, CHILD, FIELD, Linked, parse, parse_expression
-from . import source
-from .source import Arguments, append_numbers, arguments
+from ..expr.frontend import FormulaReader, Source, formula, text_function
+from ..expr.functions import Fixed, InMemory, words
+from ..expr.graph import Function, Graph, Program, Value, Width, Writer, identified, written
+from ..expr.language import CHILD
 
 if TYPE_CHECKING:
     from .node import Node
@@ -40,12 +40,118 @@ function, and the compile time of a large one grows with the number of its parts
 UNROLLED = 3
 """Elements of one structure that are unrolled; more become a loop."""
 
+PART = ("x", "y", "z", "P", "P0")
+"""Arguments of a part's function."""
+
+POINT = ("x", "y", "z")
+
+FIELD = "field"
+"""Name of the field's function."""
+
+
+@dataclass(frozen=True, eq=False)
+class Linked:
+    """Linked scene; equal if functions and numbers are.
+
+    Attributes
+    ----------
+    program
+        Functions, with the signed field ``field(x, y, z, P)``.
+    parameters
+        Parameters P, float64 [n].
+    held
+        Arguments in memory, each with the index in P of its first word.
+    """
+
+    program: Program
+    parameters: np.ndarray
+    held: tuple[tuple[int, InMemory], ...] = ()
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Linked) and self._contents == other._contents
+
+    def __hash__(self) -> int:
+        return hash(self._contents)
+
+    @cached_property
+    def _contents(self) -> tuple[str, bytes]:
+        return self.program.identity, self.parameters.tobytes()
+
+
+Passed = Any
+"""Where an argument lies in P, from its beginning: an index, of an integer in a list, or a tuple of these."""
+
+
+def load(writer: Writer, passed: Passed, origin: Value | None = None) -> Value:
+    """Write the value of an argument.
+
+    `origin`: P0; without it, P begins at 0.
+    """
+    if isinstance(passed, tuple):
+        return writer.add("tuple", *(load(writer, part, origin) for part in passed))
+    place = passed[0] if isinstance(passed, list) else passed
+    index = writer.constant(place) if origin is None else writer.add("add", origin, place)
+    value = writer.add("element", writer.names["P"], index)
+    return writer.add("int", value) if isinstance(passed, list) else value
+
+
+def append_numbers(value: Any, numbers: list[float]) -> Passed:
+    """Append a number or a tuple of numbers to a list; of an argument in memory its hash."""
+    if isinstance(value, InMemory):
+        value = words(value.digest)
+    if isinstance(value, tuple):
+        return tuple(append_numbers(part, numbers) for part in value)
+    numbers.append(float(value))
+    place = len(numbers) - 1
+    return [place] if isinstance(value, int) else place
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """Function of a node and its arguments."""
+
+    function: Callable[..., Any]  # function of the formula
+    fixed: tuple[tuple[str, Any], ...]  # arguments that are known when the function is read
+    passed: tuple[Passed, ...]  # places of the other arguments, in the function's order
+    numbers: tuple[float, ...]  # numbers in P
+    held: tuple[tuple[int, InMemory], ...] = ()  # arguments in memory, by the index of their first word
+
+    @property
+    def read(self) -> Function:
+        """The function."""
+        return formula(self.function, self.fixed)
+
+    def load(self, writer: Writer) -> list[Value]:
+        """Write the values of the arguments that are passed."""
+        return [load(writer, place, writer.names["P0"]) for place in self.passed]
+
+
+def arguments(node: Node, leading: int) -> Arguments:
+    """Return the function of a node and its arguments."""
+    function, values = node.function, node.arguments
+    names = functions.parameters(function)[leading:]
+    if set(names) != set(values):
+        place = f"{function.__code__.co_filename}:{function.__code__.co_firstlineno}"
+        wanted, given = (", ".join(s) or "nothing" for s in (values, names))
+        raise KernelError(
+            f"{place}: formula {node.formula.name}: expected {function.__name__} to take {wanted} "
+            f"after its points, found {given}"
+        )
+    fixed = tuple((name, values[name].value) for name in names if isinstance(values[name], Fixed))
+    numbers: list[float] = []
+    passed, held = [], []
+    for value in (values[name] for name in names if not isinstance(values[name], Fixed)):
+        if isinstance(value, InMemory):
+            held.append((len(numbers), value))
+        passed.append(append_numbers(value, numbers))
+    return Arguments(function, fixed, tuple(passed), tuple(numbers), tuple(held))
+
 
 @dataclass(frozen=True)
 class Subroutine:
     """Function ``name(x, y, z, P, P0)`` of all trees of one structure."""
 
-    name: str  # name of the function
+    function: Function
     size: int  # number of entries of P that it reads, from P0 on
     weight: int  # number of parts whose code it contains
 
@@ -58,19 +164,42 @@ class Run:
     count: int  # number of elements
     start: int  # offset of the first element's numbers from P0
 
-    def call(self, k: str = "", points: str = "x, y, z") -> str:
-        """Return the call of one element.
+    def call(self, writer: Writer, point: Sequence[Value] = (), k: Value | None = None) -> Value:
+        """Write the call of one element.
 
-        `k`: expression of the element's index.
+        `point`: another one than x, y, z; `k`: index of the element.
         """
-        place = f"P0 + {self.start}" + (f" + {self.part.size} * {k}" if k else "")
-        return f"{self.part.name}({points}, P, {place})"
+        names = writer.names
+        place = writer.add("add", names["P0"], self.start)
+        if k is not None:
+            place = writer.add("add", place, writer.add("mul", writer.constant(self.part.size), k))
+        point = point or [names[name] for name in POINT]
+        return writer.call(self.part.function, *point, names["P"], place)
+
+    def each(
+        self, writer: Writer, begun: bool, changed: set[str], fold: Callable[[Run, Value | None], None]
+    ) -> None:
+        """Write what is done with each element, one after the other or in a loop.
+
+        `begun`: leave out the first one; `changed`: names that `fold` assigns, which writes it for the element
+        of an index of a run.
+        """
+        rest = Run(self.part, self.count - begun, self.start + begun * self.part.size)
+        if self.count <= UNROLLED:
+            for k in range(rest.count):
+                fold(Run(self.part, 1, rest.start + k * self.part.size), None)
+            return
+
+        def body() -> bool:
+            fold(rest, writer.names["i"])
+            return True
+
+        writer.counted("i", [writer.constant(rest.count)], changed, body, [])
 
     @property
-    def calls(self) -> list[str]:
-        """Calls of all elements."""
-        step = self.part.size
-        return [Run(self.part, 1, self.start + k * step).call() for k in range(self.count)]
+    def about(self) -> str:
+        """Text of its place."""
+        return f"{self.count} {self.start} {self.part.size}"
 
 
 class Dialect(Protocol):
@@ -86,16 +215,17 @@ class Dialect(Protocol):
     def order(self, node: Node, parts: Sequence[Subroutine]) -> Sequence[int]:
         """Return an order in which the children may be evaluated."""
 
-    def write(self, name: str, node: Node, given: Arguments, runs: Sequence[Run]) -> str:
-        """Return the text of a node's function."""
+    def write(self, name: str, node: Node, given: Arguments, runs: Sequence[Run]) -> Function:
+        """Return the function of a node."""
 
 
 def link_tree(linker: Linker, root: Node, dialect: Dialect) -> str:
-    """Write the functions of a tree and append its numbers to P."""
+    """Link a tree and append its numbers to P; return the text of its call."""
     tree = _Tree(linker, dialect)
     start = len(linker.parameters)
     top = tree.linked(dialect.kept(root))
-    return f"{top.name}(x, y, z, P, {start})"
+    linker.functions[top.function.name] = top.function
+    return f"{top.function.name}(x, y, z, P, {start})"
 
 
 @dataclass
@@ -134,36 +264,49 @@ class _Tree:
         for part, group in groupby(self.parts[id(child)] for child in children):
             runs.append(Run(part, len(list(group)), size))
             size += part.size * runs[-1].count
-        key = (given.function, given.fixed, given.passed, *((run.part.name, run.count) for run in runs))
+        key = (
+            given.function,
+            given.fixed,
+            repr(given.passed),
+            *((run.part.function, run.count) for run in runs),
+        )
 
-        def written(name: str) -> Subroutine:
-            self.linker.functions[name] = self.dialect.write(name, node, given, runs)
-            return Subroutine(name, size, self.weight(runs))
+        def make(name: str) -> Subroutine:
+            return Subroutine(self.dialect.write(name, node, given, runs), size, self.weight(runs))
 
-        return self.linker.part(self.dialect.prefix, key, written)
+        return self.linker.part(self.dialect.prefix, key, make)
 
     def weight(self, runs: Sequence[Run]) -> int:
         """Weight of a function with these calls. If it is too large, the heaviest parts are called, not
         inlined.
         """
-        held = {run.part.name: 0 for run in runs}
+        held = {run.part.function: 0 for run in runs}
         for run in runs:
             sites = run.count if run.count <= UNROLLED else 2
-            held[run.part.name] += 0 if run.part.name in self.linker.called else sites * run.part.weight
-        for name in sorted(held, key=lambda name: -held[name]):
+            part = run.part
+            held[part.function] += 0 if part.function in self.linker.called else sites * part.weight
+        for function in sorted(held, key=lambda function: -held[function]):
             if sum(held.values()) < INLINED:
                 break
-            if held[name]:
-                self.linker.called.add(name)
-                held[name] = 0
+            if held[function]:
+                self.linker.called.add(function)
+                held[function] = 0
         return 1 + sum(held.values())
 
 
 LEADING = {"shape": 3, "csg": 2, "domain": 4}
 """Number of leading arguments (points, values or child) by kind of formula."""
 
-OF_FORMULAS = "f_"
-"""Prefix of the names of formulas and their helpers, distinct from those of loops and units."""
+
+def part_function(
+    name: str, given: Arguments, runs: Sequence[Run], write: Callable[[Writer], Value], kind: str
+) -> Function:
+    """Return the function of a part, which is written.
+
+    `kind`: what `write` does.
+    """
+    about = kind, given.read, repr(given.passed), *(x for run in runs for x in (run.part.function, run.about))
+    return written(name, PART, identified(*about), write)
 
 
 @dataclass
@@ -192,43 +335,81 @@ class FieldDialect:
         places = range(len(parts))
         if not node.is_unordered:
             return places
-        first = list(dict.fromkeys(part.name for part in parts))
-        return sorted(places, key=lambda k: first.index(parts[k].name))
+        first = list(dict.fromkeys(part.function for part in parts))
+        return sorted(places, key=lambda k: first.index(parts[k].function))
 
-    def write(self, name: str, node: Node, given: Arguments, runs: Sequence[Run]) -> str:
-        """Return the text of a node's function."""
-        write = {"shape": self.shape, "csg": self.csg_operator, "domain": self.domain_operator}[
-            node.formula.kind
-        ]
-        return write(name, given, runs)
+    def write(self, name: str, node: Node, given: Arguments, runs: Sequence[Run]) -> Function:
+        """Return the function of a node."""
+        write = {"shape": self.shape, "csg": self.csg_operator, "domain": self.domain_operator}
+        return write[node.formula.kind](name, given, runs)
 
-    def shape(self, name: str, given: Arguments, _: Sequence[Run]) -> str:
-        """Return the text of a shape's function."""
-        called = self.linker.share(given.function, given.fixed, OF_FORMULAS)
-        passed = ", ".join(["x", "y", "z", *given.passed])
-        return function(name, [f"return {called}({passed})"])
+    def shape(self, name: str, given: Arguments, _: Sequence[Run]) -> Function:
+        """Return the function of a shape."""
 
-    def csg_operator(self, name: str, given: Arguments, runs: Sequence[Run]) -> str:
-        """Return the text of a CSG operator's function."""
-        called = self.linker.share(given.function, given.fixed, OF_FORMULAS)
-        lines = [f"f = {runs[0].call()}"]
-        if sum(run.count for run in runs) == 1:
-            lines.append(f"f = {called}({', '.join(['f', *given.passed])})")
-        for k, run in enumerate(runs):
-            lines += fold_lines(
-                run, k == 0, lambda call: [f"f = {called}({', '.join(['f', call, *given.passed])})"]
-            )
-        return function(name, [*lines, "return f"])
+        def write(writer: Writer) -> Value:
+            point = [writer.names[name] for name in POINT]
+            return writer.call(given.read, *point, *given.load(writer))
 
-    def domain_operator(self, name: str, given: Arguments, runs: Sequence[Run]) -> str:
-        """Return the text of a domain operator's function."""
-        tree = source.specialise(given.function, dict(given.fixed))
-        arguments = [a.arg for a in tree.args.args][4:]
-        tree.args.args = [ast.arg(a) for a in ("x", "y", "z", "P", "P0")]
-        tree = _CallsChild(runs[0]).visit(tree)
-        taken = [parse(f"{a} = {p}").body[0] for a, p in zip(arguments, given.passed, strict=True)]
-        tree.body = [*taken, *tree.body]
-        return self.linker.named(name, tree, given.function)
+        return part_function(name, given, (), write, "shape")
+
+    def csg_operator(self, name: str, given: Arguments, runs: Sequence[Run]) -> Function:
+        """Return the function of a CSG operator."""
+
+        def write(writer: Writer) -> Value:
+            names = writer.names
+
+            def fold(run: Run, k: Value | None) -> None:
+                other = run.call(writer, k=k)
+                names_now = writer.names
+                names_now["f"] = writer.call(given.read, names_now["f"], other, *given.load(writer))
+
+            names["f"] = runs[0].call(writer)
+            if sum(run.count for run in runs) == 1:
+                names["f"] = writer.call(given.read, names["f"], *given.load(writer))
+            for number, run in enumerate(runs):
+                run.each(writer, number == 0, {"f"}, fold)
+            return writer.names["f"]
+
+        return part_function(name, given, runs, write, "csg")
+
+    def domain_operator(self, name: str, given: Arguments, runs: Sequence[Run]) -> Function:
+        """Return the function of a domain operator."""
+        return domain_function(DomainReader, name, given, runs[0])
+
+
+@dataclass
+class DomainReader(FormulaReader):
+    """Reads a domain operator as the function of a part, with its child's."""
+
+    child: Run = field(kw_only=True)
+
+    def calling(self, node: ast.Call, function: ast.expr, arguments: list[ast.expr]) -> Value:
+        """A call; that of ``child`` is one of the child's function."""
+        if isinstance(function, ast.Name) and function.id == CHILD:
+            return self.evaluated_child(list(map(self.value, arguments)))
+        return super().calling(node, function, arguments)
+
+    def evaluated_child(self, point: list[Value]) -> Value:
+        """The child's value at a point."""
+        return self.child.call(self, point)
+
+
+def domain_function(kind: type[DomainReader], name: str, given: Arguments, child: Run) -> Function:
+    """Return the function of a domain operator.
+
+    `kind`: its reader.
+    """
+    source, known = Source.of(given.function, "formula"), dict(given.fixed)
+    rest = [a for a in functions.parameters(given.function)[4:] if a not in known]
+
+    def read(width: Width) -> Graph:
+        reader = kind(width, source=source, fixed=known, child=child)
+        reader.begin(PART)
+        reader.names.update(zip(rest, given.load(reader), strict=True))
+        return reader.read()
+
+    about = kind.__name__, given.read, repr(given.passed), child.part.function, child.about
+    return Function(name, PART, identified(*about), read, source.error)
 
 
 def _folds(node: Node) -> bool:
@@ -241,33 +422,6 @@ def _folds(node: Node) -> bool:
 def leading(node: Node) -> int:
     """Return the number of a node's arguments that are points, values or its child."""
     return 1 if node.formula.kind == "csg" and not _folds(node) else LEADING[node.formula.kind]
-
-
-def fold_lines(run: Run, begun: bool, lines: Callable[[str], list[str]]) -> list[str]:
-    """Return the lines that combine the elements of a run, one after the other or in a loop."""
-    if run.count <= UNROLLED:
-        return [line for call in run.calls[begun:] for line in lines(call)]
-    rest = Run(run.part, run.count - begun, run.start + begun * run.part.size)
-    return [f"for i in range({rest.count}):", *(f"    {line}" for line in lines(rest.call("i")))]
-
-
-def function(name: str, lines: Sequence[str]) -> str:
-    """Return the text of a part's function."""
-    return "\n    ".join([f"def {name}(x, y, z, P, P0):", *lines])
-
-
-class _CallsChild(ast.NodeTransformer):
-    """Replaces ``child(a, b, c)`` by a call of the child's function, with P."""
-
-    def __init__(self, child: Run) -> None:
-        self.child = child
-
-    def visit_Call(self, node: ast.Call) -> ast.AST:
-        self.generic_visit(node)
-        if isinstance(node.func, ast.Name) and node.func.id == CHILD:
-            points = ", ".join(map(ast.unparse, node.args))
-            return parse_expression(self.child.call(points=points))
-        return node
 
 
 LARGEST = 1 << 24
@@ -285,12 +439,12 @@ def link(root: Node) -> Linked:
     Returns
     -------
     Linked
-        Text and parameters.
+        Functions and parameters.
 
     Raises
     ------
     KernelError
-        If a depth is "auto" or a formula is not in the language.
+        If a depth is "auto".
     """
     linker = Linker()
     linker.field(root)
@@ -299,35 +453,32 @@ def link(root: Node) -> Linked:
 
 @dataclass
 class Linker:
-    """Writes functions and collects parameters."""
+    """Collects functions and parameters."""
 
-    given: frozenset[str] = frozenset()  # names that the text gets from elsewhere
     parameters: list[float] = field(default_factory=list)  # parameters P
-    functions: dict[str, str] = field(default_factory=dict)  # texts of the functions by name
-    called: set[str] = field(default_factory=set)  # names of the functions that are called, not inlined
+    functions: dict[str, Function] = field(default_factory=dict)  # those that are called by name
+    called: set[Function] = field(default_factory=set)  # those that are called, not inlined
     # arrays that stand behind the numbers in P, each with the index of the number that is its offset
     tables: list[tuple[int, np.ndarray]] = field(default_factory=list)
     held: list[tuple[int, InMemory]] = field(default_factory=list)  # see `Linked`
     _parts: dict[Any, Subroutine] = field(default_factory=dict)
-    _shared: dict[Any, str] = field(default_factory=dict)
 
     def field(self, root: Node) -> None:
         """Write the field of a scene tree."""
-        call = link_tree(self, root, FieldDialect(self))
-        self.functions[FIELD] = f"def {FIELD}(x, y, z, P):\n    return {call}"
+        self.write(FIELD, (*POINT, "P"), [f"return {link_tree(self, root, FieldDialect(self))}"])
 
-    def part(self, prefix: str, key: tuple[Any, ...], write: Callable[[str], Subroutine]) -> Subroutine:
-        """Return the function of a structure; write it once."""
+    def part(self, prefix: str, key: tuple[Any, ...], make: Callable[[str], Subroutine]) -> Subroutine:
+        """Return the function of a structure; make it once."""
         if (prefix, *key) not in self._parts:
-            self._parts[prefix, *key] = write(f"{prefix}{len(self._parts)}")
+            self._parts[prefix, *key] = make(f"{prefix}{len(self._parts)}")
         return self._parts[prefix, *key]
 
     def argument(self, value: Any) -> str:
-        """Append a value to P."""
+        """Append a value to P; return the text that reads it."""
         if isinstance(value, np.ndarray):
             self.tables.append((len(self.parameters), value))
             value = 0.0
-        return append_numbers(value, self.parameters)
+        return _read_text(append_numbers(value, self.parameters))
 
     def numbers(self) -> np.ndarray:
         """Return P: the numbers, then each array once.
@@ -347,56 +498,38 @@ class Linker:
             )
         return np.concatenate([numbers, *(array.ravel() for _, array in arrays.values())])
 
-    def share(
-        self, function: Callable[..., Any], fixed: Sequence[tuple[str, Any]] = (), prefix: str = ""
-    ) -> str:
-        """Write a copy of the function with its fixed arguments substituted, once."""
-        suffix = "".join(f"_{k}_{v}" for k, v in sorted(fixed))
-        name = prefix + function.__name__ + "".join(c if c.isalnum() else "_" for c in suffix)
-        copy = source.shared_copy(function, tuple(fixed), self.given)
-        return self.add((prefix, function, tuple(fixed)), name, copy, prefix)
+    def share(self, function: Callable[..., Any], fixed: Sequence[tuple[str, Any]] = ()) -> Function:
+        """Let texts call a function by its name."""
+        made = formula(function, tuple(fixed))
+        self.functions.setdefault(function.__name__, made)
+        return made
 
-    def add(self, key: tuple[Any, ...], name: str, copy: source.Copy, prefix: str) -> str:
-        """Write a copy and the functions it calls, once per key."""
-        if key not in self._shared:
-            taken = {*self._shared.values()}
-            number = next(
-                n for n in range(1, len(taken) + 2) if (f"{name}_{n}" if n > 1 else name) not in taken
-            )
-            name = self._shared[key] = f"{name}_{number}" if number > 1 else name
-            self.functions[name] = self.renamed(copy, name, prefix)
-        return self._shared[key]
-
-    def renamed(self, copy: source.Copy, name: str, prefix: str) -> str:
-        """Return the text of a copy under a name; write the functions that it calls."""
-        names = {called: self.share(f, (), prefix) for called, f in copy.calls.items()}
-        return copy.renamed({**names, copy.name: name})
-
-    def named(self, name: str, tree: ast.FunctionDef, function: Callable[..., Any]) -> str:
-        """Return the renamed text of a tree derived from a formula; write the functions it calls."""
-        copy = source.copy_text(tree, function, self.given | self.functions.keys())
-        return self.renamed(copy, name, OF_FORMULAS)
+    def write(self, name: str, names: Sequence[str], lines: Sequence[str]) -> None:
+        """Add a function whose text calls others by name."""
+        self.functions[name] = text_function(name, names, lines, self.functions)
 
     def bind(self, name: str, function: Callable[..., Any], values: dict[str, Any]) -> None:
-        """Write the function ``name(rest..., P)`` that calls a given function.
+        """Add the function ``name(rest..., P)`` that calls a given function.
 
         Its arguments in `values` are read from P or fixed; the others stay open. An argument named P receives
         P.
         """
         fixed = {k: v.value for k, v in values.items() if isinstance(v, Fixed)}
-        called = self.share(function, tuple(fixed.items()))
-        names = [a for a in functions.parameters(function) if a not in fixed]
-        passed = [self.argument(values[a]) if a in values else a for a in names]
-        rest = [a for a in names if a not in values and a != "P"]
-        self.functions[name] = (
-            f"def {name}({', '.join([*rest, 'P'])}):\n    return {called}({', '.join(passed)})"
-        )
+        called = formula(function, tuple(fixed.items()))
+        passed = [self.argument(values[a]) if a in values else a for a in called.parameters]
+        rest = [a for a in called.parameters if a not in values and a != "P"]
+        lines = [f"return bound({', '.join(passed)})"]
+        self.functions[name] = text_function(name, [*rest, "P"], lines, {"bound": called})
 
     def linked(self) -> Linked:
-        """Return what is written and collected."""
-        return Linked(self.text(), self.numbers(), tuple(self.held))
+        """Return what is collected."""
+        parts = tuple(part.function for part in self._parts.values())
+        program = Program(dict(self.functions), parts, frozenset(self.called))
+        return Linked(program, self.numbers(), tuple(self.held))
 
-    def text(self) -> str:
-        """Return the text of all functions."""
-        texts = (f"@{CALLED}\n{t}" if name in self.called else t for name, t in self.functions.items())
-        return "\n\n\n".join(texts) + "\n"
+
+def _read_text(passed: Passed) -> str:
+    """Text that reads an argument from P."""
+    if isinstance(passed, tuple):
+        return f"({', '.join(map(_read_text, passed))},)"
+    return f"int(P[{passed[0]}])" if isinstance(passed, list) else f"P[{passed}]"

@@ -20,6 +20,7 @@ from functools import lru_cache
 from typing import Any
 
 from ..expr import functions, vocabulary
+from ..expr.functions import identity
 from ..expr.host import kept_text
 from ..expr.language import parse_expression
 from .escape import potential_distance, sure_distance
@@ -176,8 +177,6 @@ def mapped(matrix: str, point: Sequence[str]) -> list[str]:
 @lru_cache(maxsize=256)
 def _trace_step(code: Code, place: int, _: object) -> Step:
     """Straight-line code of a step, cached: following its text takes a twentieth of a small picture."""
-    from ..expr.loop_linker import identity
-
     rigid = sorted(RIGID, key=lambda verb: verb.__name__)
     verbs = identity(code.step, *(value for _, value in code.fixed), *MAJORANTS, *MAJORANTS.values(), *rigid)
 

@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..expr import vocabulary
 from ..expr.functions import words
+from ..expr.graph import Evaluator
 from ..expr.intervals import Interval, enclosed, on_cells
-from ..expr.language import CALLED, FIELD
-from .linker import link
+from .linker import FIELD, link
 
 if TYPE_CHECKING:
     from .node import Node
 
-_NAMES = vocabulary.NAMES | vocabulary.OF_CELLS
+ON_ARRAYS: Mapping[str, Callable[..., Any]] = {
+    name: getattr(vocabulary, name) for name in vocabulary.NAMES | vocabulary.OF_CELLS
+}
+"""The vocabulary on arrays."""
+
+ON_CELLS: Mapping[str, Callable[..., Any]] = {name: on_cells(name) for name in ON_ARRAYS}
+"""The vocabulary on intervals."""
 
 
 def reference(root: Node) -> Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]:
@@ -37,7 +43,7 @@ def reference(root: Node) -> Callable[[np.ndarray, np.ndarray, np.ndarray], np.n
     KernelError
         If the scene cannot be linked.
     """
-    function = _field(root, {name: getattr(vocabulary, name) for name in _NAMES})
+    function = _field(root, ON_ARRAYS)
 
     def evaluate(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
         return np.asarray(function(*(np.asarray(a, dtype=np.float64) for a in (x, y, z))))
@@ -50,10 +56,10 @@ def enclosure(root: Node) -> Callable[[Interval, Interval, Interval], Interval]:
 
     Returns a value in scene units.
     """
-    return _field(root, {name: on_cells(name) for name in _NAMES})
+    return _field(root, ON_CELLS)
 
 
-def _field(root: Node, scope: dict[str, Any]) -> Callable[..., Any]:
+def _field(root: Node, operations: Mapping[str, Callable[..., Any]]) -> Callable[..., Any]:
     """Field of a tree with given functions of the vocabulary."""
     linked = link(root)
     memory = {words(memory.digest): memory for _, memory in linked.held}
@@ -68,13 +74,12 @@ def _field(root: Node, scope: dict[str, Any]) -> Callable[..., Any]:
 
         return asked
 
-    scope |= {CALLED: lambda function: function} | {
-        name: asking(getattr(vocabulary, name)) for name in vocabulary.OF_FILES
-    }
-    exec(compile(linked.source, "<linked scene>", "exec"), scope)
+    asked = {name: asking(getattr(vocabulary, name)) for name in vocabulary.OF_FILES}
+    named = linked.program.functions
+    evaluator = Evaluator({**operations, **asked}, named)
 
     def evaluate(*points: Any) -> Any:
         with np.errstate(all="ignore"):
-            return scope[FIELD](*points, linked.parameters)
+            return evaluator(named[FIELD], *points, linked.parameters)
 
     return evaluate

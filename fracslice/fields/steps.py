@@ -12,21 +12,22 @@ constant factors are known to keep it.
 from __future__ import annotations
 
 import ast
+import operator
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
 from math import isfinite, nan
-from types import FunctionType
-from typing import Any, NoReturn, cast
+from typing import Any, cast
 
 from ..errors import KernelError
-from ..expr import functions, language
+from ..expr import functions, graph
+from ..expr.frontend import FormulaReader, Source
 from ..expr.functions import EVALUATED
+from ..expr.graph import MismatchError
 from ..expr.language import parse, parse_expression
 from .maps import CENTRAL, LENGTHS, MAJORANTS, RIGID
-from .source import specialise
 
 Terms = dict[tuple[str, ...], float]
 """Coefficients of monomials, each the sorted names of its factors."""
@@ -448,7 +449,7 @@ Value = Any
 def trace(
     function: Callable[..., Any], parameters: Mapping[str, int], fixed: Mapping[str, Any], place: int = 0
 ) -> Step:
-    """Follow the text of a step."""
+    """Follow the graph of a step."""
     tape = Tape(f"s{place}_")
     constant = tape.variable(f"cx{place} cy{place} cz{place}", 3, f"rc{place}")
     env: dict[str, Value] = {"w": tape.variable("x y z", 0, f"rw{place}"), "c": constant}
@@ -458,7 +459,8 @@ def trace(
         line = f"{function.__code__.co_filename}:{function.__code__.co_firstlineno}"
         wanted = ", ".join(("w", "c", *parameters, *fixed))
         raise KernelError(f"{line}: step {function.__name__}: expected the arguments {wanted}")
-    value = _follow_statements(function, fixed, env, tape)
+    step = step_function(function, parameters, fixed)
+    value = _Follower(tape)(step, *(env[name] for name in step.parameters))
     declared = value[1] if isinstance(value, tuple) and len(value) == 2 else None
     vector = _vector(value if declared is None else value[0], function)
     stretch = vector.stretch or tape.norms(vector)
@@ -476,6 +478,79 @@ def trace(
     return replace(
         made, before=before, lines=lines, bending=bending, length=vector.length, measuring=measuring
     )
+
+
+@dataclass
+class StepReader(FormulaReader):
+    """Reads a step, whose tuples have a known number of parts, and the verbs that it calls."""
+
+    sizes: Mapping[str, int] = field(kw_only=True)  # of its arguments
+
+    kind = "step"
+
+    def known(self, node: ast.expr) -> Any:
+        """What is known; a function of numbers is evaluated, of NaN for a number that is not known."""
+        match node:
+            case ast.Call(ast.Name(name), arguments) if self.outside(name) in EVALUATED:
+                values = map(self.known, arguments)
+                return self.scope[name](*(v if functions.is_number(v) else nan for v in values))
+        return super().known(node)
+
+    def read_statement(self, node: ast.stmt) -> bool:
+        match node:
+            case ast.Assign([ast.Tuple(targets)], ast.Call(ast.Name(name)) as value):
+                if self.outside(name) in EVALUATED:
+                    names = map(ast.unparse, targets)
+                    self.fixed = {**self.fixed, **dict(zip(names, self.known(value), strict=True))}
+                    return True
+        return super().read_statement(node)
+
+    def over(self, node: ast.For, target: ast.expr, iterated: ast.expr) -> bool:
+        """A loop over a tuple; that of an argument, too."""
+        if not (isinstance(iterated, ast.Name) and iterated.id in self.sizes):
+            return super().over(node, target, iterated)
+        for item in self.items(self.value(iterated), self.sizes[iterated.id]):
+            self.assign(target, item)
+            if not self.statements(node.body):
+                return False
+        return True
+
+    def call_function(self, called: Callable[..., Any], arguments: list[ast.expr]) -> graph.Value:
+        """A call of a verb; what is known is fixed in it."""
+        names, known = functions.parameters(called), [self.known(argument) for argument in arguments]
+        pairs = list(zip(names, known, strict=False))
+        fixed = {name: value for name, value in pairs if functions.is_number(value)}
+        passed = [a for a, value in zip(arguments, known, strict=True) if not functions.is_number(value)]
+        return self.call_counted(step_function(called, {}, fixed), list(map(self.value, passed)))
+
+
+def step_function(
+    function: Callable[..., Any], sizes: Mapping[str, int], fixed: Mapping[str, Any]
+) -> graph.Function:
+    """Return the function of a step or of a verb; `sizes`: numbers of components of its arguments."""
+    source = Source.of(function, "step")
+    names = tuple(name for name in functions.parameters(function) if name not in fixed)
+
+    def read(width: graph.Width) -> graph.Graph:
+        reader = StepReader(width, source=source, fixed=dict(fixed), sizes=sizes)
+        reader.begin(names)
+        return reader.read()
+
+    return graph.Function(function.__name__, names, "", read, source.error, Verb(function, fixed))
+
+
+@dataclass(frozen=True, eq=False)
+class Verb:
+    """Function of Python with some arguments known."""
+
+    function: Callable[..., Any]
+    fixed: Mapping[str, Any]
+
+    def values(self, given: Sequence[Any]) -> list[Any]:
+        """Return all arguments in order, from those that are not known."""
+        rest = iter(given)
+        names = functions.parameters(self.function)
+        return [self.fixed[name] if name in self.fixed else next(rest) for name in names]
 
 
 def _argument(name: str, size: int) -> Value:
@@ -499,184 +574,142 @@ def _divide_assignments(lines: Sequence[str]) -> tuple[list[str], list[str]]:
     return before, others
 
 
-def _follow_statements(
-    function: Callable[..., Any], fixed: Mapping[str, Any], env: dict[str, Value], tape: Tape
-) -> Value:
-    """Follow the statements of a function; return its value."""
-    scope, code = functions.scope(function), function.__code__
-    loops = {n: v for n, v in scope.items() if n in code.co_names and isinstance(v, tuple)}
-    tuples = {n: v for n, v in loops.items() if functions.is_number(v)}
-    place = f"{code.co_filename}:{code.co_firstlineno}: step {function.__name__}: "
-    return _Reader(tape, env, scope, place).run(specialise(function, {**tuples, **fixed}).body)
+class _Count(int):
+    """Counter of a loop."""
 
 
-@dataclass
-class _Reader:
-    """Follows the statements of one function."""
+class _Follower(graph.Evaluator):
+    """Follows graphs onto a tape: values are scalars, vectors and tuples of these."""
 
-    tape: Tape
-    env: dict[str, Value]
-    scope: Mapping[str, Any]
-    place: str
+    def __init__(self, tape: Tape) -> None:
+        super().__init__({})
+        self.tape = tape
 
-    def fail(self, node: ast.AST, message: str) -> NoReturn:
-        raise KernelError(f"{self.place}{ast.unparse(node)!r}: {message}")
+    def __call__(self, function: graph.Function, *given: Any) -> Any:
+        value = super().__call__(function, *given)
+        return _constants(value) if isinstance(value, float) else value
 
-    def run(self, body: Sequence[ast.stmt]) -> Value:
-        for statement in body:
-            match statement:
-                case ast.Assign([target], value):
-                    self.assign(target, self.value(value))
-                case ast.For(ast.Name(counter), ast.Call(ast.Name("range"), [ast.Constant(int(n))]), inner):
-                    for k in range(n):
-                        self.env[counter] = Scalar(repr(float(k)))
-                        self.run(inner)
-                case ast.For(target, ast.Name(name), inner) if name in self.env:
-                    for value in self.elements(self.env[name]):
-                        self.assign(target, value)
-                        self.run(inner)
-                case ast.If(test, body, others):
-                    self.run(body if self.known(test) else others)
-                case ast.Return(ast.expr() as value):
-                    return self.value(value)
-                case _:
-                    self.fail(statement, "expected assignments, loops over constants and a return")
-        return None
-
-    def elements(self, value: Value) -> tuple[Value, ...]:
-        return value.parts if isinstance(value, Vector3) else value
-
-    def known(self, test: ast.expr) -> bool:
-        """Truth of a condition that is known here."""
-        value = self.value(test)
-        if isinstance(value, tuple):
+    def decide(self, value: Any) -> bool:
+        if isinstance(value, (bool, tuple)):
             return bool(value)
         number = as_number(value.atom) if isinstance(value, Scalar) else None
         if number is None:
-            self.fail(test, "expected a condition on constants")
+            raise MismatchError("expected a condition on constants")
         return number != 0
 
-    def assign(self, target: ast.expr, value: Value) -> None:
-        match target:
-            case ast.Name(name):
-                self.env[name] = value
-            case ast.Tuple(targets):
-                parts = self.elements(value)
-                if not isinstance(parts, tuple) or len(parts) != len(targets):
-                    self.fail(target, f"expected {len(targets)} values")
-                for one, part in zip(targets, parts, strict=True):
-                    self.assign(one, part)
-            case _:
-                self.fail(target, "expected a name to assign to")
+    def evaluate(self, value: graph.Value, given: list[Any]) -> Any:
+        op = value.op
+        if op == "index" or (given and all(isinstance(v, _Count) for v in given)):
+            return self.counted(op, given, value.data)
+        parts = [_constants(v) if isinstance(v, (int, float)) else v for v in given]
+        if op == "call":
+            return self.called(value.data, parts)
+        if op == "tuple":
+            whole = tuple(parts)
+            return Vector3(whole, _constant_stretch(whole)) if _is_triple(whole) else whole
+        if op in ("item", "element"):
+            return self.part(parts, value.data)
+        if op in graph.BINARY | graph.UNARY:
+            return self.operator(op, *parts)
+        return self.intrinsic(op, parts)
 
-    def value(self, node: ast.expr) -> Value:
-        match node:
-            case ast.Constant(int() | float() as number):
-                return Scalar(repr(float(number)))
-            case ast.Name(name) if name in self.env:
-                return self.env[name]
-            case ast.Name(name) if functions.is_number(self.scope.get(name)):
-                return _constants(self.scope[name])
-            case ast.Tuple(elements):
-                parts = tuple(map(self.value, elements))
-                return Vector3(parts, _constant_stretch(parts)) if _is_triple(parts) else parts
-            case ast.UnaryOp(ast.USub(), operand):
-                return self.product(Scalar("-1.0"), self.value(operand), node)
-            case ast.BinOp(left, op, right):
-                return self.binary(op, self.value(left), self.value(right), node)
-            case ast.Compare(left, [op], [right]):
-                a, b = self.scalars(node, left, right)
-                return Scalar(str(self.tape.name(ast.unparse(ast.Compare(_n(a), [op], [_n(b)])))))
-            case ast.Subscript(place, ast.Constant(int(k))):
-                value = self.value(place)
-                return (value.parts if isinstance(value, Vector3) else value)[k]
-            case ast.Call(ast.Name(name), arguments):
-                return self.call(name, [self.value(a) for a in arguments], node)
-        self.fail(node, "it is not in the language of steps")
+    def counted(self, op: str, given: list[Any], data: int | None) -> Any:
+        """A step of a counter."""
+        if op in ("index", "int"):
+            number = data if data is not None else given[0]
+            return _Count(_number(number) if isinstance(number, Scalar) else number)
+        made = getattr(operator, op)(*given)
+        return made if isinstance(made, bool) else _Count(made)
 
-    def scalars(self, node: ast.AST, *parts: ast.expr) -> list[Scalar]:
-        values = [self.value(part) for part in parts]
-        if not all(isinstance(v, Scalar) for v in values):
-            self.fail(node, "expected numbers, found a point; x, y, z = w gives its coordinates")
-        return values
+    def part(self, given: list[Any], data: tuple[int, int] | None) -> Any:
+        """A part of a point or of a tuple."""
+        whole = given[0].parts if isinstance(given[0], Vector3) else given[0]
+        if not isinstance(whole, tuple) or (data and len(whole) != data[1]):
+            raise MismatchError(f"expected {data[1] if data else 'several'} values")
+        return whole[data[0] if data else int(_number(given[1]))]
 
     # --- arithmetic ---
-    def binary(self, op: ast.operator, a: Value, b: Value, node: ast.AST) -> Value:
-        if isinstance(op, ast.Mult):
-            return self.product(a, b, node)
-        if isinstance(op, ast.Div):
+    def operator(self, op: str, a: Value, b: Value | None = None) -> Value:
+        if op == "neg":
+            return self.product(Scalar("-1.0"), a)
+        assert b is not None
+        if op in SIGNS:
+            if not (isinstance(a, Scalar) and isinstance(b, Scalar)):
+                raise MismatchError("expected numbers, found a point; x, y, z = w gives its coordinates")
+            return Scalar(str(self.tape.name(f"{a.atom} {SIGNS[op]} {b.atom}")))
+        if op == "mul":
+            return self.product(a, b)
+        if op == "truediv":
             if not isinstance(b, Scalar):
-                self.fail(node, "expected a number to divide by")
-            return self.product(self.tape.inverse(b), a, node)
-        if isinstance(op, (ast.BitAnd, ast.BitOr)):
-            sign = "&" if isinstance(op, ast.BitAnd) else "|"
-            return Scalar(str(self.tape.name(f"{a.atom} {sign} {b.atom}")))
-        if not isinstance(op, (ast.Add, ast.Sub)):
-            self.fail(node, "expected +, -, * or /")
+                raise MismatchError("expected a number to divide by")
+            return self.product(self.tape.inverse(b), a)
+        if op not in ("add", "sub"):
+            raise MismatchError("expected +, -, * or /")
         if isinstance(b, Vector3) != isinstance(a, Vector3):
-            self.fail(node, "expected two points or two numbers")
-        sign = "+" if isinstance(op, ast.Add) else "-"
+            raise MismatchError("expected two points or two numbers")
+        sign = "+" if op == "add" else "-"
         if isinstance(a, Scalar):
-            return self.tape.sum(a, b, sign)
-        return self.tape.vector_sum(a, b, sign)
+            return self.tape.sum(a, b, sign)  # type: ignore[arg-type]
+        return self.tape.vector_sum(a, b, sign)  # type: ignore[arg-type]
 
-    def product(self, a: Value, b: Value, node: ast.AST) -> Value:
+    def product(self, a: Value, b: Value) -> Value:
         if isinstance(a, Vector3):
             a, b = b, a
         if not isinstance(a, Scalar) or not isinstance(b, (Scalar, Vector3)):
-            self.fail(node, "expected a number as one of the factors")
+            raise MismatchError("expected a number as one of the factors")
         return self.tape.product(a, b) if isinstance(b, Scalar) else self.tape.scaled(a, b)
 
     # --- calls ---
-    def call(self, name: str, given: list[Value], node: ast.AST) -> Value:
-        function = self.scope.get(name)
-        if function in EVALUATED:
-            return _constants(function(*map(_number, given)))
-        if name not in language.INTRINSICS and isinstance(function, FunctionType):
-            names = functions.parameters(function)
-            if len(names) != len(given):
-                self.fail(node, f"{name} takes {len(names)} values, found {len(given)}")
-            value = _follow_statements(function, {}, dict(zip(names, given, strict=True)), self.tape)
-            if not (isinstance(value, tuple) and len(value) == 2 and isinstance(value[0], Vector3)):
-                return value
-            if not isinstance(given[0], Vector3):
-                self.fail(node, "expected a point first")
-            (image, factor), before = value, given[0].stretch
-            stretch = before and tuple(self.tape.times(factor.atom, s) for s in before)
-            length = self.length(function, given)
-            return Vector3(image.parts, stretch, self.majorant(function, given), length)  # type: ignore[arg-type]
+    def called(self, function: graph.Function, given: list[Value]) -> Value:
+        value, verb = self(function, *given), function.python
+        if not (isinstance(value, tuple) and len(value) == 2 and isinstance(value[0], Vector3)):
+            return value
+        if not (given and isinstance(given[0], Vector3)):
+            raise MismatchError("expected a point first")
+        (image, factor), before = value, given[0].stretch
+        stretch = before and tuple(self.tape.times(factor.atom, s) for s in before)
+        length = self.length(verb, given)
+        return Vector3(image.parts, stretch, self.majorant(verb, given), length)  # type: ignore[arg-type]
+
+    def followed(self, function: Callable[..., Any], values: Sequence[Any]) -> Any:
+        """Follow a function of all values, some of which are known numbers."""
+        names = functions.parameters(function)
+        fixed = {n: v for n, v in zip(names, values, strict=True) if functions.is_number(v)}
+        given = [v for v in values if not functions.is_number(v)]
+        return self(step_function(function, {}, fixed), *given)
+
+    def intrinsic(self, name: str, given: list[Value]) -> Value:
         if name not in DERIVATIVES and name != "where":
-            self.fail(node, f"{name!r} is not in the language of steps")
+            raise MismatchError(f"{name!r} is not in the language of steps")
         if name == "where" and isinstance(given[1], Vector3) and isinstance(given[2], Vector3):
             pairs = zip(given[1].parts, given[2].parts, strict=True)
-            return Vector3(tuple(self.call(name, [given[0], p, q], node) for p, q in pairs))
+            return Vector3(tuple(self.intrinsic(name, [given[0], p, q]) for p, q in pairs))  # type: ignore[arg-type]
         if not all(isinstance(v, Scalar) for v in given):
-            self.fail(node, "expected numbers, found a point")
+            raise MismatchError("expected numbers, found a point")
         return self.tape.intrinsic(name, given)
 
-    def majorant(self, verb: Callable[..., Any], given: list[Value]) -> Majorant | None:
+    def majorant(self, verb: Verb, given: list[Value]) -> Majorant | None:
         """Majorant of a verb's image."""
-        if verb in RIGID:
+        if verb.function in RIGID:
             return self.tape.after(given[0], (None, None))
-        if verb not in MAJORANTS:
+        if verb.function not in MAJORANTS:
             return None
-        own = dict(zip(functions.parameters(verb), given, strict=True))
-        bend, tear = _follow_statements(MAJORANTS[verb], {}, own, self.tape)
+        bend, tear = self.followed(MAJORANTS[verb.function], verb.values(given))
         return self.tape.after(given[0], (bend.atom, None if as_number(tear.atom) else tear.atom))
 
-    def length(self, verb: Callable[..., Any], given: list[Value]) -> str | None:
+    def length(self, verb: Verb, given: list[Value]) -> str | None:
         """Length of a verb's image, from that of its point."""
         before = given[0].length
-        if before is None or verb in CENTRAL:
+        if before is None or verb.function in CENTRAL:
             return cast("str | None", before)
-        if verb not in LENGTHS:
+        if verb.function not in LENGTHS:
             return None
-        own = dict(zip(functions.parameters(LENGTHS[verb]), [Scalar(before), *given[1:]], strict=True))
-        return cast("str", _follow_statements(LENGTHS[verb], {}, own, self.tape).atom)
+        values = verb.values([Scalar(before), *given[1:]])
+        return cast("str", self.followed(LENGTHS[verb.function], values).atom)
 
 
-def _n(value: Scalar) -> ast.expr:
-    return parse_expression(value.atom)
+SIGNS = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!=", "and_": "&", "or_": "|"}
+"""Comparisons and conjunctions in the text of a step."""
 
 
 def _vector(value: Value, function: Callable[..., Any]) -> Vector3:

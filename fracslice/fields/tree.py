@@ -77,7 +77,7 @@ def key(root: Node) -> str:
     parts: list[object] = []
     for node in (root, root.conservative()):
         linked = link(node)
-        parts += [linked.source, linked.parameters, node.bounds]
+        parts += [linked.program.identity, linked.parameters, node.bounds]
     return hashed(*parts)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from .._native import Cells
 from ..expr.cuda_driver import device_array, pinned_array, require, to_device
+from ..expr.graph import NOTHING
 from ..fields.cuda import CudaFunction, CudaLoop, load_functions
 from .root_loops import collect, lay, start
 from .roots import SURE, Roots
@@ -51,12 +52,12 @@ class CudaSearch:
     ) -> None:
         require()
         self._cells, self._placement = cells, (*origin, voxel)
-        self._lay = load_functions("", "float64", (lay,))["lay"]
+        self._lay = load_functions(NOTHING, "float64", (lay,))["lay"]
         self._edges = device_array((MOST_EDGES, 4), np.int16)
         self._fast, self._exact = (
             Find(
                 *self._loop(roots, "find"), Table(6, roots.dtype), self._row(roots.dtype),
-                **load_functions("", roots.precision, (start, collect)),
+                **load_functions(NOTHING, roots.precision, (start, collect)),
             )
             for roots in (fast, exact)
         )  # fmt: skip

@@ -48,7 +48,7 @@ class CpuTracer:
         self.steps = STEPS[dtype.name]
         bits = dtype.itemsize * 8
         self.lanes = lane_count(bits)
-        functions = load_functions(frame.linked.source, bits, self.lanes, loops(frame))
+        functions = load_functions(frame.linked.program, bits, self.lanes, loops(frame))
         self._tile, self._cones = functions["tile"], functions.get("cones")
         self._own = threading.local()
         self.samples, self._points = SampleRange(), np.empty((0, frame.samples), np.int32)

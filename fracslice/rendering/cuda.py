@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..expr.cuda_driver import device_array, require, to_device
+from ..expr.graph import NOTHING
 from ..fields.cuda import load_functions, parameters
 from ..fields.field import Precision
 from ..scene.view import View
@@ -36,7 +37,7 @@ class CudaTracer:
     def __init__(self, frame: Frame, dtype: np.dtype, width: int, height: int) -> None:
         self.dtype, self.width, self.height = dtype, width, height
         self._precision: Precision = "float32" if dtype == np.float32 else "float64"
-        functions = load_functions(frame.linked.source, self._precision, loops(frame))
+        functions = load_functions(frame.linked.program, self._precision, loops(frame))
         self._tile, self._cones = functions["tile"], functions.get("cones")
         self._start = to_device(np.zeros(1, dtype))
         self.samples = SampleRange()
@@ -85,7 +86,7 @@ class CudaAccumulator:
         self.passes = start.passes
         self.dtype, pixels = start.sums.dtype, start.width * start.height
         precision: Precision = "float32" if self.dtype == np.float32 else "float64"
-        self._loops = load_functions("", precision, LOOPS)
+        self._loops = load_functions(NOTHING, precision, LOOPS)
         self.sums = to_device(start.sums)
         self._order = to_device(tile_order(self.width, self.height))
         self._squares, self._gains = (device_array(pixels, self.dtype) for _ in range(2))

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.lib.npyio import NpzFile
 
 from ..errors import RenderError
+from ..expr.graph import NOTHING
 from ..expr.host import lane_count
 from ..expr.loops import WIDTH, load, loop, store
 from ..expr.machine import Function
@@ -42,7 +43,7 @@ from .units.pixel import UNKNOWN, squared_error
 def _loops(dtype: np.dtype) -> dict[str, Function]:
     """Compiled loops of a float type."""
     bits = dtype.itemsize * 8
-    return load_functions("", bits, lane_count(bits), LOOPS)
+    return load_functions(NOTHING, bits, lane_count(bits), LOOPS)
 
 
 @dataclass(eq=False)

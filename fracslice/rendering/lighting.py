@@ -14,14 +14,14 @@ from ..scene.view import Camera, Fog, Light, View
 from . import glow
 from .environments import PIXELS, Environment, environment, load_picture
 from .glow import Drawn
-from .materials import Look, opaque_part, text_of
+from .materials import Look, opaque_part, write
 from .scattering import division_lines, lacquer_lines
 from .setup import Optics, ray_bound
 from .units import environment as units
 from .units import fog as fog_units
 from .units import march, shade
 from .units.glossy import highlight
-from .units.intrinsics import background, blocker, transparent
+from .units.intrinsics import blocker, transparent
 from .units.pixel import linear
 from .units.weights import behind, mixed_weights, sun_density, sunshine, weights
 
@@ -219,8 +219,8 @@ class Lighting:
             if look.inside:
                 self.linker.bind("unobstructed_", march.visible, {**marched, "glass": Fixed(True)})
                 self.linker.bind("tinted_shadow_", march.tinted_shadow, marched)
-                self.linker.functions["transparent"] = text_of(transparent, look.transparent())
-            self.linker.functions["blocker"] = self.blocker()
+                write(self.linker, transparent, look.transparent())
+            write(self.linker, blocker, self.blocker())
             lines += [f"s{a} = {a} + 3.0 * h * n{a}" for a in "xyz"]
         if self.weighted:
             pane = "where((clear > 0.0) | (side < 0.0), 1.0, last)" if look.inside else "last"
@@ -240,14 +240,14 @@ class Lighting:
         paths = self.view.shading.paths == "yes" and self.view.shading.mode == "light"
         return paths and any(x.kind == "environment" or seen_as_disc(x) for x in self.view.lights)
 
-    def blocker(self) -> str:
-        """Source of `units.intrinsics.blocker`."""
+    def blocker(self) -> list[str]:
+        """Lines of `units.intrinsics.blocker`."""
         opaque = opaque_part(self.root)
         if opaque is self.root:
-            return text_of(blocker, ["return field(x, y, z, P)"])
+            return ["return field(x, y, z, P)"]
         if opaque is None:
-            return text_of(blocker, ["return 0.0 * x + 1.0"])
-        return text_of(blocker, [f"return {link_tree(self.linker, opaque, FieldDialect(self.linker))}"])
+            return ["return 0.0 * x + 1.0"]
+        return [f"return {link_tree(self.linker, opaque, FieldDialect(self.linker))}"]
 
     def light(self, k: int, light: Light, look: Look) -> list[str]:
         """Lines for one sun or lamp, or a light at the camera."""
@@ -369,8 +369,8 @@ class Lighting:
         fog = self.view.fog
         return [] if fog is None or fog.density == 0 else fog_lines(self, fog, onward)
 
-    def background(self) -> str:
-        """Source of `units.intrinsics.background`: the sky, else the colour of the fog, else of the film."""
+    def background(self) -> list[str]:
+        """Lines of `units.intrinsics.background`: the sky, else the colour of the fog, else of the film."""
         view = self.view
         lit = view.shading.mode == "light"
         around = next((light for light in view.lights if lit and light.surrounds), None)
@@ -387,4 +387,4 @@ class Lighting:
         for k, light in enumerate(view.lights):
             if self.weighted and seen_as_disc(light):
                 lines += self.around.disc(k, light)
-        return text_of(background, [*lines, "return r, g, b"])
+        return [*lines, "return r, g, b"]

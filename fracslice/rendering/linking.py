@@ -13,19 +13,18 @@ from typing import Any
 
 import numpy as np
 
-from ..expr.language import Linked
 from ..expr.vocabulary import maximum, minimum
-from ..fields.linker import Linker
+from ..fields.linker import Linked, Linker
 from ..fields.registry import Fixed, Node
 from ..scene.view import Camera, View
 from .glow import Drawn, glowing_bodies, wholly_met
 from .lighting import Lighting
-from .materials import Look, text_of
+from .materials import Look, write
 from .scattering import onward
 from .setup import Optics, footprint, ray_bound
 from .units import camera as units
 from .units import glossy, march
-from .units.intrinsics import GIVEN, surface
+from .units.intrinsics import background, surface
 from .units.march import normal
 
 Unit = tuple[Callable[..., Any], dict[str, Any]]
@@ -145,7 +144,7 @@ class _Frame:
     view: View
     camera: Camera
     seen: Optics
-    linker: Linker = field(default_factory=lambda: Linker(given=GIVEN))
+    linker: Linker = field(default_factory=Linker)
     drawn: Drawn = field(default_factory=Drawn)
     bounces: int = 0
 
@@ -166,8 +165,8 @@ class _Frame:
         for number in (self.seen.far, *self.seen.origin, CIRCLE * self.seen.cone):
             linker.argument(number)
         self.bounces = self.view.shading.bounces if look.bounces and self.lit else 0
-        linker.functions["background"] = self.lighting.background()
-        linker.functions["surface"] = self.surface(look)
+        write(linker, background, self.lighting.background())
+        write(linker, surface, self.surface(look))
         linked = linker.linked()
         samples = camera_samples, self.drawn.count
         kind = self.sharp, self.lit, self.view.film.transparent, self.lighting.weighted
@@ -208,8 +207,8 @@ class _Frame:
         camera = self.camera
         return not (camera.aperture or camera.stereo or camera.kind == "orthographic")
 
-    def surface(self, look: Look) -> str:
-        """Source of `units.intrinsics.surface`."""
+    def surface(self, look: Look) -> list[str]:
+        """Lines of `units.intrinsics.surface`."""
         mode = self.view.shading.mode
         lines = ["h = width_at(path + t, P)"]
         if mode in ("light", "normal") or (mode == "albedo" and look.textured):
@@ -230,7 +229,7 @@ class _Frame:
         else:
             lines += self.shown(mode, look)
         ray = "tr, tg, tb, ox, oy, oz, ex, ey, ez, es, eq" if self.bounces else ""
-        return text_of(surface, [*lines, f"return (r, g, b), ({ray})"])
+        return [*lines, f"return (r, g, b), ({ray})"]
 
     def shown(self, mode: str, look: Look) -> list[str]:
         """Lines for the modes that show a value."""

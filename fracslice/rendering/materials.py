@@ -13,21 +13,24 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ..expr import functions
-from ..expr.language import parse
-from ..fields import source
+from ..expr.frontend import FormulaReader, Source, formula
+from ..expr.graph import Function, Graph, Value, Width, Writer, identified
+from ..expr.vocabulary import absolute, atan2, minimum, sqrt, where
 from ..fields.linker import (
-    OF_FORMULAS,
+    Arguments,
+    DomainReader,
     FieldDialect,
     Linker,
     Run,
     Subroutine,
-    fold_lines,
-    function,
+    append_numbers,
+    arguments,
+    domain_function,
     leading,
     link_tree,
+    part_function,
 )
 from ..fields.registry import Fixed, Node
-from ..fields.source import Arguments, append_numbers, arguments
 from ..formulas.material import material, stops
 from .environments import load_picture
 from .glow import glowing_bodies
@@ -36,86 +39,112 @@ from .units.environment import triplanar
 from .units.pixel import linear
 
 
-class KeepNearest(ast.NodeTransformer):
-    """Replace orbit marks by the update of a running value, and return it beside the field's."""
-
-    def __init__(self, update: str) -> None:
-        self.update = update
-
-    def visit_Expr(self, node: ast.Expr) -> Any:
-        if not source.is_mark(node):
-            return node
-        assert isinstance(node.value, ast.Call)
-        r2, alive, x, y, z = (f"({ast.unparse(argument)})" for argument in node.value.args)
-        value = self.update.format(r2=r2, x=x, y=y, z=z)
-        return parse(f"nearest = where({alive}, {value}, nearest)").body[0]
-
-    def visit_Return(self, node: ast.Return) -> Any:
-        assert node.value is not None
-        return parse(f"return {ast.unparse(node.value)}, nearest").body[0]
+def write(linker: Linker, function: Callable[..., Any], lines: Sequence[str]) -> None:
+    """Add a function of a scene, of some lines, with the name and the arguments of an intrinsic."""
+    linker.write(function.__name__, functions.parameters(function), lines)
 
 
-class KeepChild(ast.NodeTransformer):
-    """Evaluate the child's triple before each statement that calls the child.
+@dataclass
+class TrapReader(FormulaReader):
+    """Reads a shape with the running value of an orbit's trap, which it returns beside the field's."""
 
-    The triple of lowest value is kept.
-    """
+    trap: str = field(kw_only=True)
 
-    def __init__(self, child: Run) -> None:
-        self.child = child
+    def read(self) -> Graph:
+        start, _, _ = _TRAPS[self.trap]
+        self.names["nearest"] = self.add("add", self.add("mul", 0.0, self.names["x"]), start)
+        return super().read()
 
-    def visit_Assign(self, node: ast.Assign) -> Any:
-        return self.taken(node)
+    def expression(self, node: ast.expr) -> None:
+        """The mark of a step of the orbit."""
+        assert isinstance(node, ast.Call)
+        r2, alive, x, y, z = map(self.value, node.args)
+        nearest, update = self.names["nearest"], _TRAPS[self.trap][1]
+        value = self.call(formula(update), nearest, r2, x, y, z)
+        self.names["nearest"] = self.add("where", alive, value, nearest)
 
-    def visit_Return(self, node: ast.Return) -> Any:
-        lines = self.taken(node)
-        value = ast.unparse(lines[-1].value)
-        return [*lines[:-1], parse(f"return {value}, paint, tone").body[0]]
+    def parts(self, node: ast.For | ast.While) -> tuple[set[str], Callable[[], bool]]:
+        """Names that a loop changes: the running value, too."""
+        changed, body = super().parts(node)
+        return changed | {"nearest"}, body
 
-    def taken(self, node: Any) -> list[Any]:
-        calls = [
-            c
-            for c in ast.walk(node)
-            if isinstance(c, ast.Call) and isinstance(c.func, ast.Name) and c.func.id == "child"
-        ]
-        if not calls:
-            return [node]
-        point = ", ".join(map(ast.unparse, calls[0].args))
-        text = ast.unparse(node).replace(ast.unparse(calls[0]), "inner")
-        lines = [
-            f"inner, p, t = {self.child.call(points=point)}",
-            "paint, tone = where(inner < lowest, p, paint), where(inner < lowest, t, tone)",
-            "lowest = minimum(lowest, inner)",
-        ]
-        return [statement for line in [*lines, text] for statement in self.parsed(line)]
-
-    @staticmethod
-    def parsed(line: str) -> list[Any]:
-        # `ast.parse` accepts a return statement outside a function.
-        return parse(line).body
+    def returned(self, value: Value) -> None:
+        super().returned(self.add("tuple", value, self.names["nearest"]))
 
 
-def text_of(function: Callable[..., Any], lines: Sequence[str]) -> str:
-    """Assemble the source of a function."""
-    names = ", ".join(functions.parameters(function))
-    return "\n    ".join([f"def {function.__name__}({names}):", *lines])
+@dataclass
+class PaintReader(DomainReader):
+    """Reads a domain operator with the paint and the tone of its child's lowest evaluation."""
+
+    def read(self) -> Graph:
+        zero = self.add("mul", 0.0, self.names["x"])
+        self.names |= {"lowest": self.add("add", zero, 1e30), "paint": zero, "tone": zero}
+        return super().read()
+
+    def evaluated_child(self, point: list[Value]) -> Value:
+        inner, paint, tone = self.items(super().evaluated_child(point), 3)
+        names = self.names
+        lower = self.add("lt", inner, names["lowest"])
+        names["paint"] = self.add("where", lower, paint, names["paint"])
+        names["tone"] = self.add("where", lower, tone, names["tone"])
+        names["lowest"] = self.add("minimum", names["lowest"], inner)
+        return inner
+
+    def parts(self, node: ast.For | ast.While) -> tuple[set[str], Callable[[], bool]]:
+        """Names that a loop changes: those of the child, too."""
+        changed, body = super().parts(node)
+        return changed | {"lowest", "paint", "tone"}, body
+
+    def returned(self, value: Value) -> None:
+        super().returned(self.add("tuple", value, self.names["paint"], self.names["tone"]))
 
 
 TRAP, NEAREST = "trap", "point"
 
-_ORBIT = "where(nearest < 1e29, {}, 1.0)"
-_SMALLEST = _ORBIT.format("sqrt(nearest)")
-_TRAPS = {
-    "point": ("1e30", "minimum(nearest, {r2})", _SMALLEST),
-    "axes": (
-        "1e30",
-        "minimum(nearest, minimum({x} * {x} + minimum({y} * {y}, {z} * {z}), {y} * {y} + {z} * {z}))",
-        _SMALLEST,
-    ),
-    "planes": ("1e30", "minimum(nearest, minimum({x} * {x}, minimum({y} * {y}, {z} * {z})))", _SMALLEST),
-    "sphere": ("1e30", "minimum(nearest, absolute({r2} - 1.0))", _ORBIT.format("nearest")),
-    "steps": ("0.0", "nearest + 0.0625", "nearest"),
-    "direction": ("0.5", "0.5 + 0.15915494309189535 * atan2({y}, {x})", "nearest"),
+
+def _nearest_point(nearest, r2, x, y, z):  # type: ignore[no-untyped-def]
+    return minimum(nearest, r2)
+
+
+def _nearest_axis(nearest, r2, x, y, z):  # type: ignore[no-untyped-def]
+    return minimum(nearest, minimum(x * x + minimum(y * y, z * z), y * y + z * z))
+
+
+def _nearest_plane(nearest, r2, x, y, z):  # type: ignore[no-untyped-def]
+    return minimum(nearest, minimum(x * x, minimum(y * y, z * z)))
+
+
+def _nearest_sphere(nearest, r2, x, y, z):  # type: ignore[no-untyped-def]
+    return minimum(nearest, absolute(r2 - 1.0))
+
+
+def _steps(nearest, r2, x, y, z):  # type: ignore[no-untyped-def]
+    return nearest + 0.0625
+
+
+def _direction(nearest, r2, x, y, z):  # type: ignore[no-untyped-def]
+    return 0.5 + 0.15915494309189535 * atan2(y, x)
+
+
+def _tone(nearest):  # type: ignore[no-untyped-def]
+    return nearest
+
+
+def _distance_tone(nearest):  # type: ignore[no-untyped-def]
+    return where(nearest < 1e29, nearest, 1.0)
+
+
+def _root_tone(nearest):  # type: ignore[no-untyped-def]
+    return where(nearest < 1e29, sqrt(nearest), 1.0)
+
+
+_TRAPS: dict[str, tuple[float, Callable[..., Any], Callable[..., Any]]] = {
+    "point": (1e30, _nearest_point, _root_tone),
+    "axes": (1e30, _nearest_axis, _root_tone),
+    "planes": (1e30, _nearest_plane, _root_tone),
+    "sphere": (1e30, _nearest_sphere, _distance_tone),
+    "steps": (0.0, _steps, _tone),
+    "direction": (0.5, _direction, _tone),
 }
 """Start and update of each trap's running value, and its position in the palette: 1 without an orbit."""
 
@@ -153,7 +182,7 @@ class TraceDialect(FieldDialect):
             trap = self.traps.get(id(node), NEAREST)
             return given if trap == NEAREST else replace(given, fixed=(*given.fixed, (TRAP, trap)))
         paint: list[float] = []
-        passed = append_numbers(float(self.materials[id(node)]), paint, "P0")
+        passed = append_numbers(float(self.materials[id(node)]), paint)
         return Arguments(node.function, (), (passed,), tuple(paint))
 
     def order(self, node: Node, parts: Sequence[Subroutine]) -> Sequence[int]:
@@ -163,70 +192,87 @@ class TraceDialect(FieldDialect):
         """
         return range(len(parts))
 
-    def write(self, name: str, node: Node, given: Arguments, runs: Sequence[Run]) -> str:
-        """Write the function of a node; see `Dialect.write`."""
+    def write(self, name: str, node: Node, given: Arguments, runs: Sequence[Run]) -> Function:
+        """Return the function of a node; see `Dialect.write`."""
         if node.formula.name == material.name:
             return self.painted(name, given, runs[0])
         return super().write(name, node, given, runs)
 
-    def painted(self, name: str, given: Arguments, child: Run) -> str:
-        """Write the function of a material: its paint applies where the child has none."""
-        return function(
-            name,
-            [
-                f"f, paint, tone = {child.call()}",
-                f"return f, where(paint > 0.5, paint, {given.passed[0]}), tone",
-            ],
+    def painted(self, name: str, given: Arguments, child: Run) -> Function:
+        """Return the function of a material: its paint applies where the child has none."""
+
+        def write(writer: Writer) -> Value:
+            f, paint, tone = writer.items(child.call(writer), 3)
+            (own,) = given.load(writer)
+            kept = writer.add("where", writer.add("gt", paint, 0.5), paint, own)
+            return writer.add("tuple", f, kept, tone)
+
+        return part_function(name, given, [child], write, "painted")
+
+    def shape(self, name: str, given: Arguments, _: Sequence[Run]) -> Function:
+        """Return the function of a shape: the field value and the orbit trap; see `FieldDialect.shape`."""
+        known = dict(given.fixed)
+        trap = known.pop(TRAP, NEAREST)
+        of, tone = trapped(given.function, tuple(known.items()), trap), _TRAPS[trap][2]
+
+        def write(writer: Writer) -> Value:
+            x, y, z = (writer.names[a] for a in "xyz")
+            f, nearest = writer.items(writer.call(of, x, y, z, *given.load(writer)), 2)
+            paint = writer.add("mul", 0.0, x)
+            return writer.add("tuple", f, paint, writer.call(formula(tone), nearest))
+
+        return part_function(
+            name, replace(given, fixed=tuple(known.items())), (), write, f"trap {of.identity}"
         )
 
-    def shape(self, name: str, given: Arguments, _: Sequence[Run]) -> str:
-        """Write the function of a shape: the field value and the orbit trap; see `FieldDialect.shape`."""
-        fixed = dict(given.fixed)
-        start, update, tone = _TRAPS[fixed.pop(TRAP, NEAREST)]
-        tree = KeepNearest(update).visit(source.specialise(given.function, fixed))
-        tree.body.insert(0, parse(f"nearest = 0.0 * x + {start}").body[0])
-        called = f"{name}_of"
-        self.linker.functions[called] = self.linker.named(called, tree, given.function)
-        return function(
-            name,
-            [
-                f"f, nearest = {called}({', '.join(['x', 'y', 'z', *given.passed])})",
-                f"return f, 0.0 * x, {tone}",
-            ],
-        )
-
-    def csg_operator(self, name: str, given: Arguments, runs: Sequence[Run]) -> str:
-        """Write the function of a CSG operator: paint and tone of the child that determines the value.
+    def csg_operator(self, name: str, given: Arguments, runs: Sequence[Run]) -> Function:
+        """Return the function of a CSG operator: paint and tone of the child that determines the value.
 
         See `FieldDialect.csg_operator`.
         """
-        called = self.linker.share(given.function, given.fixed, OF_FORMULAS)
-        lines = [f"f, paint, tone = {runs[0].call()}"]
-        if sum(run.count for run in runs) == 1:
-            lines.append(f"f = {called}({', '.join(['f', *given.passed])})")
-        taken = [
-            "g, p, t = {}",
-            f"a, f = f, {called}({', '.join(['f', 'g', *given.passed])})",
-            "mine = absolute(absolute(f) - absolute(a)) <= absolute(absolute(f) - absolute(g))",
-            "paint, tone = where(mine, paint, p), where(mine, tone, t)",
-        ]
-        for k, run in enumerate(runs):
-            lines += fold_lines(run, k == 0, lambda call: [taken[0].format(call), *taken[1:]])
-        return function(name, [*lines, "return f, paint, tone"])
 
-    def domain_operator(self, name: str, given: Arguments, runs: Sequence[Run]) -> str:
-        """Write the function of a domain operator: paint and tone of the child's lowest evaluation.
+        def write(writer: Writer) -> Value:
+            add = writer.add
+
+            def fold(run: Run, k: Value | None) -> None:
+                g, p, t = writer.items(run.call(writer, k=k), 3)
+                a, names = writer.names["f"], writer.names
+                names["f"] = f = writer.call(given.read, a, g, *given.load(writer))
+                apart = (add("absolute", add("sub", add("absolute", f), add("absolute", v))) for v in (a, g))
+                mine = add("le", *apart)
+                names["paint"] = add("where", mine, names["paint"], p)
+                names["tone"] = add("where", mine, names["tone"], t)
+
+            first = writer.items(runs[0].call(writer), 3)
+            writer.names.update(zip(("f", "paint", "tone"), first, strict=True))
+            if sum(run.count for run in runs) == 1:
+                writer.names["f"] = writer.call(given.read, writer.names["f"], *given.load(writer))
+            for k, run in enumerate(runs):
+                run.each(writer, k == 0, {"f", "paint", "tone"}, fold)
+            return add("tuple", *(writer.names[name] for name in ("f", "paint", "tone")))
+
+        return part_function(name, given, runs, write, "traced csg")
+
+    def domain_operator(self, name: str, given: Arguments, runs: Sequence[Run]) -> Function:
+        """Return the function of a domain operator: paint and tone of the child's lowest evaluation.
 
         See `FieldDialect.domain_operator`.
         """
-        tree = source.specialise(given.function, dict(given.fixed))
-        arguments = [a.arg for a in tree.args.args][4:]
-        tree.args.args = [ast.arg(a) for a in ("x", "y", "z", "P", "P0")]
-        tree = KeepChild(runs[0]).visit(tree)
-        start = [f"{a} = {p}" for a, p in zip(arguments, given.passed, strict=True)]
-        start += ["lowest = 0.0 * x + 1e30", "paint = 0.0 * x", "tone = 0.0 * x"]
-        tree.body = [*(parse(line).body[0] for line in start), *tree.body]
-        return self.linker.named(name, tree, given.function)
+        return domain_function(PaintReader, name, given, runs[0])
+
+
+def trapped(function: Callable[..., Any], fixed: tuple[tuple[str, Any], ...], trap: str) -> Function:
+    """Return the function of a shape that returns its field and the running value of an orbit's trap."""
+    source, plain = Source.of(function, "formula"), formula(function, fixed)
+    updating = formula(_TRAPS[trap][1])
+
+    def read(width: Width) -> Graph:
+        reader = TrapReader(width, source=source, fixed=dict(fixed), trap=trap)
+        reader.begin(plain.parameters)
+        return reader.read()
+
+    about = identified("trap", _TRAPS[trap][0], plain, updating)
+    return Function(f"{plain.name}_{trap}", plain.parameters, about, read, source.error)
 
 
 TEXELS = 1024 * 1024

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import from_linear
-from ..expr import vocabulary
-from ..expr.language import CALLED
+from ..expr.graph import Evaluator, Function
 from ..fields.linker import Linker, link_tree
+from ..fields.reference import ON_ARRAYS
 from ..fields.registry import Node
 from ..formulas.material import material
 from ..work import Work, chunks
@@ -42,15 +42,15 @@ def paint(root: Node, points: NDArray[np.float64], shown: str, work: Work) -> Pa
     """
     if shown != MATERIAL:
         root = material(_plain(root), palette=PALETTE, trap=shown)
-    source, parameters = _link_painting(root)
-    scope = {name: getattr(vocabulary, name) for name in vocabulary.NAMES}
-    scope[CALLED] = lambda function: function
-    exec(compile(source, "<linked colours>", "exec"), scope)
+    functions, parameters = _link_painting(root)
+    evaluator = Evaluator(ON_ARRAYS, functions)
     values = np.empty((5, len(points)))
 
     def evaluate(rows: slice) -> None:
         with np.errstate(all="ignore"):
-            values[:, rows] = np.broadcast_arrays(*scope[_FUNCTION](*points[rows].T, parameters))
+            values[:, rows] = np.broadcast_arrays(
+                *evaluator(functions[_FUNCTION], *points[rows].T, parameters)
+            )
 
     work.map(evaluate, chunks(len(points), COUNT))
     tone = {"trap" if shown == MATERIAL else shown: values[4].astype(np.float32)}
@@ -65,8 +65,8 @@ def _plain(node: Node) -> Node:
     return node.changed(tuple(map(_plain, node.children))) if node.children else node
 
 
-def _link_painting(root: Node) -> tuple[str, NDArray[np.float64]]:
-    """Text and parameters of the function of linear red, green and blue, material number and tone."""
+def _link_painting(root: Node) -> tuple[Mapping[str, Function], NDArray[np.float64]]:
+    """Functions and parameters of the function of linear red, green and blue, material number and tone."""
     linker = Linker()
     look = Look(linker, root)
     dialect = TraceDialect(linker, materials=look.paints, traps=traps(root))
@@ -77,8 +77,8 @@ def _link_painting(root: Node) -> tuple[str, NDArray[np.float64]]:
         *look.chosen(colours, ("cr", "cg", "cb")),
         "return cr, cg, cb, paint, tone",
     ]
-    linker.functions[_FUNCTION] = "\n    ".join([f"def {_FUNCTION}(x, y, z, P):", *lines])
-    return linker.text(), np.array(linker.parameters or [0.0])
+    linker.write(_FUNCTION, ("x", "y", "z", "P"), lines)
+    return linker.functions, np.array(linker.parameters or [0.0])
 
 
 def _encode_srgb(light: NDArray[np.float64]) -> NDArray[np.uint8]:

@@ -88,7 +88,7 @@ class PartTask:
 
 def frame_key(frame: Frame) -> str:
     """Key of a linked frame."""
-    return key(frame.linked.source, frame.linked.parameters)
+    return key(frame.linked.program.identity, frame.linked.parameters)
 
 
 class PoolTracer:
@@ -377,7 +377,7 @@ class Renderer:
         """
         linked, samples = self._frame.linked, self.tracer.samples
         about = self.crop.size, self.setup.precision, samples
-        return key(program(), *about, linked.source, linked.parameters)
+        return key(program(), *about, linked.program.identity, linked.parameters)
 
     def look(self, camera: Camera) -> None:
         """Restart the picture from another camera; depths and precision are kept.

@@ -5,7 +5,6 @@ from __future__ import annotations
 from ...expr.loops import field, gather, intrinsic
 
 __all__ = [
-    "GIVEN",
     "background",
     "blocker",
     "camera_ray",
@@ -17,9 +16,6 @@ __all__ = [
     "surface",
     "transparent",
 ]
-
-GIVEN = frozenset({"blocker", "field", "gather", "transparent"})
-"""Intrinsics that units may call before the linker writes them."""
 
 
 @intrinsic

@@ -1,0 +1,613 @@
+"""Reader of the language: from functions of Python to graphs.
+
+What a function takes from outside is known when it is read: numbers become constants, functions are called,
+branches on what is known are resolved, loops over tuples that are known are unrolled. An argument may be known,
+too. The text is structured: names are assigned, and branches and loops end where they began. Every name
+therefore has one value at every place, and a value that differs where two ways join becomes a parameter of the
+block there (Braun et al. 2013, "Simple and Efficient Construction of Static Single Assignment Form", has the
+general case).
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import linecache
+import operator
+import re
+import textwrap
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache, reduce
+from types import FunctionType
+from typing import Any, NoReturn
+
+from ..errors import KernelError
+from . import vocabulary
+from .functions import fingerprint, identity, is_number, parameters, scope
+from .graph import (
+    Block,
+    Function,
+    Graph,
+    MismatchError,
+    Names,
+    Value,
+    Width,
+    Writer,
+    identified,
+)
+from .language import HIGHEST, body_of, check, depends_on_points, intrinsic_name, parse, stored_names
+from .loops import OPERATIONS, Loop, is_intrinsic
+
+OPERATORS: dict[type, str] = {
+    ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "truediv", ast.FloorDiv: "floordiv",
+    ast.Mod: "mod", ast.BitAnd: "and_", ast.BitOr: "or_", ast.BitXor: "xor", ast.LShift: "lshift",
+    ast.RShift: "rshift", ast.Lt: "lt", ast.LtE: "le", ast.Gt: "gt", ast.GtE: "ge", ast.Eq: "eq",
+    ast.NotEq: "ne", ast.USub: "neg", ast.Invert: "invert", ast.Not: "not_",
+}  # fmt: skip
+"""Names in Python's `operator` of its operators."""
+
+Fixed = tuple[tuple[str, Any], ...]
+"""Arguments that are known when a function is read, by name."""
+
+_UNKNOWN = object()
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """Text of a function, and what it sees outside."""
+
+    name: str
+    place: str  # file and kind, for errors, with braces for the line
+    tree: Callable[[], ast.FunctionDef]
+    scope: Callable[[], Mapping[str, Any]]
+
+    @classmethod
+    def of(cls, function: Callable[..., Any], kind: str) -> Source:
+        """Source of a function of Python."""
+        place = f"{function.__code__.co_filename}:{{}}: {kind} {function.__name__}: "
+        return cls(function.__name__, place, lambda: syntax(function), lambda: scope(function))
+
+    def error(self, node: Any, message: str) -> KernelError:
+        """Error about a statement or an expression."""
+        shown = (
+            f"{ast.unparse(node).splitlines()[0]!r} cannot be compiled: "
+            if isinstance(node, ast.stmt)
+            else ""
+        )
+        return KernelError(f"{self.place.format(getattr(node, 'lineno', 1))}{shown}{message}")
+
+
+def syntax(function: Callable[..., Any]) -> ast.FunctionDef:
+    """Return the syntax tree of a function, with the line numbers of its file.
+
+    Raises
+    ------
+    KernelError
+        If its source cannot be read.
+    """
+    name = function.__name__
+    linecache.checkcache(function.__code__.co_filename)
+    try:
+        lines, first = inspect.getsourcelines(function)
+    except (OSError, TypeError):
+        raise KernelError(
+            f"formula {name}: its source cannot be read; expected a def in a file or a notebook"
+        ) from None
+    tree = parse(textwrap.dedent("".join(lines))).body[0]
+    ast.increment_lineno(tree, max(first, 1) - 1)
+    if not isinstance(tree, ast.FunctionDef):
+        raise KernelError(f"{function.__code__.co_filename}:{first}: formula {name}: expected a def")
+    return tree
+
+
+def formula(function: Callable[..., Any], fixed: Fixed = ()) -> Function:
+    """Return a function in the language of formulas with some arguments fixed.
+
+    It is read, and refused with a `KernelError` if it is not in the language, when it is compiled or evaluated.
+    """
+    return _function(FormulaReader, function, fixed, function.__name__, _mark(function, fixed))
+
+
+def loop_function(loop: Loop) -> Function:
+    """Return the function of a loop."""
+    return _function(Reader, loop.function, loop.fixed, loop.name, _mark(loop.function, loop.fixed))
+
+
+def _mark(function: Callable[..., Any], fixed: Fixed) -> object:
+    """What distinguishes values that are equal but not the same: 1 and 1.0, a function and its redefinition."""
+    return fingerprint(function), repr(fixed)
+
+
+@lru_cache(maxsize=2048)
+def _function(
+    kind: type[Reader], function: Callable[..., Any], fixed: Fixed, name: str, _: object
+) -> Function:
+    """Function that a reader reads, cached."""
+    known, source = dict(fixed), Source.of(function, kind.kind)
+    names = tuple(name for name in parameters(function) if name not in known)
+    about = identified(kind.__name__, identity(function, *known.values()), *known)
+
+    def read(width: Width) -> Graph:
+        reader = kind(width, source=source, fixed=known)
+        reader.begin(names)
+        return reader.read()
+
+    return Function(name, names, about, read, source.error, function)
+
+
+@dataclass
+class Reader(Writer):
+    """Reads the statements of a function."""
+
+    source: Source = field(kw_only=True)
+    fixed: dict[str, Any] = field(default_factory=dict)  # what is known, by name
+    exits: list[list[tuple[Block, Names]]] = field(default_factory=list)  # of the loops around
+    returns: int = 0
+
+    kind = "loop"
+
+    def fail(self, node: ast.AST, message: str) -> NoReturn:
+        raise self.source.error(node, message)
+
+    def read(self) -> Graph:
+        """Read the body."""
+        self.tree, self.scope = self.source.tree(), self.source.scope()
+        self.local = {*(a.arg for a in self.tree.args.args), *stored_names(self.tree)}
+        self.names["WIDTH"] = Value("constant", data=self.width.lanes)
+        body = body_of(self.tree)
+        if self.statements(body):
+            self.give(None)
+            if self.returns:
+                self.fail(body[-1], "not every way through the function returns a value")
+        return self.graph
+
+    # --- what is known ---
+    def outside(self, name: str) -> Any:
+        """What a name stands for outside the function."""
+        return self.scope.get(name, _UNKNOWN)
+
+    def known(self, node: ast.expr) -> Any:
+        """Value of an expression that is known when the function is read; operators on whole numbers are."""
+        match node:
+            case ast.Constant(value):
+                return value
+            case ast.Name("WIDTH"):
+                return _UNKNOWN
+            case ast.Name(name) if name in self.fixed:
+                return self.fixed[name]
+            case ast.Name(name):
+                return _UNKNOWN if name in self.local else self.outside(name)
+            case ast.Attribute(record, name):
+                return getattr(self.known(record), name, _UNKNOWN)
+            case ast.Tuple(parts):
+                values = tuple(map(self.known, parts))
+                return _UNKNOWN if any(value is _UNKNOWN for value in values) else values
+            case ast.Subscript(place, index):
+                place, index = self.known(place), self.known(index)
+                return place[index] if type(place) is tuple and type(index) is int else _UNKNOWN
+            case ast.UnaryOp(op, operand):
+                return self.folded(op, operand)
+            case ast.BinOp(left, op, right) if not isinstance(op, ast.Pow):
+                return self.folded(op, left, right)
+            case ast.Compare(left, [op], [right]):
+                return self.folded(op, left, right)
+            case ast.IfExp(test, yes, no):
+                test = self.known(test)
+                return _UNKNOWN if not _decides(test) else self.known(yes if test else no)
+        return _UNKNOWN
+
+    def folded(self, op: ast.AST, *operands: ast.expr) -> Any:
+        values = [self.known(operand) for operand in operands]
+        if not all(isinstance(value, int) for value in values) or type(op) not in OPERATORS:
+            return _UNKNOWN
+        return getattr(operator, OPERATORS[type(op)])(*map(int, values))
+
+    # --- expressions ---
+    def value(self, node: ast.expr) -> Value:
+        """Read an expression."""
+        known = self.known(node)
+        if is_number(known):
+            return self.constant(_plain(known))
+        match node:
+            case ast.Name(name) if name in self.names:
+                return self.names[name]
+            case ast.Name() | ast.Attribute():
+                raise MismatchError(f"{ast.unparse(node)!r} has no value here")
+            case ast.Tuple(parts):
+                return self.add("tuple", *map(self.value, parts))
+            case ast.UnaryOp(ast.UAdd(), operand):
+                return self.value(operand)
+            case ast.UnaryOp(op, operand):
+                return self.add(OPERATORS[type(op)], self.value(operand))
+            case ast.BinOp(left, ast.Pow(), right):
+                return self.power(self.value(left), self.known(right))
+            case ast.BinOp(left, op, right):
+                return self.binary(node, OPERATORS[type(op)], self.value(left), self.value(right))
+            case ast.Compare(left, ops, others):
+                terms = list(map(self.value, (left, *others)))
+                pairs = zip(ops, terms, terms[1:], strict=False)
+                compared = [self.comparison(OPERATORS[type(op)], a, b) for op, a, b in pairs]
+                return reduce(lambda a, b: self.add("and_", a, b), compared)
+            case ast.BoolOp(op, [first, *others]):
+                return reduce(lambda a, b: self.short(op, a, b), others, self.truth(first))
+            case ast.IfExp(test, yes, no):
+                return self.choice(test, yes, no)
+            case ast.Subscript(place, index):
+                return self.element(self.value(place), self.value(index))
+            case ast.Call(function, arguments):
+                return self.calling(node, function, arguments)
+        raise MismatchError("it is not in the language")
+
+    def truth(self, node: ast.expr) -> Value:
+        return self.add("truth", self.value(node))
+
+    def binary(self, node: ast.expr, op: str, a: Value, b: Value) -> Value:
+        return self.add(op, a, b)
+
+    def power(self, base: Value, exponent: Any) -> Value:
+        """A root, or a product."""
+        if exponent == 0.5:
+            return self.add("sqrt", base)
+        if exponent not in range(1, HIGHEST + 1):
+            raise MismatchError(f"a whole exponent from 1 to {HIGHEST}, or 0.5, is expected")
+        return reduce(lambda product, _: self.add("mul", product, base), range(int(exponent) - 1), base)
+
+    def comparison(self, op: str, a: Value, b: Value) -> Value:
+        """A comparison; of whole constants, such as WIDTH, it is one."""
+        if type(a.known) is int and type(b.known) is int:
+            return self.constant(bool(getattr(operator, op)(a.known, b.known)))
+        return self.add(op, a, b)
+
+    def element(self, place: Value, index: Value) -> Value:
+        if place.op == "tuple" and type(index.known) is int:
+            return place.operands[index.known]
+        return self.add("element", place, index)
+
+    def choice(self, test: ast.expr, yes: ast.expr, no: ast.expr) -> Value:
+        known = self.known(test)
+        if _decides(known):
+            return self.value(yes if known else no)
+        condition = self.value(test)
+        if isinstance(condition.known, bool):
+            return self.value(yes if condition.known else no)
+        return self.chosen(condition, lambda: self.value(yes), lambda: self.value(no))
+
+    def short(self, op: ast.boolop, a: Value, node: ast.expr) -> Value:
+        """``and`` or ``or``: the second operand is evaluated only if the first does not decide."""
+        if isinstance(op, ast.And):
+            return self.chosen(a, lambda: self.truth(node), lambda: self.constant(False))
+        return self.chosen(a, lambda: self.constant(True), lambda: self.truth(node))
+
+    def chosen(self, test: Value, yes: Callable[[], Value], no: Callable[[], Value]) -> Value:
+        """A choice between two values; only the chosen one is computed."""
+        names, ends = self.names, []
+        for block, way in zip(self.fork(test), (yes, no), strict=True):
+            self.block = block
+            value = way()
+            ends.append((self.block, {"": value}))
+        self.joined(ends)
+        (value,), self.names = self.names.values(), names
+        return value
+
+    # --- calls ---
+    def calling(self, node: ast.Call, function: ast.expr, arguments: list[ast.expr]) -> Value:
+        """A call of an intrinsic, of a function from outside, or of one of the scene."""
+        if node.keywords:
+            self.fail(node, f"{ast.unparse(node)!r}: expected arguments by their place")
+        match node:
+            case ast.Call(ast.Name("tuple"), [ast.GeneratorExp(element, [generator])]):
+                return self.unrolled_tuple(node, element, generator)
+        called = self.known(function)
+        name = self.operation(function, called)
+        if name is not None:
+            return self.intrinsic(name, list(map(self.value, arguments)))
+        if is_intrinsic(called):
+            return self.call(called.__name__, *map(self.value, arguments))
+        if isinstance(called, Function):
+            return self.call_counted(called, list(map(self.value, arguments)))
+        if not isinstance(called, FunctionType):
+            raise MismatchError(f"{ast.unparse(function)!r} is no function")
+        return self.call_function(called, arguments)
+
+    def call_counted(self, function: Function, given: list[Value]) -> Value:
+        """A call with as many values as the function takes."""
+        if len(given) != len(function.parameters):
+            count = len(function.parameters)
+            raise MismatchError(f"{function.name} takes {count} values, found {len(given)}")
+        return self.call(function, *given)
+
+    def operation(self, node: ast.expr, called: Any) -> str | None:
+        """The operation that a function stands for."""
+        if called in (min, max, int):
+            return str(called.__name__)
+        if is_intrinsic(called):
+            return called.__name__ if called.__name__ in OPERATIONS else None
+        return intrinsic_name(called)
+
+    def intrinsic(self, name: str, given: list[Value]) -> Value:
+        if name == "pow":
+            return self.power(given[0], given[1].known)
+        if name in ("minimum", "maximum") and len(given) > 2:
+            return reduce(lambda a, b: self.add(name, a, b), given)
+        return self.add(name, *given)
+
+    def call_function(self, called: Callable[..., Any], arguments: list[ast.expr]) -> Value:
+        """A call of a function from outside; what is known and no number is fixed in it."""
+        fixed, passed, names = [], [], parameters(called)
+        for name, argument in zip(names, arguments, strict=False):
+            value = self.known(argument)
+            if value is _UNKNOWN or isinstance(value, (int, float)):
+                passed.append(self.value(argument))
+            else:
+                fixed.append((name, value))
+        passed += map(self.value, arguments[len(names) :])
+        kept = tuple(fixed)
+        return self.call_counted(
+            _function(Reader, called, kept, called.__name__, _mark(called, kept)), passed
+        )
+
+    def unrolled_tuple(self, node: ast.Call, element: ast.expr, generator: ast.comprehension) -> Value:
+        """A tuple of known length."""
+        match generator:
+            case ast.comprehension(ast.Name(counter), ast.Call(ast.Name("range"), [limit]), []):
+                count = self.known(limit)
+                if type(count) is int:
+                    return self.add("tuple", *(self.with_known({counter: k}, element) for k in range(count)))
+        self.fail(node, "expected a range that is known when the loop is compiled")
+
+    def with_known(self, values: Mapping[str, Any], node: ast.expr) -> Value:
+        outer, self.fixed = self.fixed, {**self.fixed, **values}
+        value = self.value(node)
+        self.fixed = outer
+        return value
+
+    # --- statements: each returns True if the next statement is reachable ---
+    def statements(self, body: Sequence[ast.stmt]) -> bool:
+        for statement in body:
+            self.statement = statement
+            try:
+                reached = self.read_statement(statement)
+            except MismatchError as error:
+                self.fail(statement, str(error))
+            if not reached:
+                return False
+        return True
+
+    def read_statement(self, node: ast.stmt) -> bool:
+        match node:
+            case ast.Assign([target], value):
+                self.assign(target, self.value(value))
+            case ast.AugAssign(target, op, value):
+                self.assign(target, self.value(ast.BinOp(_loaded(target), op, value)))
+            case ast.Expr(value):
+                self.expression(value)
+            case ast.Return(value):
+                self.returned(self.value(value) if value else self.add("tuple"))
+                return False
+            case ast.Break():
+                self.exits[-1].append((self.block, dict(self.names)))
+                return False
+            case ast.If(test, body, orelse):
+                return self.condition(test, body, orelse)
+            case ast.While(ast.Constant(True)):
+                return self.repeated(node, lambda: None)
+            case ast.While(test):
+                return self.repeated(node, lambda: self.value(test))
+            case ast.For(ast.Name(counter), ast.Call(ast.Name("range"), limits)):
+                return self.ranged(node, counter, list(map(self.value, limits)))
+            case ast.For(ast.Name(counter), ast.Call(ast.Name("shares"), [count, step])):
+                return self.shared(node, counter, self.value(count), self.value(step))
+            case ast.For(target, iterated):
+                return self.over(node, target, iterated)
+            case ast.Pass():
+                pass
+            case _:
+                raise MismatchError("it is not in the language")
+        return True
+
+    def expression(self, node: ast.expr) -> None:
+        """A statement that is an expression."""
+        self.value(node)
+
+    def returned(self, value: Value) -> None:
+        """The end of the function."""
+        self.give(value)
+        self.returns += 1
+
+    def assign(self, target: ast.expr, value: Value) -> None:
+        match target:
+            case ast.Name(name):
+                self.names[name] = value
+            case ast.Tuple(parts):
+                for part, item in zip(parts, self.items(value, len(parts)), strict=True):
+                    self.assign(part, item)
+            case ast.Subscript(place, index):
+                self.add("set", self.value(place), self.value(index), value)
+            case _:
+                raise MismatchError("a name is expected to assign to")
+
+    def condition(self, test: ast.expr, body: Sequence[ast.stmt], orelse: Sequence[ast.stmt]) -> bool:
+        known = self.known(test)
+        if _decides(known):
+            return self.statements(body if known else orelse)
+        condition = self.value(test)
+        if isinstance(condition.known, bool):
+            return self.statements(body if condition.known else orelse)
+        return self.branch(condition, body, orelse)
+
+    def branch(self, test: Value, body: Sequence[ast.stmt], orelse: Sequence[ast.stmt]) -> bool:
+        names, ends, statement = dict(self.names), [], self.statement
+        for block, part in zip(self.fork(test), (body, orelse), strict=True):
+            self.block, self.names = block, dict(names)
+            if self.statements(part):
+                ends.append((self.block, self.names))
+        self.statement = statement
+        return self.joined(ends)
+
+    def ranged(self, node: ast.For, counter: str, limits: list[Value]) -> bool:
+        """A loop over a range."""
+        ends = [limit.known for limit in limits]
+        if self.width.lanes == 1 and all(type(end) is int for end in ends) and _fills_array(node.body):
+            return self.rounds(node.body, ({counter: k} for k in range(*ends)))
+        return self.within(lambda exits: self.counted(counter, limits, *self.parts(node), exits))
+
+    def repeated(self, node: ast.While, test: Callable[[], Value | None]) -> bool:
+        """A loop while a condition holds."""
+        changed, body = self.parts(node)
+        return self.within(lambda exits: self.loop(changed, {}, test, body, exits))
+
+    def within(self, loop: Callable[[list[tuple[Block, Names]]], bool]) -> bool:
+        """Read a loop; statements in it may leave it."""
+        self.exits.append([])
+        reached = loop(self.exits[-1])
+        self.exits.pop()
+        return reached
+
+    def parts(self, node: ast.For | ast.While) -> tuple[set[str], Callable[[], bool]]:
+        """Names that the body of a loop assigns, and its reader."""
+        return self.assigned(node.body), lambda: self.statements(node.body)
+
+    def assigned(self, body: Sequence[ast.stmt]) -> set[str]:
+        """Names that statements assign, without those that are known to be passed over."""
+        names = set[str]()
+        for statement in body:
+            match statement:
+                case ast.If(test, then, orelse) if _decides(known := self.known(test)):
+                    names |= self.assigned(then if known else orelse)
+                case ast.If(_, then, orelse):
+                    names |= self.assigned([*then, *orelse])
+                case ast.For(_, _, inner) | ast.While(_, inner):
+                    names |= self.assigned(inner)
+                case _:
+                    names |= stored_names(statement)
+        return names
+
+    def over(self, node: ast.For, target: ast.expr, iterated: ast.expr) -> bool:
+        """A loop over a tuple of numbers: its rounds one after the other."""
+        values = self.known(iterated)
+        if type(values) is not tuple:
+            raise MismatchError("it is not in the language")
+        names = [target] if isinstance(target, ast.Name) else getattr(target, "elts", [])
+        rows = (value if isinstance(target, ast.Tuple) else (value,) for value in values)
+        return self.rounds(node.body, (dict(zip(map(ast.unparse, names), row, strict=True)) for row in rows))
+
+    def rounds(self, body: Sequence[ast.stmt], values: Iterator[dict[str, Any]]) -> bool:
+        """The rounds of a loop one after the other; the names of its counters are known in each."""
+        outer = self.fixed
+        for known in values:
+            self.fixed = {**outer, **known}
+            if not self.statements(body):
+                return False
+        self.fixed = outer
+        return True
+
+    def shared(self, node: ast.For, counter: str, count: Value, step: Value) -> bool:
+        """A loop that the threads of a GPU share, one round each; elsewhere it is a loop over a range.
+
+        Where there is one lane, a round is of one.
+        """
+        if not self.width.on_gpu:
+            step = self.constant(1) if self.width.lanes == 1 else step
+            return self.ranged(node, counter, [self.constant(0), count, step])
+        self.names[counter] = thread = self.add("thread")
+        return self.branch(self.add("lt", thread, count), node.body, ())
+
+
+def _decides(value: Any) -> bool:
+    """True for a known value on which a branch is resolved."""
+    return isinstance(value, (int, float, tuple))
+
+
+def _plain(value: Any) -> Any:
+    """Convert a number of any library to Python's own."""
+    if isinstance(value, tuple):
+        return tuple(map(_plain, value))
+    return value if isinstance(value, bool) else int(value) if isinstance(value, int) else float(value)
+
+
+def _loaded(target: ast.expr) -> ast.expr:
+    """The expression of what is assigned to."""
+    match target:
+        case ast.Name(name):
+            return ast.copy_location(ast.Name(name, ast.Load()), target)
+        case ast.Subscript(place, index):
+            return ast.copy_location(ast.Subscript(place, index, ast.Load()), target)
+    return target
+
+
+def _fills_array(body: Sequence[ast.stmt]) -> bool:
+    """True if statements, which no break leaves, assign elements of an array."""
+    nodes = [node for statement in body for node in ast.walk(statement)]
+    stores = any(isinstance(n, ast.Subscript) and isinstance(n.ctx, ast.Store) for n in nodes)
+    return stores and not any(isinstance(n, ast.Break) for n in nodes)
+
+
+@dataclass
+class FormulaReader(Reader):
+    """Reads functions in the language of formulas."""
+
+    kind = "formula"
+
+    def read(self) -> Graph:
+        self.check()
+        return super().read()
+
+    def check(self) -> None:
+        """Check that the function is in the language."""
+        self.points = check(self.source.tree(), self.source.scope(), self.source.error)
+
+    def binary(self, node: ast.expr, op: str, a: Value, b: Value) -> Value:
+        """An operator; remainders and floored quotients of points are those of Python."""
+        if op not in ("mod", "floordiv") or not depends_on_points(node, self.points):
+            return self.add(op, a, b)
+        whole = self.add("floor", self.add("truediv", a, b))
+        return whole if op == "floordiv" else self.add("sub", a, self.add("mul", b, whole))
+
+    def operation(self, node: ast.expr, called: Any) -> str | None:
+        if called is _UNKNOWN and isinstance(node, ast.Name) and node.id in vocabulary.NAMES:
+            return node.id
+        return "int" if called is int else super().operation(node, called)
+
+    def call_function(self, called: Callable[..., Any], arguments: list[ast.expr]) -> Value:
+        return self.call_counted(formula(called), list(map(self.value, arguments)))
+
+    def expression(self, node: ast.expr) -> None:
+        """The mark of a step of an orbit, which only some readers use."""
+
+
+@dataclass
+class TextReader(FormulaReader):
+    """Reads text that is written for a kernel."""
+
+    def check(self) -> None:
+        self.points = set()
+
+
+def text_function(
+    name: str, names: Sequence[str], lines: Sequence[str], called: Mapping[str, Function]
+) -> Function:
+    """Return the function of some lines.
+
+    `called`: functions that they may call, by name.
+    """
+    text = "\n    ".join([f"def {name}({', '.join(names)}):", *lines])
+    used = [word for word in dict.fromkeys(_WORD.findall(text)) if word in called]
+    functions = {word: called[word] for word in used}
+    source = Source(name, f"<{name}>:{{}}: ", lambda: _parsed(text), lambda: functions)
+
+    def read(width: Width) -> Graph:
+        reader = TextReader(width, source=source)
+        reader.begin(names)
+        return reader.read()
+
+    return Function(name, tuple(names), identified(text, *functions.values()), read, source.error)
+
+
+_WORD = re.compile(r"[A-Za-z_]\w*")
+
+
+def _parsed(text: str) -> ast.FunctionDef:
+    (tree,) = parse(text).body
+    assert isinstance(tree, ast.FunctionDef)
+    return tree
