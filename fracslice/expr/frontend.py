@@ -1,17 +1,16 @@
 """Reader of the language: from functions of Python to graphs.
 
 What a function takes from outside is known when it is read: numbers become constants, functions are called,
-branches on what is known are resolved, loops over tuples that are known are unrolled. An argument may be known,
-too. The text is structured: names are assigned, and branches and loops end where they began. Every name
-therefore has one value at every place, and a value that differs where two ways join becomes a parameter of the
-block there (Braun et al. 2013, "Simple and Efficient Construction of Static Single Assignment Form", has the
-general case).
+branches on what is known are resolved, loops over tuples that are known are unrolled. An argument may be
+known, too. The text is structured: names are assigned, and branches and loops end where they began. Every
+name therefore has one value at every place, and a value that differs where two ways join becomes a parameter
+of the block there (Braun et al. 2013, "Simple and Efficient Construction of Static Single Assignment Form",
+has the general case).
 """
 
 from __future__ import annotations
 
 import ast
-import inspect
 import linecache
 import operator
 import re
@@ -86,6 +85,8 @@ def syntax(function: Callable[..., Any]) -> ast.FunctionDef:
     KernelError
         If its source cannot be read.
     """
+    import inspect  # which takes as long as loading a small scene
+
     name = function.__name__
     linecache.checkcache(function.__code__.co_filename)
     try:
@@ -104,7 +105,8 @@ def syntax(function: Callable[..., Any]) -> ast.FunctionDef:
 def formula(function: Callable[..., Any], fixed: Fixed = ()) -> Function:
     """Return a function in the language of formulas with some arguments fixed.
 
-    It is read, and refused with a `KernelError` if it is not in the language, when it is compiled or evaluated.
+    When it is compiled or evaluated, it is read, and refused with a `KernelError` if it is not in the
+    language.
     """
     return _function(FormulaReader, function, fixed, function.__name__, _mark(function, fixed))
 
@@ -115,8 +117,8 @@ def loop_function(loop: Loop) -> Function:
 
 
 def _mark(function: Callable[..., Any], fixed: Fixed) -> object:
-    """What distinguishes values that are equal but not the same: 1 and 1.0, a function and its redefinition."""
-    return fingerprint(function), repr(fixed)
+    """What differs of values that are equal but not the same: 1 and 1.0, a function and its redefinition."""
+    return fingerprint(function), tuple(repr(value) for _, value in fixed if is_number(value))
 
 
 @lru_cache(maxsize=2048)
@@ -186,6 +188,8 @@ class Reader(Writer):
             case ast.Subscript(place, index):
                 place, index = self.known(place), self.known(index)
                 return place[index] if type(place) is tuple and type(index) is int else _UNKNOWN
+            case ast.UnaryOp(ast.USub(), ast.Constant(float(number))):
+                return -number
             case ast.UnaryOp(op, operand):
                 return self.folded(op, operand)
             case ast.BinOp(left, op, right) if not isinstance(op, ast.Pow):
@@ -565,9 +569,11 @@ class FormulaReader(Reader):
         return whole if op == "floordiv" else self.add("sub", a, self.add("mul", b, whole))
 
     def operation(self, node: ast.expr, called: Any) -> str | None:
-        if called is _UNKNOWN and isinstance(node, ast.Name) and node.id in vocabulary.NAMES:
+        if called is _UNKNOWN and isinstance(node, ast.Name) and node.id in vocabulary.NAMES | {"int"}:
             return node.id
-        return "int" if called is int else super().operation(node, called)
+        if called is int or is_intrinsic(called):
+            return super().operation(node, called)
+        return intrinsic_name(called)
 
     def call_function(self, called: Callable[..., Any], arguments: list[ast.expr]) -> Value:
         return self.call_counted(formula(called), list(map(self.value, arguments)))

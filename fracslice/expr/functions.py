@@ -61,14 +61,17 @@ def _mark(value: Any, attributes: tuple[str, ...] = ()) -> Hashable:
         return value
     if isinstance(value, ModuleType):
         return value, tuple(_mark(vars(value).get(name)) for name in attributes)
+    if is_dataclass(value) and not isinstance(value, type):
+        return value  # type: ignore[return-value]
     return type(value), repr(value) if isinstance(value, (int, float, tuple)) else None
 
 
 def identity(*values: Any) -> str:
     """Describe functions, the functions that they call, and all values that these use from outside."""
     described = _Described()
-    for value in sorted(values, key=lambda value: not isinstance(value, FunctionType)):
-        described.add(value, tuple(sorted(described.names)))
+    for value in values:
+        described.add(value)
+    described.add_records()
     return "\n".join(described.lines)
 
 
@@ -78,11 +81,11 @@ class _Described:
     def __init__(self) -> None:
         self.lines: list[str] = []
         self.seen: dict[tuple[int, tuple[str, ...]], Any] = {}
-        self.names = set[str]()
-        """Names that the functions so far use: their arguments are used by these."""
+        self.names = set[str]()  # names that the functions use
+        self.records: list[Any] = []  # those whose attributes of these names are used
 
-    def add(self, value: Any, names: tuple[str, ...]) -> None:
-        """Add a value; of a module, class or record the attributes with some names."""
+    def add(self, value: Any, names: tuple[str, ...] = ()) -> None:
+        """Add a value; of a module or a class the attributes with some names."""
         if value is None or isinstance(value, (bool, int, float, str, Enum)):
             self.lines.append(repr(value))
             return
@@ -93,21 +96,34 @@ class _Described:
             return
         self.seen[id(value), names] = value
         if isinstance(value, FunctionType):
+            outside = scope(value)
             self.names.update(names)
             self.lines += _source(value.__code__)
-            outside = scope(value)
-            self.named({name: outside[name] for name in names if name in outside}, names)
+            self.add_named({name: outside[name] for name in names if name in outside}, names)
         elif type(value) is tuple:
             for item in value:
                 self.add(item, names)
-        elif isinstance(value, (ModuleType, type, tuple)) or is_dataclass(value):
-            self.named({name: getattr(value, name) for name in names if hasattr(value, name)}, names)
+        elif isinstance(value, (ModuleType, type)):
+            self.add_named({name: getattr(value, name) for name in names if hasattr(value, name)}, names)
+        elif isinstance(value, tuple) or is_dataclass(value):
+            self.records.append(value)
 
-    def named(self, values: dict[str, Any], names: tuple[str, ...]) -> None:
+    def add_named(self, values: dict[str, Any], names: tuple[str, ...]) -> None:
         """Add values with their names."""
         for name, value in values.items():
             self.lines.append(name)
             self.add(value, names)
+
+    def add_records(self) -> None:
+        """Add the attributes of records that functions use, now that all functions are known."""
+        known = None
+        while known != len(self.names):  # attributes may be functions
+            known, names = len(self.names), tuple(sorted(self.names))
+            for record in self.records:
+                self.lines.append(_label(record))
+                self.add_named(
+                    {name: getattr(record, name) for name in names if hasattr(record, name)}, names
+                )
 
 
 def _label(value: Any) -> str:

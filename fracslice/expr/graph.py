@@ -41,7 +41,7 @@ class MismatchError(Exception):
     """Incompatible values; the message names them."""
 
 
-@dataclass(eq=False, slots=True)
+@dataclass(eq=False, slots=True, repr=False)
 class Value:
     """Result of an operation."""
 
@@ -56,7 +56,7 @@ class Value:
         return self.data if self.op == "constant" else None
 
 
-@dataclass(eq=False, slots=True)
+@dataclass(eq=False, slots=True, repr=False)
 class Jump:
     """Way to another block."""
 
@@ -64,7 +64,7 @@ class Jump:
     passed: list[Value]  # of the parameters of the block
 
 
-@dataclass(eq=False, slots=True)
+@dataclass(eq=False, slots=True, repr=False)
 class Branch:
     """Two ways, by a condition; neither block has parameters."""
 
@@ -74,14 +74,14 @@ class Branch:
     origin: Any = None
 
 
-@dataclass(eq=False, slots=True)
+@dataclass(eq=False, slots=True, repr=False)
 class Return:
     """End of the function; without a value, that of a loop."""
 
     value: Value | None = None
 
 
-@dataclass(eq=False, slots=True)
+@dataclass(eq=False, slots=True, repr=False)
 class Block:
     """Operations one after the other."""
 
@@ -92,7 +92,7 @@ class Block:
     ways: int = 0  # jumps to it, without those that come back
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Graph:
     """Body of a function; its first block is the beginning."""
 
@@ -112,7 +112,7 @@ ARRAYS = Width(0)
 """Arrays of any size, in place of lanes."""
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Function:
     """Function of the language, which is read when it is needed."""
 
@@ -137,7 +137,7 @@ def identified(*parts: object) -> str:
     return hashlib.sha256("\0".join(texts).encode()).hexdigest()[:32]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Program:
     """Functions of a linked scene."""
 
@@ -388,15 +388,12 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {name: getattr(operator, name) for 
 }  # fmt: skip
 
 
-def text(function: Function, width: Width = ARRAYS) -> str:
-    """Return a function and those that it calls as text, for readers."""
-    shown: dict[Function, str] = {}
-    todo = [function]
-    for one in todo:
-        todo += [f for f in _called(one.graph(width)) if f not in todo]
-    for one in reversed(todo):
-        shown[one] = "\n".join(_lines(one, one.graph(width)))
-    return "\n\n".join(shown.values())
+def text(*functions: Function, width: Width = ARRAYS) -> str:
+    """Return functions and those that they call as text, for readers."""
+    shown = list(dict.fromkeys(functions))
+    for one in shown:
+        shown += dict.fromkeys(f for f in _called(one.graph(width)) if f not in shown)
+    return "\n\n".join("\n".join(_lines(one, one.graph(width))) for one in reversed(shown))
 
 
 def _called(graph: Graph) -> Iterator[Function]:

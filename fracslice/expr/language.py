@@ -2,8 +2,8 @@
 
 A formula is plain Python over points: arithmetic, comparisons, the intrinsics of `expr.vocabulary`,
 ``for`` over a range or a tuple of numbers, and ``if not any_of(...): break``. Functions of Python and NumPy
-with the same meaning (abs, min, max, pow, ``math.sqrt``, ``np.sqrt``) stand for intrinsics. Everything else is
-rejected here, by file and line, before anything is compiled.
+with the same meaning (abs, min, max, pow, ``math.sqrt``, ``np.sqrt``) stand for intrinsics. Everything else
+is rejected here, by file and line, before anything is compiled.
 """
 
 from __future__ import annotations

@@ -6,8 +6,8 @@ is thus one sphere and a loop, and scenes that differ in numbers only have the s
 compiles nothing.
 
 Shapes and CSG operators are called with their arguments read from P. `Fixed` arguments are known when the
-function is read, so that dead branches are dropped and loops over fixed tuples are unrolled. A domain operator
-is read with its child in the place of ``child``. Identities are omitted.
+function is read, so that dead branches are dropped and loops over fixed tuples are unrolled. A domain
+operator is read with its child in the place of ``child``. Identities are omitted.
 """
 
 from __future__ import annotations
@@ -181,8 +181,8 @@ class Run:
     ) -> None:
         """Write what is done with each element, one after the other or in a loop.
 
-        `begun`: leave out the first one; `changed`: names that `fold` assigns, which writes it for the element
-        of an index of a run.
+        `begun`: leave out the first one; `changed`: names that `fold` assigns, which writes it for the
+        element of an index of a run.
         """
         rest = Run(self.part, self.count - begun, self.start + begun * self.part.size)
         if self.count <= UNROLLED:

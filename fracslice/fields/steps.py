@@ -649,8 +649,8 @@ class _Follower(graph.Evaluator):
             raise MismatchError("expected two points or two numbers")
         sign = "+" if op == "add" else "-"
         if isinstance(a, Scalar):
-            return self.tape.sum(a, b, sign)  # type: ignore[arg-type]
-        return self.tape.vector_sum(a, b, sign)  # type: ignore[arg-type]
+            return self.tape.sum(a, b, sign)
+        return self.tape.vector_sum(a, b, sign)
 
     def product(self, a: Value, b: Value) -> Value:
         if isinstance(a, Vector3):
@@ -683,7 +683,7 @@ class _Follower(graph.Evaluator):
             raise MismatchError(f"{name!r} is not in the language of steps")
         if name == "where" and isinstance(given[1], Vector3) and isinstance(given[2], Vector3):
             pairs = zip(given[1].parts, given[2].parts, strict=True)
-            return Vector3(tuple(self.intrinsic(name, [given[0], p, q]) for p, q in pairs))  # type: ignore[arg-type]
+            return Vector3(tuple(self.intrinsic(name, [given[0], p, q]) for p, q in pairs))
         if not all(isinstance(v, Scalar) for v in given):
             raise MismatchError("expected numbers, found a point")
         return self.tape.intrinsic(name, given)

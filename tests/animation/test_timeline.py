@@ -70,7 +70,7 @@ def test_frames_differ_in_parameters_only_so_one_kernel_draws_them_all() -> None
             'of="box.size" keys="0s: 1 1 1; 4s: 2 1 1"',
         )
     )
-    assert len({link(timeline.at(time).root).source for time in np.linspace(0, 4, 9)}) == 1
+    assert len({link(timeline.at(time).root).program for time in np.linspace(0, 4, 9)}) == 1
 
 
 def test_an_eye_keeps_its_clearance_and_moves_without_jumps() -> None:

@@ -10,9 +10,8 @@ import re
 from collections.abc import Sequence
 
 from fracslice.expr.host import REGISTERS
-from fracslice.expr.language import Linked
 from fracslice.expr.loops import Loop, points
-from fracslice.fields.linker import link
+from fracslice.fields.linker import Linked, link
 
 from .workloads import WORKLOADS
 
@@ -50,7 +49,7 @@ def assembly(linked: Linked, bits: int, loops: Sequence[Loop] = (points,)) -> li
     machine, compiler._machine = compiler._machine, Text
     try:
         target = compiler.Target(bits, LANES[bits], REGISTERS, CPU, FEATURES)
-        text = compiler.compile_object(linked.source, target, loops).decode()
+        text = compiler.compile_object(linked.program, target, loops).decode()
     finally:
         compiler._machine = machine
     return [line for line in text.splitlines() if _LABEL.match(line) or re.match(r"^\t[a-z]", line)]

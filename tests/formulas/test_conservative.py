@@ -38,7 +38,7 @@ def anywhere(count: int = 40_000) -> np.ndarray:
 def test_most_scenes_are_their_own_guard(name: str) -> None:
     """The same code and numbers: nothing is compiled for it."""
     own, conservative = link(EXAMPLES[name]), link(EXAMPLES[name].conservative())
-    assert own.source == conservative.source and np.array_equal(own.parameters, conservative.parameters)
+    assert own.program == conservative.program and np.array_equal(own.parameters, conservative.parameters)
 
 
 @pytest.mark.parametrize("name", DIFFERENT)

@@ -91,7 +91,7 @@ def test_rounds_take_every_step_in_turn() -> None:
 
 def test_numbers_compile_nothing() -> None:
     a, b = (orbit(transform(bristorbrot(), scale=s), mandelbox(scale=-s), iterations=2) for s in (1.3, 1.5))
-    assert link(a).source == link(b).source
+    assert link(a).program == link(b).program
 
 
 def test_a_scene_is_the_expression() -> None:

@@ -257,7 +257,7 @@ def test_parameters_of_every_kind() -> None:
         np.testing.assert_allclose(
             compile_scene(root, "float64").points(*p), expected, rtol=1e-12, atol=1e-12
         )
-    assert link(own(iterations=3)).source == link(own(iterations=4, way=(0, 0, 1))).source
+    assert link(own(iterations=3)).program == link(own(iterations=4, way=(0, 0, 1))).program
 
 
 def test_a_mistake_is_one_line_with_its_place() -> None:

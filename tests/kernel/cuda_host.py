@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from fracslice.expr import cuda_driver
+from fracslice.expr.graph import Program
 from fracslice.expr.loops import OWN, Loop, element_type, is_array
 from fracslice.expr.machine import Function
 from fracslice.fields import cpu as lanes
@@ -133,9 +134,9 @@ class Threads:
 def runs_on_cpu(patch: pytest.MonkeyPatch) -> Iterator[HostDriver]:
     """A fixture: a GPU whose threads the CPU runs."""
 
-    def functions(source: str, precision: Precision, loops: tuple[Loop, ...]) -> Mapping[str, Threads]:
+    def functions(program: Program, precision: Precision, loops: tuple[Loop, ...]) -> Mapping[str, Threads]:
         real = np.dtype(precision)
-        made = lanes.load_functions(source, 8 * real.itemsize, 1, loops)
+        made = lanes.load_functions(program, 8 * real.itemsize, 1, loops)
         return {loop.name: Threads(made[loop.name], loop, real) for loop in loops}
 
     for host in driven(patch):

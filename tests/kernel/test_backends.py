@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fracslice.fields.cpu import compile_scene
-from fracslice.fields.linker import link
+from fracslice.fields.linker import FIELD, link
 from fracslice.fields.reference import reference
 from fracslice.formulas import mandelbulb, sphere
 from tests.examples import DEFINED, EXAMPLES, stamped
@@ -79,15 +79,15 @@ class TestAgainstTheReference:
 
 def test_editing_a_value_does_not_change_the_code() -> None:
     a, b = link(mandelbulb(iterations=5)), link(mandelbulb(iterations=9, bailout=3))
-    assert a.source == b.source and not np.array_equal(a.parameters, b.parameters)
+    assert a.program == b.program and not np.array_equal(a.parameters, b.parameters)
 
 
 def test_only_what_is_used_is_linked() -> None:
     from fracslice.formulas import transform
 
-    plain = link(sphere()).source
-    assert link(transform(sphere())).source == plain
-    assert "child" not in plain and "log" not in plain
+    plain = link(sphere()).program
+    assert link(transform(sphere())).program == plain
+    assert [part.name for part in plain.parts] == ["N0"] and list(plain.functions) == ["N0", FIELD]
 
 
 def test_second_process_compiles_nothing(tmp_path, monkeypatch) -> None:  # type: ignore[no-untyped-def]

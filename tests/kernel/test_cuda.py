@@ -40,7 +40,7 @@ MOST = {"sphere": 70, "mandelbulb": 165, "mandelbulb 7.5": 330, "julia": 125, "m
 
 def ptx(root: Node, bits: int, loop: str = "bricks") -> str:
     """The PTX of a loop for an H100 or H200, which needs no GPU to be compiled."""
-    text = compile_ptx(link(root).source, bits, H200, (points, bricks)).decode()
+    text = compile_ptx(link(root).program, bits, H200, (points, bricks)).decode()
     return text.split(f".entry {loop}(")[1].split(".entry")[0]
 
 
@@ -78,7 +78,7 @@ class TestMachineCode:
     def test_a_gpu_gets_the_code_of_the_newest_that_llvm_knows(
         self, capability: tuple[int, int], target: str, capfd: pytest.CaptureFixture[str]
     ) -> None:
-        text = compile_ptx(link(EXAMPLES["union"]).source, 32, capability, (points,)).decode()
+        text = compile_ptx(link(EXAMPLES["union"]).program, 32, capability, (points,)).decode()
         assert f".target sm_{target}" in text
         assert capfd.readouterr() == ("", "")
 

@@ -15,10 +15,12 @@ import pytest
 
 from fracslice.errors import KernelError
 from fracslice.expr import compiler, cuda_driver
+from fracslice.expr.graph import NOTHING, Program
 from fracslice.expr.loops import loop, shares
 from fracslice.fields import cuda
 from fracslice.fields.field import Precision
-from fracslice.fields.linker import Linked
+from fracslice.fields.linker import Linked, link
+from fracslice.formulas import sphere
 from tests.kernel.cuda_host import HostDriver, driven, words
 
 pytestmark = pytest.mark.once
@@ -145,9 +147,9 @@ SCALED = replace(scaled, own=1)
 
 
 class TestLaunches:
-    def function(self, source: str = "", precision: Precision = "float32") -> cuda.CudaFunction:
+    def function(self, program: Program = NOTHING, precision: Precision = "float32") -> cuda.CudaFunction:
         cuda._functions.cache_clear()  # as in another process
-        return cuda.load_functions(source, precision, (SCALED,))["scaled"]
+        return cuda.load_functions(program, precision, (SCALED,))["scaled"]
 
     def test_give_all_parameters_but_what_a_thread_has_to_itself(self, host: HostDriver) -> None:
         array = cuda_driver.device_array(300, np.float32)
@@ -168,7 +170,7 @@ class TestLaunches:
 
         monkeypatch.setattr(compiler, "compile_ptx", compiled)
         assert [len(made) for _ in range(2) if self.function()] == [1, 1]
-        assert [len(made) for _ in range(2) if self.function("x = 1")] == [2, 2]
+        assert [len(made) for _ in range(2) if self.function(link(sphere()).program)] == [2, 2]
         assert [len(made) for _ in range(2) if self.function(precision="float64")] == [3, 3]
         monkeypatch.setattr(cuda_driver, "capability", lambda: (8, 0))
         assert [len(made) for _ in range(2) if self.function()] == [4, 4]

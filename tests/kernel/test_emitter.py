@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from fracslice.errors import KernelError
+from fracslice.expr.graph import NOTHING
 from fracslice.expr.host import lane_count
 from fracslice.expr.loops import Loop
 from fracslice.expr.machine import load_object
@@ -41,7 +42,7 @@ def compiled(folder: Path, body: str, extra: str = "") -> dict[str, np.ndarray]:
         if way == "python":
             loop.function(a, [int(v) for v in j], f, k, N)
         else:
-            code = object_code("", 64, lane_count(64), [loop])
+            code = object_code(NOTHING, 64, lane_count(64), [loop])
             load_object(code, [loop], np.dtype(np.float64))["run"](a, j, f, k, N)
         rows[way] = np.concatenate([f, k])
     return rows
@@ -148,5 +149,5 @@ def test_what_cannot_be_compiled_is_one_line_with_its_place(body: str, tmp_path:
     loop = made(tmp_path, body)
     wrong = 7 if body.startswith("if load") else 6 + len(body.splitlines())
     with pytest.raises(KernelError, match=rf"written.py:{wrong}: loop run: .*{WRONG[body]}") as caught:
-        object_code("", 64, lane_count(64), [loop])
+        object_code(NOTHING, 64, lane_count(64), [loop])
     assert "\n" not in str(caught.value)

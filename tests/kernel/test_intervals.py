@@ -7,16 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fracslice.expr import vocabulary
+from fracslice.expr.graph import Evaluator
 from fracslice.expr.intervals import ARRAYS, Interval
-from fracslice.expr.language import CALLED, FIELD
 from fracslice.expr.loops import enclosures
 from fracslice.fields.box import Box
 from fracslice.fields.cpu import compile_loops, compile_scene
 from fracslice.fields.depth import resolve_depths
 from fracslice.fields.field import Precision
-from fracslice.fields.linker import link
-from fracslice.fields.reference import enclosure
+from fracslice.fields.linker import FIELD, link
+from fracslice.fields.reference import ON_ARRAYS, enclosure
 from fracslice.fields.tree import Enclosures
 from fracslice.formulas import Node, gyroid, mandelbox, mandelbulb, menger, sphere
 from tests.examples import EXAMPLES, OF_FILES, stamped
@@ -35,10 +34,8 @@ KINDS = {
 def exact(root: Node) -> Any:
     """The field in extended precision."""
     linked = link(root)
-    scope: dict[str, Any] = {name: getattr(vocabulary, name) for name in vocabulary.NAMES}
-    scope[CALLED] = lambda function: function
-    exec(compile(linked.source, "<linked scene>", "exec"), scope)
-    return lambda x, y, z: scope[FIELD](x, y, z, linked.parameters)
+    named = linked.program.functions
+    return lambda x, y, z: Evaluator(ON_ARRAYS, named)(named[FIELD], x, y, z, linked.parameters)
 
 
 def cells(half: float) -> tuple[np.ndarray, np.ndarray]:

@@ -11,7 +11,6 @@ import pytest
 
 from fracslice.errors import FracsliceError, SceneError
 from fracslice.fields.cpu import compile_scene
-from fracslice.fields.linker import link
 from fracslice.fields.node import FORMULAS
 from fracslice.fields.reference import reference
 from tests.kernel.idioms import HEAD, SAME, P, X, Y, Z, imported
@@ -54,7 +53,6 @@ REFUSED = {
     "return (lambda a: a)(x)": "11: .*not in the language",
     "return 'radius'": "11: .*not in the language",
     "return max(a=x, b=y)": "11: .*by their place",
-    "P0 = x\n    return P0": "11: .*another name",
 }
 
 
@@ -62,7 +60,7 @@ REFUSED = {
 def test_what_is_outside_the_language_is_one_line_with_its_place(module, body: str) -> None:  # type: ignore[no-untyped-def]
     root = module(HEAD + "\n    " + body).mine()
     with pytest.raises(FracsliceError, match=r"own_formulas.py:" + REFUSED[body]) as caught:
-        link(root)
+        reference(root)(*P)
     assert "\n" not in str(caught.value)
 
 
@@ -113,7 +111,7 @@ def test_arguments_are_bound_by_name(module) -> None:  # type: ignore[no-untyped
 def test_an_argument_that_is_not_given_is_named(module) -> None:  # type: ignore[no-untyped-def]
     root = module(SWAPPED.format(arguments='{"near": 1.0}')).slab()
     with pytest.raises(FracsliceError, match=r"py:2: formula slab: .* to take near .*, found far, near"):
-        link(root)
+        reference(root)(*P)
 
 
 def test_one_name_is_one_formula(module) -> None:  # type: ignore[no-untyped-def]

@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 
 from fracslice.errors import KernelError
-from fracslice.expr import loop_linker
+from fracslice.expr import frontend
 from fracslice.expr import loops as intrinsics
+from fracslice.expr.frontend import loop_function
+from fracslice.expr.graph import NOTHING, Width, text
 from fracslice.expr.host import lane_count
-from fracslice.expr.loop_linker import loop_source
 from fracslice.expr.loops import Loop, load, loop, store
 from fracslice.fields.cpu import load_functions
 from fracslice.fields.field import Kernel, Precision
@@ -57,22 +58,24 @@ def example(A, n, setup):  # type: ignore[no-untyped-def]
         A[n] = parts[1]
 
 
+def shown(loop: Loop) -> str:
+    return text(loop_function(loop), width=Width(16))
+
+
 def test_what_a_loop_sees_is_constants_and_functions() -> None:
-    assert loop_source([example.fix(setup=Setup(True, 2))]) == (
-        "def l_doubled(v):\n    return 2.0 * v\n\n\n"
-        "def l_applied(v):\n    return l_doubled(v)\n\n\n"
-        "def example(A, n):\n    A[4] = l_applied(A[0])\n    parts = (A[0], A[1])\n    A[n] = parts[1]"
-    )
-    assert loop_source([example.fix(setup=Setup(False, 0))]) == (
-        "def l_applied(v):\n    return v\n\n\n"
-        "def example(A, n):\n    A[4] = l_applied(A[0])\n    A[n] = 3\n    parts = ()"
-    )
+    deep = shown(example.fix(setup=Setup(True, 2)))
+    assert "doubled(v):\nb0():\n  v0 = mul 2.0, v\n  return v0" in deep
+    assert "applied(v):\nb0():\n  v0 = call doubled v\n  return v0" in deep
+    assert "set A, 4, v1" in deep and "branch" not in deep
+    flat = shown(example.fix(setup=Setup(False, 0)))
+    assert "doubled" not in flat and "applied(v):\nb0():\n  return v" in flat
+    assert f"set A, n, {STEP}" in flat
 
 
-def test_copies_for_other_fixed_arguments_have_other_names() -> None:
+def test_copies_for_other_fixed_arguments_are_others() -> None:
     deep, flat = (example.fix(setup=Setup(deep, 2)) for deep in (True, False))
-    text = loop_source([deep, Loop(applied_flat, "r")])
-    assert "def l_applied(v):" in text and "def l_applied_(v):" in text
+    assert loop_function(deep).identity != loop_function(flat).identity
+    assert "call doubled" in shown(deep) and "call doubled" not in shown(Loop(applied_flat, "r"))
     assert flat.name == "example"
 
 
@@ -102,7 +105,7 @@ def wrong_name(A):  # type: ignore[no-untyped-def]
 def test_what_cannot_be_linked_is_one_line_with_its_place(function, line: int, message: str) -> None:  # type: ignore[no-untyped-def]
     place = f"test_loops.py:{function.__code__.co_firstlineno + line}: loop {function.__name__}: .*{message}$"
     with pytest.raises(KernelError, match=place):
-        loop_source([Loop(function, "r")])
+        shown(Loop(function, "r"))
 
 
 def to_the_floor(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P):  # type: ignore[no-untyped-def]
@@ -119,7 +122,7 @@ def test_packets_followed_by_python_are_those_of_the_machine_code(monkeypatch: p
     rows[packets.Row.dz] = np.where(np.arange(m) % 7 == 3, 1.0, -1.0)
     rows[packets.Row.end] = np.where(np.arange(m) % 5 == 1, -1.0, 9.0)
     follow = Loop(packets.follow, "rrinnnr").fix(step=to_the_floor)
-    compiled = load_functions("", 64, width, [follow])["follow"]
+    compiled = load_functions(NOTHING, 64, width, [follow])["follow"]
     for module in (intrinsics, packets):
         monkeypatch.setattr(module, "WIDTH", width)
     result = []
@@ -163,36 +166,26 @@ def test_lanes_that_were_loaded_are_values() -> None:
     assert lanes.max() == 0.0 and array.min() == 1.0
 
 
-def test_a_loop_is_a_function_of_a_module() -> None:
-    def inner(A):  # type: ignore[no-untyped-def]
-        A[0] = 1.0
-
-    with pytest.raises(KernelError, match=r"test_loops.py:\d+: loop inner: expected a def in a module"):
-        loop_source([Loop(inner, "r")])
-
-
-def test_the_text_of_loops_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Linking it takes a tenth of a picture of one sample."""
-    loops = [example.fix(setup=Setup(True, 2))]
-    text = loop_source(loops)
-    monkeypatch.setattr(loop_linker, "link_loops", None)
-    assert loop_source(loops) == text
-    for changed in ([example.fix(setup=Setup(True, 3))], [example.fix(setup=Setup(False, 2))]):
-        with pytest.raises(TypeError):
-            loop_source(changed)
+def test_the_identity_of_a_loop_follows_what_it_sees(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By it the machine code is kept; no loop is read for it."""
+    monkeypatch.setattr(frontend, "syntax", None)
+    loops = [example.fix(setup=Setup(*values)) for values in ((True, 2), (True, 3), (False, 2))]
+    identities = {loop_function(loop).identity for loop in loops}
+    assert len(identities) == 3
+    assert loop_function(example.fix(setup=Setup(True, 2))).identity in identities
+    before = loop_function(Loop(applied_flat, "r")).identity
     monkeypatch.setattr(sys.modules[__name__], "FLAT", Setup(True, 0))
-    with pytest.raises(TypeError):
-        loop_source([Loop(applied_flat, "r")])
+    assert loop_function(Loop(applied_flat, "r")).identity != before
 
 
 def test_the_identity_of_a_function_is_the_same_in_every_process() -> None:
     """And follows every number that it or a function that it calls uses."""
     code = (
-        "from fracslice.rendering.packets import tile; from fracslice.expr.loop_linker import identity; "
+        "from fracslice.rendering.packets import tile; from fracslice.expr.functions import identity; "
         "print(identity(tile.function))"
     )
     one, other = (
         subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
         for _ in range(2)
     )
-    assert one == other and "COUNT" in one and "0x" not in one
+    assert one == other and "COUNT" in one and " at 0x" not in one

@@ -15,11 +15,12 @@ import pytest
 
 from fracslice.errors import FracsliceWarning
 from fracslice.expr import compiler
+from fracslice.expr.graph import Program
 from fracslice.expr.host import toolchain
 from fracslice.expr.loops import Loop, points
 from fracslice.fields.cpu import object_code
 from fracslice.fields.linker import link
-from fracslice.formulas import sphere
+from fracslice.formulas import sphere, torus
 
 LINKED = link(sphere())
 
@@ -35,7 +36,7 @@ def compiled(monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
     """What was compiled: a stand-in for machine code, another one each time."""
     made: list[bytes] = []
 
-    def compile_object(source: str, target: compiler.Target, loops: Sequence[Loop]) -> bytes:
+    def compile_object(program: Program, target: compiler.Target, loops: Sequence[Loop]) -> bytes:
         made.append(b"code %d" % len(made))
         return made[-1]
 
@@ -43,8 +44,8 @@ def compiled(monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
     return made
 
 
-def code(source: str = LINKED.source, bits: int = 32, loops: Sequence[Loop] = (points,)) -> bytes:
-    return object_code(source, bits, 16, loops)
+def code(program: Program = LINKED.program, bits: int = 32, loops: Sequence[Loop] = (points,)) -> bytes:
+    return object_code(program, bits, 16, loops)
 
 
 def test_it_is_compiled_once_for_this_user_alone(folder: Path, compiled: list[bytes]) -> None:
@@ -61,7 +62,7 @@ def test_it_is_known_by_all_that_it_was_made_of(
     code()
     code(bits=64)
     code(loops=[replace(points, arguments="rrrrin")])
-    code(LINKED.source + "#")
+    code(link(torus()).program)
     monkeypatch.setattr("llvmlite.__version__", "another")
     toolchain.cache_clear()
     code()

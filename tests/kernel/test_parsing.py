@@ -9,7 +9,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from fracslice.fields.linker import link
+from fracslice.expr.graph import text
+from fracslice.fields.linker import FIELD, link
 from fracslice.formulas import mandelbulb, menger
 
 
@@ -35,5 +36,5 @@ def test_threads_link_at_the_same_time(hasty: None) -> None:
     """CPython 3.11 and 3.12 count how deep a tree is for all threads together."""
     root = (mandelbulb(iterations=4).scale(0.5) | menger(level=2)).twist(0.3)
     with ThreadPoolExecutor(4) as threads:
-        linked = list(threads.map(lambda _: link(root).source, range(16)))
+        linked = list(threads.map(lambda _: text(link(root).program.functions[FIELD]), range(16)))
     assert len(set(linked)) == 1

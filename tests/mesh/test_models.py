@@ -179,7 +179,7 @@ def test_a_cube_is_the_same_cube_once_more(tmp_path: Path) -> None:
 
 def test_one_code_serves_all_models_and_keeps_theirs_alive(tmp_path: Path) -> None:
     other = model(saved(shapes.cube(), tmp_path / "cube.stl"))
-    assert link(other).source == link(model(BRACKET)).source and link(other) != link(model(BRACKET))
+    assert link(other).program == link(model(BRACKET)).program and link(other) != link(model(BRACKET))
     assert other.key != model(BRACKET).key
     assert link(other.changed(size=2, place="bed")).held[0][1] is link(other).held[0][1]
     made = cpu.CpuKernel(link(other))

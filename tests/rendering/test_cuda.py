@@ -14,6 +14,7 @@ import pytest
 
 from fracslice.expr import cuda_driver
 from fracslice.expr.compiler import compile_ptx
+from fracslice.expr.graph import NOTHING
 from fracslice.rendering.accumulator import CHANNELS, PassPlan, tile_order
 from fracslice.rendering.cpu import CpuTracer
 from fracslice.rendering.cuda import CudaAccumulator, CudaTracer
@@ -37,14 +38,14 @@ SINGLE = np.dtype(np.float32)
 @pytest.mark.parametrize("name", stamped(CASES, REPRESENTATIVES))
 def test_float32_kernels_hold_no_float64_and_keep_rays_in_registers(name: str) -> None:
     seen = frame(name)
-    ptx = compile_ptx(seen.linked.source, 32, H200, loops(seen)).decode()
+    ptx = compile_ptx(seen.linked.program, 32, H200, loops(seen)).decode()
     assert ".f32" in ptx
     assert ".f64" not in ptx
     assert ".local" not in ptx
 
 
 def test_what_keeps_the_picture_holds_no_float64() -> None:
-    ptx = compile_ptx("", 32, H200, LOOPS).decode()
+    ptx = compile_ptx(NOTHING, 32, H200, LOOPS).decode()
     assert ".f32" in ptx
     assert ".f64" not in ptx
 
@@ -52,7 +53,7 @@ def test_what_keeps_the_picture_holds_no_float64() -> None:
 def test_threads_go_on_together_after_the_march() -> None:
     """Without the barrier those that hit first shade alone, and a frame takes twice as long."""
     seen = frame("fractal")
-    ptx = compile_ptx(seen.linked.source, 32, H200, loops(seen)).decode()
+    ptx = compile_ptx(seen.linked.program, 32, H200, loops(seen)).decode()
     assert len(re.findall(r"bar\.warp\.sync", ptx.split(".entry tile(")[1].split(".entry")[0])) == 1
 
 

@@ -27,7 +27,7 @@ def test_the_program_draws_the_picture_of_the_renderer(
     seen, pixels = gpu.frame(width, height), tile_order(width, height)
     gpu.given(seen, pixels).tofile(tmp_path / "given")
     launched = re.sub(r"tile<<<(.+?), 128>>>\((.+?)\);", r"launch(\1, [&] { tile(\2); });", gpu.program(seen))
-    text = translated(seen.linked.source, seen.linked.parameters.tolist()) + launched
+    text = translated(seen.linked.program, seen.linked.parameters.tolist()) + launched
     header = Path(gpu.__file__).with_name("host.h")
     (tmp_path / "program.cpp").write_text(f'#include "{header}"\n{text}')
     binary = tmp_path / "program"

@@ -59,7 +59,7 @@ def test_a_texture_multiplies_the_colour_and_changes_no_source(tmp_path: Path) -
     ]
     *_, last = renderers[0].passes(1)
     assert last.image[1, 1] == pytest.approx((linear((0.5,))[0], 1, 0), abs=0.02)
-    assert renderers[0]._frame.linked.source == renderers[1]._frame.linked.source
+    assert renderers[0]._frame.linked.program == renderers[1]._frame.linked.program
 
 
 def test_a_texture_that_is_missing_is_named() -> None:

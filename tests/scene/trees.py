@@ -15,6 +15,7 @@ from fracslice.common.parameters import (
     Count,
     Digest,
     File,
+    Label,
     Number,
     Vector,
 )
@@ -62,6 +63,7 @@ _POSSIBLE: dict[type, Any] = {
     Choice: lambda kind: st.sampled_from(kind.choices),
     File: lambda kind: st.just(BRACKET) if kind.inside else st.none(),
     Digest: lambda kind: st.none(),
+    Label: lambda kind: st.sampled_from(("LUMEN", "    Digest: lambda kind: st.none(),lt;", "e\u0301")),
     Axis: lambda kind: st.sampled_from("xyz"),
 }
 

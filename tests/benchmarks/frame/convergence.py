@@ -13,7 +13,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fracslice.expr.loop_linker import link_loops
+from fracslice.expr import frontend
 from fracslice.formulas import Node, julia, mandelbulb, menger, plane, transform, union
 from fracslice.rendering import Renderer, packets
 from fracslice.rendering.accumulator import CHANNELS, COUNT, GOAL, PassPlan, tile_order
@@ -91,11 +91,11 @@ def ours(root: Node, view: View, exact: np.ndarray, most: int) -> Curve:
 def random(root: Node, view: View, exact: np.ndarray, count: int) -> Curve:
     """By the same units, but for the two that make the numbers."""
     kept, packets.sample, packets.centred = (packets.sample, packets.centred), sample, centred
-    link_loops.cache_clear()
+    frontend._function.cache_clear()
     made = renderer(root, view)
     table = np.random.default_rng(1).integers(0, 2**32, (count + 1, 64), np.uint32)
     packets.sample, packets.centred = kept
-    link_loops.cache_clear()
+    frontend._function.cache_clear()
     made.tracer._points = np.ascontiguousarray(table[:, : made.tracer.frame.samples]).view(np.int32)
     curve, spent, start = [], 0.0, time.process_time()
     for n, mean in enumerate(mean_of_rounds(made, count), 1):

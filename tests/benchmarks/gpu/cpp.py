@@ -1,15 +1,19 @@
-"""A linked scene as CUDA C++, word for word: what nvcc makes of the same arithmetic is the bound to compare
-with."""
+"""A linked scene as CUDA C++, operation for operation: what nvcc makes of the same arithmetic is the bound to
+compare with."""
 
 from __future__ import annotations
 
-import ast
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
+
+from fracslice.expr.graph import Block, Branch, Function, Jump, Program, Return, Value, Width
+
+THREAD = Width(1, on_gpu=True)
 
 WORDS = {
     "where": "({} ? {} : {})",
     "any_of": "{}",
+    "truth": "bool({})",
     "sqrt": "sqrtf({})",
     "rsqrt": "rsqrtf({})",
     "ratio": "({} / {})",
@@ -23,25 +27,18 @@ WORDS = {
     "maximum": "fmaxf({}, {})",
     "absolute": "fabsf({})",
     "int": "int({})",
+    "element": "{}[{}]",
+    "neg": "(-{})",
+    "not_": "(!{})",
+    "invert": "(!{})",
 }
-OPERATORS = {
-    ast.Add: "+",
-    ast.Sub: "-",
-    ast.Mult: "*",
-    ast.Div: "/",
-    ast.BitAnd: "&",
-    ast.BitOr: "|",
-    ast.Lt: "<",
-    ast.LtE: "<=",
-    ast.Gt: ">",
-    ast.GtE: ">=",
-    ast.Eq: "==",
-    ast.Not: "!",
-    ast.USub: "-",
-}
+SIGNS = {"add": "+", "sub": "-", "mul": "*", "truediv": "/", "mod": "%", "and_": "&", "or_": "|"} | {
+    "lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="
+}  # fmt: skip
 
 PRELUDE = """
 #include <cmath>
+#include <type_traits>
 template <int N> struct Tuple {{
     float v[N];
     __host__ __device__ float operator[](int i) const {{ return v[i]; }}
@@ -50,142 +47,103 @@ template <class A, class B> struct Pair {{
     A first;
     B second;
 }};
-template <class A, class B> __device__ __forceinline__ Pair<A, B> pair_of(A a, B b) {{ return {{a, b}}; }}
+template <int I, int N> __device__ __forceinline__ float item(const Tuple<N> &t) {{ return t.v[I]; }}
 using Parameters = Tuple<{count}>;
 """
 
 
-def translated(source: str, parameters: Sequence[float]) -> str:
+def translated(program: Program, parameters: Sequence[float]) -> str:
     """The functions of a linked scene, each name with a ``_`` behind it, and its parameters GIVEN."""
-    functions = [_function(f) for f in _callees_first(source)]
+    functions = _Functions(program)
+    for name in program.functions:
+        functions.write(program.functions[name], f"{name}_")
     given = f"const Parameters GIVEN = {{{{{', '.join(_number(p) for p in parameters)}}}}};"
-    return "\n".join([PRELUDE.format(count=len(parameters)), *functions, given, ""])
+    return "\n".join([PRELUDE.format(count=len(parameters)), *functions.texts, given, ""])
 
 
-def _callees_first(source: str) -> list[ast.FunctionDef]:
-    """The functions in the order that C++ asks for, without those that shift bits, written by hand."""
-    named = {f.name: f for f in ast.parse(source).body if isinstance(f, ast.FunctionDef)}
-    ordered: dict[str, ast.FunctionDef] = {}
+class _Functions:
+    """Functions in the order that C++ asks for, without those that shift bits, written by hand."""
 
-    def visit(name: str) -> None:
-        called = [
-            n.func.id
-            for n in ast.walk(named[name])
-            if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)
-        ]
-        for callee in called:
-            if callee in named and callee not in ordered:
-                visit(callee)
-        ordered[name] = named[name]
+    def __init__(self, program: Program) -> None:
+        self.program, self.names, self.texts = program, dict[Function, str](), list[str]()
 
-    for name, function in named.items():
-        if not any(isinstance(n, (ast.BitXor, ast.RShift)) for n in ast.walk(function)):
-            visit(name)
-    return list(ordered.values())
+    def write(self, function: Function, name: str) -> None:
+        """Write a function and before it those that it calls, once."""
+        if function in self.names:
+            return
+        values = [value for block in function.graph(THREAD).blocks for value in block.body]
+        if any(value.op in ("xor", "rshift") for value in values):
+            return
+        self.names[function] = name
+        for value in values:
+            if value.op == "call":
+                callee = self.callee(value.data)
+                known = next((n for n, f in self.program.functions.items() if f is callee), None)
+                self.write(callee, f"{known}_" if known else f"{callee.name}_{len(self.names)}_")
+        self.texts.append("\n    ".join(self.lines(function)) + "\n}")
+
+    def callee(self, data: Function | str) -> Function:
+        return self.program.functions[data] if isinstance(data, str) else data
+
+    def lines(self, function: Function) -> Iterator[str]:
+        graph = function.graph(THREAD)
+        known = {value: f"a{k}" for k, value in enumerate(graph.arguments)}
+        blocks = {block: f"b{k}" for k, block in enumerate(graph.blocks)}
+        values = [v for block in graph.blocks for v in (*block.parameters, *block.body)]
+        known |= {value: f"v{k}" for k, value in enumerate(values)}
+
+        def shown(value: Value) -> str:
+            return known[value] if value in known else _number(value.data)
+
+        kinds = ", ".join(f"class T{k}" for k in range(len(graph.arguments)))
+        taken = ", ".join(f"T{k} a{k}" for k in range(len(graph.arguments)))
+        yield f"template <{kinds}> __device__ __forceinline__ auto {self.names[function]}({taken}) {{"
+        for block in graph.blocks:
+            first = next(iter(_passed(graph.blocks, block)), [])
+            for parameter, value in zip(block.parameters, first, strict=True):
+                yield f"std::decay_t<decltype({shown(value)})> {known[parameter]};"
+            for value in block.body:
+                yield f"std::decay_t<decltype({self.expression(value, shown)})> {known[value]};"
+        for block in graph.blocks:
+            yield f"{blocks[block]}:;"
+            for value in block.body:
+                yield f"{known[value]} = {self.expression(value, shown)};"
+            match block.exit:
+                case Jump(target, passed):
+                    news = [f"auto new{k} = {shown(v)};" for k, v in enumerate(passed)]
+                    sets = [f"{known[p]} = new{k};" for k, p in enumerate(target.parameters)]
+                    yield " ".join(["{", *news, *sets, f"goto {blocks[target]};", "}"])
+                case Branch(test, yes, no):
+                    yield f"if ({shown(test)}) goto {blocks[yes]}; else goto {blocks[no]};"
+                case Return(Value() as value):
+                    yield f"return {shown(value)};"
+
+    def expression(self, value: Value, shown: Callable[[Value], str]) -> str:
+        given = list(map(shown, value.operands))
+        match value.op:
+            case "call":
+                return f"{self.names[self.callee(value.data)]}({', '.join(given)})"
+            case "index":
+                return f"int({given[0]})" if given else str(value.data)
+            case "item":
+                return f"item<{value.data[0]}>({given[0]})"
+            case "tuple" if not given:
+                return "Tuple<1>{{0.0f}}"
+            case "tuple" if all(operand.op == "tuple" for operand in value.operands):
+                return f"Pair<decltype({given[0]}), decltype({given[1]})>{{{', '.join(given)}}}"
+            case "tuple":
+                return f"Tuple<{len(given)}>{{{{{', '.join(f'float({part})' for part in given)}}}}}"
+        if value.op in SIGNS:
+            return f"({given[0]} {SIGNS[value.op]} {given[1]})"
+        return WORDS[value.op].format(*given)
+
+
+def _passed(blocks: Sequence[Block], target: Block) -> Iterator[list[Value]]:
+    """What the jumps to a block pass."""
+    return (b.exit.passed for b in blocks if isinstance(b.exit, Jump) and b.exit.target is target)
 
 
 def _number(value: Any) -> str:
+    if isinstance(value, (bool, int)):
+        return str(value).lower()
     return "INFINITY" if value == float("inf") else f"{float(value)!r}f"
-
-
-def _function(node: ast.FunctionDef) -> str:
-    arguments = [a.arg for a in node.args.args]
-    declared = {**_assigned(node), **dict.fromkeys(arguments, "")}
-    lines = [f"{kind} {name};" for name, kind in declared.items() if kind]
-    body = [line for statement in node.body for line in _statement(statement)]
-    kinds = ", ".join(f"class T_{a}" for a in arguments)
-    taken = ", ".join(f"T_{a} {a}" for a in arguments)
-    head = f"template <{kinds}> __device__ __forceinline__ auto {node.name}_({taken})"
-    return "\n    ".join([f"{head} {{", *lines, *body]) + "\n}"
-
-
-def _assigned(node: ast.FunctionDef) -> dict[str, str]:
-    """The C++ type of each name that a function assigns: bool for what is compared, else float."""
-    result: dict[str, str] = {}
-    for inner in ast.walk(node):
-        if isinstance(inner, ast.Assign) and not _makes_tuple(inner):
-            target = inner.targets[0]
-            for name in target.elts if isinstance(target, ast.Tuple) else [target]:
-                assert isinstance(name, ast.Name)
-                mask = isinstance(inner.value, ast.Compare) or (
-                    isinstance(inner.value, ast.BinOp) and isinstance(inner.value.op, (ast.BitAnd, ast.BitOr))
-                )
-                result[name.id] = "bool" if mask else "float"
-    return result
-
-
-def _makes_tuple(node: ast.Assign) -> bool:
-    return isinstance(node.targets[0], ast.Name) and isinstance(node.value, ast.Tuple)
-
-
-def _statement(node: ast.stmt) -> list[str]:
-    match node:
-        case ast.Assign([ast.Name(name)], ast.Tuple() as value):
-            return [f"auto {name} = {_expression(value)};"]
-        case ast.Assign([ast.Name(name)], value):
-            return [f"{name} = {_expression(value)};"]
-        case ast.Assign([ast.Tuple(targets)], ast.Tuple(values)):
-            news = [f"auto new{i} = {_expression(v)};" for i, v in enumerate(values)]
-            sets = [f"{_expression(t)} = new{i};" for i, t in enumerate(targets)]
-            return ["{", *news, *sets, "}"]
-        case ast.Assign([ast.Tuple(targets)], value):
-            sets = [f"{_expression(t)} = all[{i}];" for i, t in enumerate(targets)]
-            return ["{", f"auto all = {_expression(value)};", *sets, "}"]
-        case ast.If(test, body, orelse):
-            other = ["} else {", *(line for s in orelse for line in _statement(s))] if orelse else []
-            return [
-                f"if ({_expression(test)}) {{",
-                *(line for s in body for line in _statement(s)),
-                *other,
-                "}",
-            ]
-        case ast.For(ast.Name(i), ast.Call(ast.Name("range"), [end]), body):
-            head = f"for (int {i} = 0; {i} < {_count(end)}; {i}++) {{"
-            return [head, *(line for s in body for line in _statement(s)), "}"]
-        case ast.Break():
-            return ["break;"]
-        case ast.Return(value) if value is not None:
-            return [f"return {_expression(value)};"]
-    raise NotImplementedError(ast.unparse(node))
-
-
-def _count(node: ast.expr) -> str:
-    return str(node.value) if isinstance(node, ast.Constant) else _expression(node)
-
-
-def after_parameters(arguments: list[ast.expr]) -> list[ast.expr]:
-    """The arguments of a call after P: integer offsets into P."""
-    names = [a.id if isinstance(a, ast.Name) else "" for a in arguments]
-    return arguments[names.index("P") + 1 :] if "P" in names[:-1] else []
-
-
-def _expression(node: ast.expr) -> str:
-    match node:
-        case ast.Name(name):
-            return name
-        case ast.Constant(bool(value)):
-            return str(value).lower()
-        case ast.Constant(value):
-            return _number(value)
-        case ast.Subscript(value, index):
-            return f"{_expression(value)}[{ast.unparse(index)}]"
-        case ast.IfExp(test, yes, no):
-            return f"({_expression(test)} ? {_expression(yes)} : {_expression(no)})"
-        case ast.BinOp(left, ast.Mod(), right):
-            return f"({ast.unparse(left)} % {ast.unparse(right)})"
-        case ast.Tuple([]):
-            return "Tuple<1>{{0.0f}}"
-        case ast.Tuple([ast.Tuple() as first, ast.Tuple() as second]):
-            return f"pair_of({_expression(first)}, {_expression(second)})"
-        case ast.Tuple(values):
-            return f"Tuple<{len(values)}>{{{{{', '.join(map(_expression, values))}}}}}"
-        case ast.UnaryOp(op, value):
-            return f"({OPERATORS[type(op)]}{_expression(value)})"
-        case ast.BinOp(left, op, right) | ast.Compare(left, [op], [right]):
-            return f"({_expression(left)} {OPERATORS[type(op)]} {_expression(right)})"
-        case ast.Call(ast.Name(name), arguments):
-            places = after_parameters(arguments)
-            passed = [_expression(a) for a in arguments[: len(arguments) - len(places)]]
-            passed += map(ast.unparse, places)
-            return WORDS[name].format(*passed) if name in WORDS else f"{name}_({', '.join(passed)})"
-    raise NotImplementedError(ast.unparse(node))

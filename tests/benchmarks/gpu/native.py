@@ -7,7 +7,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-from fracslice.expr.language import Linked
+from fracslice.fields.linker import Linked
 
 from .cpp import translated
 
@@ -19,7 +19,7 @@ def run(linked: Linked, program: str, flags: list[str], *arguments: str) -> list
     numbers that it prints."""
     with tempfile.TemporaryDirectory() as folder:
         source, binary = Path(folder) / "program.cu", Path(folder) / "program"
-        source.write_text(translated(linked.source, linked.parameters.tolist()) + program)
+        source.write_text(translated(linked.program, linked.parameters.tolist()) + program)
         command = ["nvcc", "-O3", "-std=c++17", "-arch=native", "-w", *flags, str(source), "-o", str(binary)]
         subprocess.run(command, check=True)
         done = subprocess.run([str(binary), *arguments], check=True, capture_output=True, text=True)

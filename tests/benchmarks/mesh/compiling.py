@@ -49,7 +49,7 @@ SCENES = {
 
 def compiled(root: Node) -> None:
     target = compiler.Target(32, lane_count(32), REGISTERS, *host())
-    compiler.compile_object(link(root).source, target, (points, bricks))
+    compiler.compile_object(link(root).program, target, (points, bricks))
 
 
 def rows(run: Run, scenes: tuple[str, ...] = tuple(SCENES)) -> Iterator[Row]:

@@ -9,10 +9,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fracslice.expr import vocabulary
-from fracslice.expr.language import CALLED, FIELD
+from fracslice.expr.graph import Evaluator
 from fracslice.fields.cpu import compile_scene
-from fracslice.fields.linker import link
+from fracslice.fields.linker import FIELD, link
+from fracslice.fields.reference import ON_ARRAYS
 from fracslice.formulas import Node
 from fracslice.volume import Lattice, sample
 from fracslice.volume.bricks import INSIDE, Bricks
@@ -32,15 +32,13 @@ def sampled(root: Node, voxels: int) -> Bricks:
 def orbit_steps(root: Node, result: Bricks, most: int = 400) -> tuple[float, float]:
     """Steps per sample until it leaves, and until all of its vector have left; the reference counts them."""
     linked, alive = link(root), []
-    scope = {name: getattr(vocabulary, name) for name in vocabulary.NAMES}
-    scope[CALLED] = lambda function: function
-    scope["any_of"] = lambda mask: alive.append(mask) or bool(np.any(mask))
-    exec(compile(linked.source, "<linked scene>", "exec"), scope)
+    counting = {**ON_ARRAYS, "any_of": lambda mask: alive.append(mask) or bool(np.any(mask))}
+    named = linked.program.functions
     picked = result.ijk[:: max(1, len(result) // most)]
     index = picked[:, None] + np.indices((8, 8, 8)).reshape(3, -1).T
     points = np.asarray(result.origin) + result.voxel * index.reshape(-1, 3)
     with np.errstate(all="ignore"):
-        scope[FIELD](*points.T, linked.parameters)
+        Evaluator(counting, named)(named[FIELD], *points.T, linked.parameters)
     masks = np.array(alive)
     return float(masks.sum(0).mean()), float(masks.reshape(len(masks), -1, LANES[32]).any(2).sum(0).mean())
 

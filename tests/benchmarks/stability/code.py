@@ -11,8 +11,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 
-from fracslice.expr.language import Linked
-from fracslice.fields.linker import link
+from fracslice.fields.linker import Linked, link
 from fracslice.formulas import Node, mandelbulb, material, sphere, transform, union
 from fracslice.rendering.linking import link_frame
 from fracslice.rendering.packets import loops
