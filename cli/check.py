@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 import click
 
 from fracslice.common.messages import decimal, format_count, significant
-from fracslice.common.parameters import MODELS
+from fracslice.formats import ENDINGS
 from fracslice.records import PIXEL, MeshJob, Placed, Print, SliceJob
 
 from .inputs import BadInput, check_targets, is_model, load_model, load_scene, refuse_options
@@ -99,7 +99,7 @@ class CheckOptions(LayerOptions, MeshOptions, ClusterOptions):
     picture: str | None = option(Name("FILE.png", ".png"), "Draw the worst layers.")
     fix: bool = flag("Try what would mend the problems, and keep what helps.")
     fixed: str | None = option(
-        Name("FILE", *sorted(MODELS)),
+        Name("FILE", *ENDINGS),
         "With --fix, of a scene: write the mesh of what it made.",
         "-o",
         "--output",
@@ -444,7 +444,7 @@ def shared_check(scene: Scene, job: SliceJob, given: CheckOptions, work: Work) -
 
 def draw(stack: Stack, report: PrintReport, path: str, work: Work) -> None:
     """Draw the worst layers."""
-    from fracslice.export import replacing
+    from fracslice.common.files import replacing
     from fracslice.slicing.preview import worst_layers
 
     with replacing(path) as file:

@@ -416,7 +416,7 @@ def write_page(
     """Write the summary page of layers that were checked."""
     import numpy as np
 
-    from fracslice.export import replacing
+    from fracslice.common.files import replacing
     from fracslice.export.page import page
     from fracslice.printing.problems import verdict
     from fracslice.slicing.preview import worst_layers

@@ -269,7 +269,7 @@ def creation_date() -> datetime:
 
 def write_preview(stack: Stack, path: str, work: Work) -> None:
     """Write a contact sheet (.png) or an animation (.webp) of the layers."""
-    from fracslice.export import replacing
+    from fracslice.common.files import replacing
     from fracslice.slicing.preview import animation, contact_sheet
 
     with replacing(path) as file:

@@ -11,7 +11,6 @@ import numpy as np
 from ..common.cache import key, program
 from ..common.parameters import Number, validate_value
 from ..errors import RenderError
-from ..export import application
 from ..export.images import encoded_image
 from ..fields.depth import resolve_depths
 from ..fields.devices import choose_device
@@ -22,6 +21,7 @@ from ..rendering.sequence import SampleRange
 from ..rendering.setup import DETAIL, default_lights, footprint, surroundings
 from ..scene.model import Scene
 from ..scene.view import Camera
+from ..version import APPLICATION
 from ..work import Work
 from .timeline import Timeline
 
@@ -187,7 +187,7 @@ class FilmJob:
         """
         (mean, counts), at, scene = self._traced(number, work), self.scene(number), self.timeline.scene
         view = replace(at.view, lights=at.view.lights or default_lights(at.root))
-        text = {"Title": scene.name, "Software": application(), "scene_hash": scene.hash}
+        text = {"Title": scene.name, "Software": APPLICATION, "scene_hash": scene.hash}
         more = self._layers(at, work) | {"samples": counts} if self.layers else None
         light = picture(mean, view.shading.mode)
         return encoded_image(self.ending, develop(mean, view), light, text=text, layers=more)

@@ -84,7 +84,7 @@ def main() -> None:
     asked = json.load(sys.stdin)
     what, resolution = WORKLOADS[asked["workload"]], asked["resolution"]
     if "mesh" in asked:
-        from ..mesh.reading import read_mesh
+        from ..mesh.models import read_mesh
 
         figures = errors(read_mesh(asked["mesh"]), what, resolution)
     else:

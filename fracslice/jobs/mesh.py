@@ -31,9 +31,6 @@ if TYPE_CHECKING:
     from .shared import MeshRecipe
     from .surfaces import Surface
 
-COLOURED = (".ply", ".glb", ".3mf")
-"""Formats that hold colours of vertices."""
-
 
 def make_mesh(
     scene: Scene, what: MeshJob | None = None, work: Work | None = None, path: str | Path | None = None
@@ -131,12 +128,14 @@ class _Job:
         """Raise the errors of invalid arguments before any work is done."""
         self.what.voxels(self.size.longest)
         if self.path is not None:
-            from ..export import check_format, check_target
+            from ..common.files import check_target
+            from ..formats import ENDINGS, check_format, mesh_format
 
             ending = check_format(self.path)
             check_target(self.path)
-            if self.what.colour is not None and ending not in COLOURED:
-                raise SceneError(f"colour: expected a file that holds colours: {', '.join(COLOURED)}")
+            if self.what.colour is not None and not mesh_format(ending).has_colours:
+                coloured = ", ".join(name for name in ENDINGS if mesh_format(name).has_colours)
+                raise SceneError(f"colour: expected a file that holds colours: {coloured}")
         if self.what.colour is not None and self.clock.work.cluster is not None:
             raise SceneError(f"colour {self.what.colour}: expected no cluster and no shard")
 
@@ -314,7 +313,7 @@ def make_implicit(
 
     `what`: the size, and the voxel that automatic depths follow from.
     """
-    from ..export import check_target
+    from ..common.files import check_target
     from ..export.implicit import write_implicit
     from ..fields.graph import graph
     from ..volume.sizing import sizing

@@ -58,8 +58,9 @@ class Writing:
         """Write the file while it is checked, by threads of this process. Returns the mesh, if in one piece,
         and the result of its simplification, if any.
         """
-        from ..export import FORMATS, flushing, replacing
-        from ..export.stl import write_pieces
+        from ..common.files import flushing, replacing
+        from ..formats import mesh_format
+        from ..formats.stl import write_pieces
         from ..mesh.cleaning import Finished
         from ..mesh.tips import tips_last
 
@@ -92,7 +93,7 @@ class Writing:
                 write_pieces(timed(), file, about, self.clock.work)
             else:
                 for whole in timed():
-                    FORMATS[self.path.suffix.lower()](whole, file, about, self.clock.work)
+                    mesh_format(self.path.suffix.lower()).write(whole, file, about, self.clock.work)
         return None if several else mesh, simplified
 
     def _painted(self, meshes: Iterator[Mesh], finish: Finish) -> Iterator[Mesh]:
@@ -112,6 +113,6 @@ class Writing:
 
 def metadata(scene: Scene) -> dict[str, str]:
     """Metadata of files made from a scene."""
-    from ..export import application
+    from ..version import APPLICATION
 
-    return {"Application": application(), "Title": scene.name, "scene_hash": scene.hash}
+    return {"Application": APPLICATION, "Title": scene.name, "scene_hash": scene.hash}

@@ -176,9 +176,9 @@ def light_of(done: Pass) -> Any:
 
 def metadata(scene: Scene) -> dict[str, str]:
     """Metadata of every picture of a scene."""
-    from ..export import application
+    from ..version import APPLICATION
 
-    return {"Title": scene.name, "Software": application(), "scene_hash": scene.hash}
+    return {"Title": scene.name, "Software": APPLICATION, "scene_hash": scene.hash}
 
 
 def save(

@@ -19,13 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cluster import PAGE, unpack_arrays
+from ..common import packages as texts
 from ..common.files import flushing, link_or_copy, replacing
+from ..common.packages import Fragment, TextSum, combine_checksums, deflate
+from ..common.triangles import concatenate
 from ..errors import ClusterError
-from ..export import FORMATS, stl
-from ..export import packages as texts
-from ..export.packages import Fragment, TextSum, combine_checksums, deflate
-from ..export.threemf import triangle_rows, vertex_rows, write_fragments
-from ..mesh.model import Mesh, concatenate
+from ..formats import mesh_format, stl
+from ..formats._3mf import triangle_rows, vertex_rows, write_fragments
+from ..mesh.model import Mesh
 from ..mesh.pieces import Pieces
 from ..mesh.tips import by_tip
 from ..store import Arrays
@@ -61,7 +62,7 @@ def write_shared(
                 if mesh is None:
                     stl.write_pieces(meshes, file, about, work)
                 else:
-                    FORMATS[ending](mesh, file, about, work)
+                    mesh_format(ending).write(mesh, file, about, work)
     executor.pool.finished(executor.job)
     return mesh
 

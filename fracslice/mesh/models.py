@@ -1,12 +1,16 @@
-"""Triangle models as solids of scenes: files and their hashes, checks, and signed distances."""
+"""Triangle models: read from files, welded like in a slicer, nothing repaired; and as solids of scenes, with
+their hashes, checks and signed distances.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import os
+import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -19,15 +23,50 @@ from ..expr.functions import InMemory
 from ..fields.box import Box
 from ..fields.node import TriangleMesh
 from ..fields.registry import Node, get
+from ..formats import ENDINGS, mesh_format
 from .checks import MeshReport, check_mesh
+from .cleaning import quantise_mesh
 from .model import Mesh
-from .reading import read_mesh
 from .spatial import build
 
-LARGEST, MOST = 1 << 27, 1 << 21
-"""Most bytes of a file, half of them where a triangle takes less than in an STL file; and most triangles."""
+MOST, MOST_BYTES = 1 << 21, 1 << 26
+"""Most triangles of a solid, and bytes of a file that is no format of meshes."""
+MOST_AROUND = 1 << 13
+"""Most triangles around a vertex, as each is compared with each."""
 CHUNK = 1 << 20
 """Bytes that are hashed at once."""
+
+
+def read_mesh(path: str | Path) -> Mesh:
+    """Read a mesh file, in mm.
+
+    STL, PLY and OBJ have no unit: mm are assumed. Coordinates are rounded to float32, equal positions welded,
+    and every triangle is kept.
+
+    Returns `Mesh` in mm.
+    """
+    path = Path(path)
+    if (ending := path.suffix.lower()) not in ENDINGS:
+        raise MeshError(f"{path}: not a model file that can be read; known are {', '.join(ENDINGS)}")
+    try:
+        if path.is_file() and not path.stat().st_size:
+            raise MeshError("the file is empty")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of NumPy: coordinates that are not finite are refused
+            whole = mesh_format(ending).read(path)
+            mesh = quantise_mesh(Mesh(whole.vertices, whole.triangles))
+    except FileNotFoundError:
+        raise MeshError(f"{path}: no such file") from None
+    except (OSError, MeshError) as error:
+        raise MeshError(f"{path}: {getattr(error, 'strerror', None) or error}") from error
+    if not len(mesh.triangles):
+        raise MeshError(f"{path}: the file has no triangles")
+    most = np.bincount(mesh.triangles.ravel()).max()
+    if most > MOST_AROUND:
+        raise MeshError(
+            f"{path}: {most} corners of triangles meet at a vertex: expected at most {MOST_AROUND}"
+        )
+    return mesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +112,8 @@ def file_hash(path: str) -> str:
     """SHA-256 of a file."""
     try:
         with open_regular(path) as file:
-            most = LARGEST if path.lower().endswith((".stl", ".obj")) else LARGEST // 2
+            ending = os.path.splitext(path)[1].lower()
+            most = mesh_format(ending).most if ending in ENDINGS else MOST_BYTES
             if (size := os.fstat(file.fileno()).st_size) > most:
                 large = f"a file of {size / 1e6:.0f} MB: expected at most {most / 1e6:.0f} MB"
                 raise MeshError(f"{large}, of fewer triangles or in a binary format")

@@ -16,7 +16,7 @@ from fracslice.bench.measurements import BenchmarkTask, Peer, measure
 from fracslice.bench.methods import WORKLOADS
 from fracslice.cluster import ResultFolder, Shard
 from fracslice.errors import BenchError, Cancelled, SharedError
-from fracslice.export import write
+from fracslice.formats import write
 from fracslice.work import Work
 
 from ..mesh import shapes

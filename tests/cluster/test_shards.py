@@ -12,9 +12,8 @@ import pytest
 from fracslice.cli.main import run as command
 
 from fracslice.cluster import ResultFolder, Shard
-from fracslice.common import files
+from fracslice.common import files, packages
 from fracslice.errors import ClusterError, SharedError
-from fracslice.export import packages
 from fracslice.export.layer_tasks import RangeTask
 from fracslice.export.layers import write_slices
 from fracslice.formulas import box, cone, flake, sphere
