@@ -35,11 +35,11 @@ from .sweeps import families
 if TYPE_CHECKING:
     from fracslice.export.resins import Resin
     from fracslice.export.slice_run import SliceRun
-    from fracslice.jobs.completeness import Completeness
     from fracslice.jobs.slices import SliceRecipe
     from fracslice.scene import Scene
     from fracslice.slicing import Stack
     from fracslice.slicing.printers import Printer
+    from fracslice.volume.completeness import Completeness
     from fracslice.work import Work
 
 DATE = "SOURCE_DATE_EPOCH"
@@ -126,7 +126,7 @@ def slice_(given: SliceOptions) -> int:
     """
     from fracslice.export.layers import PICTURES, PRINTS, slice_format, write_slices
     from fracslice.export.resuming import KEPT
-    from fracslice.jobs.completeness import layers_amount
+    from fracslice.slicing.layers import layers_amount
 
     output = given.output
     kind, resin = slice_format(output, given.form), resin_of(given)

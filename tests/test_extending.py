@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+import re
 import subprocess
 import sys
 from importlib.util import module_from_spec, spec_from_file_location
@@ -155,6 +157,72 @@ def test_a_format_of_meshes(tmp_path: Path) -> None:
     assert "ball.off: 5,372 triangles, 9.98 x 9.98 x 9.98 mm" in done.stdout
     assert ".stl, .off, .vdb" in done.stderr
     assert ".off" in done.stdout.partition("-o, --output")[2]
+
+
+CHECK = """
+from fracslice.checks import Check
+from fracslice.checks.problems import Problem
+
+
+def _rings(layer):
+    return len(layer.contours)
+
+
+def _many(layers):
+    most = max(layers.measured["rings"])
+    if most > 2:
+        first = layers.measured["rings"].index(most)
+        at = 0.0, 0.0, layers.bottom(first)
+        yield Problem("rings", f"{most:g} outlines in a layer", first, at, (("hollow", "none"),))
+
+
+def _heavy(solid):
+    if sum(solid.bodies) > 50:
+        yield Problem("heavy", f"{sum(solid.bodies):.0f} mm3 of material", advice="--hollow 1mm")
+
+
+def _few(mesh):
+    if mesh.mesh is not None and mesh.report.triangles < 1000:
+        yield Problem("few", f"{len(mesh.mesh.triangles)} triangles are few")
+
+
+CHECKS = (
+    Check("rings", "layers", _many, measure=_rings, of_resin=True),
+    Check("heavy", "solid", _heavy, weight=3),
+    Check("few", "mesh", _few),
+)
+"""
+
+CHECKED = """
+import json
+from fracslice.cli.main import run
+from fracslice.mesh import Mesh
+import trimesh
+
+solid = trimesh.util.concatenate(
+    [trimesh.creation.box((2, 2, 5), trimesh.transformations.translation_matrix((3 * k, 0, 0)))
+     for k in range(4)]
+)
+solid.export("four.stl")
+run(["check", "four.stl", "--layer", "0.5mm", "--pixel", "0.05mm", "--html", "four.html"])
+run(["check", "four.stl", "--layer", "0.5mm", "--pixel", "0.05mm", "--material", "pla"])
+run(["check", "four.stl", "--layer", "0.5mm", "--pixel", "0.05mm", "--json"])
+"""
+
+
+def test_a_check_of_a_mesh_a_solid_and_layers(tmp_path: Path) -> None:
+    (tmp_path / "amounts.py").write_text(CHECK)
+    words = extended("fracslice.checks", tmp_path, CHECKED).stdout
+    resin, filament, numbers = re.split(r"^(?=four.stl: .*layers|{)", words, flags=re.MULTILINE)[-3:]
+    found = [problem["kind"] for problem in json.loads(numbers)["layers"]["problems"]]
+    assert found == ["few", "rings", "heavy"]
+    for line in (
+        "48 triangles are few",
+        "4 outlines in a layer: layer 0",
+        "79 mm3 of material; --hollow 1mm",
+    ):
+        assert line in resin and line in (tmp_path / "four.html").read_text()
+    assert "outlines" not in filament and "79 mm3 of material; --hollow 1mm" in filament
 
 
 def extended(package: str, folder: Path, code: str) -> subprocess.CompletedProcess[str]:

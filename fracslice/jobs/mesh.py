@@ -230,7 +230,7 @@ class _Job:
         """Finished mesh and report, and the refinement of the samples that does not lose the object."""
         from ..fields.depth import shallower
         from ..mesh.shells import touching_note
-        from .completeness import lost_size, mesh_amount
+        from ..volume.completeness import lost_size, mesh_amount
         from .finishing import choose_bodies
         from .mesh_writing import Writing
 

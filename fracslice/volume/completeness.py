@@ -9,16 +9,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..common.messages import decimal
-from ..fields.algebra import dot
 from ..fields.box import Triple
 from ..formulas import Box, Node
-from ..volume import Lattice, Plan
-from ..volume.amount import FINER, MARGIN, SCATTERED, SURE, amount, finer, lost_share, scattered
 from ..work import Work
+from . import Lattice, Plan
+from .amount import FINER, MARGIN, SCATTERED, SURE, amount, finer, lost_share, scattered
 
 if TYPE_CHECKING:
     from ..fields.field import Field
-    from ..slicing import Slicer
 
 Grid = tuple[Triple, Triple, Callable[[float], str]]
 """Origin and spacing of the samples, scene units, and a function that names samples of a fraction of the
@@ -30,9 +28,6 @@ LOST = 0.05
 
 RAISED = 2, 4
 """Refinements of the samples that a job tries by itself."""
-
-SLABS = 6
-"""Slabs of a stack that are measured, evenly distributed."""
 
 
 @dataclass(frozen=True)
@@ -98,38 +93,10 @@ def mesh_amount(planned: Plan, made: float, scale: float, whole: bool, work: Wor
 
     spacing = planned.voxel, planned.voxel, planned.voxel
     grid = lattice.origin, spacing, sampling
-    return _compare_volumes(planned.root, [planned.outer], made, scale, grid, whole, work)
+    return compare_volumes(planned.root, [planned.outer], made, scale, grid, whole, work)
 
 
-def layers_amount(slicer: Slicer, work: Work) -> Completeness:
-    """Compare the volume of some slabs of a stack with that of its field."""
-    from ..slicing import SLAB
-
-    stack = slicer.stack
-    starts = np.arange(0, len(stack.z), SLAB)
-    chosen = [s.tolist() for s in np.split(np.arange(len(stack.z)), starts[1:])]
-    chosen = [
-        chosen[k] for k in sorted(set(np.linspace(0, len(starts) - 1, SLABS).round().astype(int).tolist()))
-    ]
-    layers = [layer for slab in chosen for layer in slab]
-    for _ in slicer.map(lambda layer: layer.area, [k for k in layers if k not in slicer.areas]):
-        pass  # the slicer keeps the areas
-    areas = np.array([slicer.areas[k] for k in layers])
-    (x0, y0, dx, dy), height = stack.frame.tolist(), stack.heights / stack.scale
-    low, high = stack.z - height / 2, stack.z + height / 2
-    (left, front, _), (right, back, _) = stack.outer.lo, stack.outer.hi
-    boxes = [Box((left, front, low[s[0]]), (right, back, high[s[-1]])) for s in chosen]
-    least = float(stack.heights.min())
-
-    def sampling(share: float) -> str:
-        return f"pixels of {share * min(stack.pixel):.2g} mm and layers of {share * least:.2g} mm"
-
-    grid = (x0, y0, float(stack.z[0])), (dx, dy, least / stack.scale), sampling
-    made = dot(areas, stack.heights[layers])
-    return _compare_volumes(stack.root, boxes, made, stack.scale, grid, len(chosen) == len(starts), work)
-
-
-def _compare_volumes(
+def compare_volumes(
     root: Field, boxes: list[Box], made: float, scale: float, grid: Grid, whole: bool, work: Work
 ) -> Completeness:
     """Compare the volume of the field in boxes, scene units, with `made`, mm3; with `whole`, look for the
