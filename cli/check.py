@@ -205,7 +205,7 @@ def of_model(given: CheckOptions, work: Work) -> Checked:
     from fracslice.common.parameters import LONGEST
     from fracslice.errors import EmptyError, MeshError
     from fracslice.mesh.checks import check_mesh
-    from fracslice.mesh.field import MeshField
+    from fracslice.mesh.models import MeshField
     from fracslice.records import SAME, UP
     from fracslice.volume.sizing import Sizing
 

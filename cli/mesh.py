@@ -188,8 +188,7 @@ def store_in(folder: str | None) -> Store | None:
 def make_and_write(scene: Scene, given: MeshFileOptions, work: Work) -> Result:
     """Make the mesh and write it, or its samples, and the picture."""
     from fracslice.formats import write
-    from fracslice.jobs.mesh import make_mesh
-    from fracslice.jobs.mesh_writing import metadata
+    from fracslice.jobs.mesh import make_mesh, metadata
 
     job, output, picture = given.mesh_job(scene), given.output, given.picture
     if picture is None and Path(output).suffix.lower() != GRID:

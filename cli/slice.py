@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from fracslice.scene import Scene
     from fracslice.slicing import Stack
     from fracslice.slicing.printers import Printer
-    from fracslice.volume.completeness import Completeness
+    from fracslice.volume.amount import Completeness
     from fracslice.work import Work
 
 DATE = "SOURCE_DATE_EPOCH"

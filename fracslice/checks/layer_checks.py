@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ..printing.widths import Widths, widths_of
+from ..printing.walls import Widths, widths_of
 from ..slicing.feature_graph import Feature, Graph, Neck, Overhang, farthest, unsupported_pixels, weakest
 from ..slicing.layers import Layer, Slicer
 from ..slicing.printers import Printer
-from ..slicing.runs import LayerComponents, layer_components
+from ..slicing.runs import LayerComponents, layer_components, widths
 from ..slicing.stack import Stack
-from ..slicing.thickness import widths
 from ..work import Work
 from . import checks_of, problems_of
 from .problems import Limits, Problem

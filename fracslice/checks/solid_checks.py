@@ -12,11 +12,9 @@ from ..common.messages import format_count, place, significant
 from ..fields.box import Triple
 from ..fields.field import Field
 from ..formulas import Box
-from ..printing.components import components_of
-from ..printing.samples import Samples
+from ..printing.samples import Samples, components_of
 from ..printing.thin_features import narrow_holes, resolve_connectivity, sampled_object, thin_features
-from ..printing.walls import Measure, Walls, project_faces, walls_of
-from ..printing.widths import BINS, Widths, widths_of
+from ..printing.walls import BINS, Measure, Walls, Widths, project_faces, walls_of, widths_of
 from ..volume import Bricks, Drain
 from ..work import Work
 from . import checks_of, problems_of

@@ -10,8 +10,7 @@ from ..checks.layer_checks import LayerFindings, PrintReport, check_layers, find
 from ..checks.problems import Limits
 from ..cluster import Contents, Files, Pool, Shard, pack_arrays, unpack_arrays
 from ..errors import SharedError
-from ..export.layer_tasks import RangeTask
-from ..export.slice_run import SliceRun
+from ..export.slice_run import RangeTask, SliceRun
 from ..slicing.runs import LayerComponents, Nodes, Runs
 from ..work import Work
 

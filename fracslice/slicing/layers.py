@@ -38,7 +38,7 @@ from ..errors import SliceError
 from ..fields.algebra import dot
 from ..fields.box import Box
 from ..fields.field import Bounds, Field, Kernel
-from ..volume.completeness import Completeness, compare_volumes
+from ..volume.amount import Completeness, compare_volumes
 from ..work import Work
 from .contours import Contours, contours
 from .stack import Stack

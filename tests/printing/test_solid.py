@@ -36,11 +36,9 @@ from fracslice.formulas import (
     union,
 )
 from fracslice.printing import printable
-from fracslice.printing.components import components_of
 from fracslice.printing.framing import frame_bodies
-from fracslice.printing.samples import Samples
-from fracslice.printing.walls import walls
-from fracslice.printing.widths import Widths
+from fracslice.printing.samples import Samples, components_of
+from fracslice.printing.walls import Widths, walls
 from fracslice.scene import Print, scene
 from fracslice.slicing import SliceJob, plan_stack
 from fracslice.slicing.layers import Slicer

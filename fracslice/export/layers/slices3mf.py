@@ -12,8 +12,7 @@ from ...common.packages import package, rows
 from ...errors import ExportError
 from ...slicing import Layer
 from ..layer_formats import FileFormat
-from ..layer_tasks import Encode
-from ..slice_run import SliceRun
+from ..slice_run import Encode, SliceRun
 
 LEVEL = 1
 HEAD = (

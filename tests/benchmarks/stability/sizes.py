@@ -16,7 +16,7 @@ from fracslice.jobs.mesh import make_mesh
 from fracslice.scene import library, read, scene
 from fracslice.slicing import SliceJob, Slicer, plan_stack
 from fracslice.slicing.layers import layers_amount
-from fracslice.volume.completeness import Completeness
+from fracslice.volume.amount import Completeness
 from fracslice.volume.extent import _kept
 from fracslice.work import Work
 from tests.examples import EXAMPLES
