@@ -93,7 +93,7 @@ def animate(given: FilmOptions) -> None:
         with_flight,
         write_frames,
     )
-    from fracslice.export import replacing
+    from fracslice.common.files import replacing
     from fracslice.scene.model import to_xml
 
     target, ending = Path(given.output), Path(given.output).suffix.lower()

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 import click
 
 from fracslice.common.messages import decimal, format_count, significant
-from fracslice.common.parameters import MODELS
+from fracslice.formats import ENDINGS
 from fracslice.records import PIXEL, MeshJob, Placed, Print, SliceJob
 
 from .inputs import BadInput, check_targets, is_model, load_model, load_scene, refuse_options
@@ -33,13 +33,13 @@ from .options import (
 from .summary import DENSITIES, figures, of_material, sizes, summary
 
 if TYPE_CHECKING:
+    from fracslice.checks.layer_checks import PrintReport
+    from fracslice.checks.problems import Limits, Problem
     from fracslice.fields.box import Triple
     from fracslice.fields.field import Field
     from fracslice.mesh import Mesh
-    from fracslice.printing.problems import Limits
     from fracslice.scene import Scene
     from fracslice.slicing import Stack
-    from fracslice.slicing.layer_checks import PrintReport
     from fracslice.slicing.printers import Printer
     from fracslice.volume.sizing import Sizing
     from fracslice.work import Work
@@ -99,7 +99,7 @@ class CheckOptions(LayerOptions, MeshOptions, ClusterOptions):
     picture: str | None = option(Name("FILE.png", ".png"), "Draw the worst layers.")
     fix: bool = flag("Try what would mend the problems, and keep what helps.")
     fixed: str | None = option(
-        Name("FILE", *sorted(MODELS)),
+        Name("FILE", *ENDINGS),
         "With --fix, of a scene: write the mesh of what it made.",
         "-o",
         "--output",
@@ -120,7 +120,7 @@ class CheckOptions(LayerOptions, MeshOptions, ClusterOptions):
     @property
     def limits(self) -> Limits:
         """Minimum thicknesses of walls and floors."""
-        from fracslice.printing.problems import Limits
+        from fracslice.checks.problems import Limits
 
         return Limits(wall=self.wall, floor=self.floor)
 
@@ -159,20 +159,24 @@ def check(given: CheckOptions) -> int:
     return 1 if problems else 0
 
 
-Checked = tuple[dict[str, Any], list[str], Sequence[object]]
+Checked = tuple[dict[str, Any], list[str], "Sequence[Problem]"]
 """Figures, lines of text, and problems."""
 
 
 def of_mesh(given: CheckOptions, work: Work) -> Checked:
     """Check the mesh of a scene, and its layers."""
+    from fracslice.checks import problems_of
+    from fracslice.checks.defects import MeshEvidence
     from fracslice.jobs.mesh import make_mesh
     from fracslice.volume.sizing import sizing
 
     scene = load_scene(given.source, given.settings)
-    report = make_mesh(scene, given.mesh_job(scene), work).report
+    made = make_mesh(scene, given.mesh_job(scene), work)
+    report = made.report
     size = sizing(scene, given.size, given.scale, work)
     layered = in_layers(given, size.longest)
-    how, faults = given.printing(scene.printing), report.problems
+    how = given.printing(scene.printing)
+    faults = problems_of("mesh", MeshEvidence(report.mesh, report.problems, made.whole))
     layers, lines, problems = of_layers(scene, size, how, layered, work, faults)
     return report.as_dict() | {"layers": layers}, [summary(given.source, report), *lines], problems
 
@@ -195,10 +199,13 @@ def of_scene(given: CheckOptions, work: Work) -> Checked:
 
 def of_model(given: CheckOptions, work: Work) -> Checked:
     """Check the mesh of a model and, if it encloses a volume, its layers."""
+    from fracslice.checks import problems_of
+    from fracslice.checks.defects import MeshEvidence
+    from fracslice.checks.problems import Problem
     from fracslice.common.parameters import LONGEST
     from fracslice.errors import EmptyError, MeshError
     from fracslice.mesh.checks import check_mesh
-    from fracslice.mesh.field import MeshField
+    from fracslice.mesh.models import MeshField
     from fracslice.records import SAME, UP
     from fracslice.volume.sizing import Sizing
 
@@ -213,9 +220,10 @@ def of_model(given: CheckOptions, work: Work) -> Checked:
         report = check_mesh(mesh, threads=work.threads)
     except MeshError as error:
         raise BadInput(f"{given.source}: {error}") from error
+    faults = problems_of("mesh", MeshEvidence(report, report.problems, mesh))
     line, numbers = f"{given.source}: {sizes(report)}", report.as_dict()
     if not report.watertight or report.misoriented_edges or not report.volume_mm3:
-        return numbers, [f"{given.source}: {figures(report)}"], report.problems
+        return numbers, [f"{given.source}: {figures(report, [str(fault) for fault in faults])}"], faults
     size = longest(mesh)
     if size <= THINNEST and given.layer is None:
         raise BadInput(f"{given.source}: {size:.3g} mm long, less than a layer: expected a model in mm")
@@ -224,13 +232,12 @@ def of_model(given: CheckOptions, work: Work) -> Checked:
     sides = Sizing(side, 1 / factor, (factor,) * 3)
     field = MeshField(replace(mesh, vertices=mesh.vertices - mesh.bounds.mean(0)))
     try:
-        how, faults = given.printing(Print()), report.problems
-        layers, lines, problems = of_layers(field, sides, how, layered, work, faults)
+        layers, lines, problems = of_layers(field, sides, given.printing(Print()), layered, work, faults)
     except EmptyError:
         pixel = max(layered.slice_job(Print()).pixels)
         finest = f"layer of {layered.layer[0]:.3g} mm has a pixel of {pixel:.3g} mm"
-        nothing = f"no {finest} inside: all of it is thinner"
-        return numbers, [line, verdict([*report.problems, nothing])], (*report.problems, nothing)
+        problems = [*faults, Problem("lost", f"no {finest} inside: all of it is thinner")]
+        return numbers, [line, verdict(problems)], problems
     return numbers | {"layers": layers}, [line, *lines], problems
 
 
@@ -257,7 +264,7 @@ class Variant:
     size: Sizing
     how: Print
     up: Triple
-    faults: tuple[str, ...] = ()  # problems of its mesh
+    faults: Sequence[Problem] = ()  # problems of its mesh
     flags: tuple[str, ...] = ()
 
     def changed(self, settings: dict[str, str]) -> Variant:
@@ -285,26 +292,31 @@ class Attempt:
     variant: Variant
     numbers: dict[str, Any]
     text: str
-    problems: Sequence[Any]
+    problems: Sequence[Problem]
     shown: tuple[Stack, PrintReport] | None
     seconds: float  # CPU time of the check
 
     @property
     def severity(self) -> tuple[int, float]:
-        """See `fracslice.printing.problems.severity`."""
-        from fracslice.printing.problems import severity
+        """See `fracslice.checks.problems.severity`."""
+        from fracslice.checks.problems import severity
 
         return severity(self.problems)
 
     def mends(self, other: Attempt) -> bool:
-        """See `fracslice.printing.problems.mends`."""
-        from fracslice.printing.problems import mends
+        """See `fracslice.checks.problems.mends`."""
+        from fracslice.checks.problems import mends
 
         return mends(self.problems, other.problems)
 
 
 def of_layers(
-    of: Scene | Field, size: Sizing, how: Print, given: CheckOptions, work: Work, faults: tuple[str, ...] = ()
+    of: Scene | Field,
+    size: Sizing,
+    how: Print,
+    given: CheckOptions,
+    work: Work,
+    faults: Sequence[Problem] = (),
 ) -> Checked:
     """Check the layers of an object; with --fix, try what mends its problems and keep what helps.
 
@@ -336,8 +348,8 @@ def mended_object(
     All settings that the problems name are tried at once, then one by one; then other directions up. They
     are compared in coarse layers while there is time; the best is examined in those that were asked for.
     """
+    from fracslice.checks.problems import mend_settings
     from fracslice.errors import Cancelled
-    from fracslice.printing.problems import mend_settings
     from fracslice.scene import Scene
 
     lines = list[str]()
@@ -399,11 +411,10 @@ def examine_layers(
     of: Scene | Field, variant: Variant, given: CheckOptions, work: Work, finest: float = 0.0
 ) -> Attempt:
     """Check the layers of a variant of an object, in layers and pixels of at least `finest` mm."""
-    from fracslice.jobs.completeness import layers_amount
-    from fracslice.printing.problems import Problem
+    from fracslice.checks.fitting import misfit
+    from fracslice.checks.layer_checks import check_layers
     from fracslice.scene import Scene
-    from fracslice.slicing import Slicer, adapted, plan_stack
-    from fracslice.slicing.layer_checks import check_layers, misfit
+    from fracslice.slicing import adapted, plan_stack
 
     begun, machine, size = time.process_time(), given.machine, variant.size
     side = None if size.unit else size.side
@@ -423,9 +434,7 @@ def examine_layers(
     else:
         stack = stack if most is None else adapted(stack, most, work)
         report = check_layers(stack, given.limits, machine, work)
-    lost = [Problem("lost", text) for text in layers_amount(Slicer(stack, work), work).problems]
-    faults = [Problem("mesh", text) for text in variant.faults]
-    report = replace(report, problems=[*faults, *lost, *report.problems])
+    report = replace(report, problems=[*variant.faults, *report.problems])
     report, spent = of_material(report, given.material), time.process_time() - begun
     return Attempt(
         variant, report.as_dict(), describe_report(report), report.problems, (stack, report), spent
@@ -444,7 +453,7 @@ def shared_check(scene: Scene, job: SliceJob, given: CheckOptions, work: Work) -
 
 def draw(stack: Stack, report: PrintReport, path: str, work: Work) -> None:
     """Draw the worst layers."""
-    from fracslice.export import replacing
+    from fracslice.common.files import replacing
     from fracslice.slicing.preview import worst_layers
 
     with replacing(path) as file:
@@ -465,9 +474,9 @@ def figures_of(report: PrintReport) -> str:
     return f"{format_count(report.layers, 'layer')}, {size} mm, {parts}{ml} ml, {g} g"
 
 
-def verdict(problems: Sequence[object]) -> str:
+def verdict(problems: Sequence[Problem]) -> str:
     """Verdict on printability, with a line for each problem."""
-    from fracslice.printing.problems import verdict
+    from fracslice.checks.problems import verdict
 
     lines = [f"  {problem}" for problem in problems]
     return os.linesep.join([f"{verdict(problems)}{':' if lines else ''}", *lines])

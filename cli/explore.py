@@ -92,7 +92,7 @@ def write(target: Path, scenes: Sequence[Scene], pictures: Sequence[np.ndarray])
     """Write the contact sheet and the folder of its scenes."""
     from PIL import Image, ImageDraw
 
-    from fracslice.export import replacing
+    from fracslice.common.files import replacing
     from fracslice.scene.model import to_xml
 
     height, width = pictures[0].shape[:2]

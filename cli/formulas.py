@@ -69,7 +69,7 @@ def draw(roots: list[Node], path: str) -> None:
     from PIL import Image
 
     from fracslice import render
-    from fracslice.export import replacing
+    from fracslice.common.files import replacing
     from fracslice.formulas import bounds
 
     cut = [r if r.bounds.box.finite else bounds(r, min=(-2, -2, -2), max=(2, 2, 2)) for r in roots]

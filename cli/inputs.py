@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fracslice.common.parameters import MODELS
 from fracslice.errors import MeshError, SceneError
+from fracslice.formats import ENDINGS
 
 from .execution import stopped_at_once
 
@@ -70,12 +70,12 @@ def refuse_moved(scene: Scene, settings: Iterable[str]) -> None:
 
 def is_model(source: str) -> bool:
     """True if the file name has the extension of a model."""
-    return Path(source).suffix.lower() in MODELS
+    return Path(source).suffix.lower() in ENDINGS
 
 
 def load_model(source: str) -> Mesh:
     """Read the mesh of a model file. Raises `BadInput` if it cannot be read."""
-    from fracslice.mesh.reading import read_mesh
+    from fracslice.mesh.models import read_mesh
 
     try:
         with stopped_at_once():
@@ -99,7 +99,7 @@ def check_targets(source: str, *targets: str | None) -> None:
 
     Raises an error for a file that cannot be written, or that would replace the scene or another output.
     """
-    from fracslice.export import check_target
+    from fracslice.common.files import check_target
 
     taken = {os.path.realpath(source)}
     for target in targets:
@@ -113,7 +113,7 @@ def check_targets(source: str, *targets: str | None) -> None:
 
 def check_folder(folder: Path) -> None:
     """Check before any work is done that a folder can be made or written to."""
-    from fracslice.export import check_target
+    from fracslice.common.files import check_target
 
     if folder.exists() and not folder.is_dir():
         raise click.UsageError(f"{folder}: expected a folder")

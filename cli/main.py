@@ -19,6 +19,7 @@ from typing import Any, NoReturn, TextIO
 
 import click
 
+from fracslice.common.parameters import alternatives
 from fracslice.errors import (
     BenchError,
     DeviceError,
@@ -31,6 +32,7 @@ from fracslice.errors import (
     SliceError,
     VolumeError,
 )
+from fracslice.formats import ENDINGS
 from fracslice.version import __version__
 
 from .execution import NOTHING, StoppedError
@@ -99,19 +101,23 @@ def stoppable() -> Iterator[None]:
         raise StoppedError(signal.SIGINT, NOTHING) from None
 
 
+HELP = f"""Fractals as signed distance fields, made into printable meshes, slices and pictures.
+
+SCENE is an .xml file, or the name of a scene that ships with fracslice (see fracslice scenes). MODEL is
+a file of {alternatives(*ENDINGS)}. A LENGTH is in mm, or has a unit: mm, cm, m, in or um.
+"""
+
+
 @click.group(
     cls=Commands,
+    help=HELP,
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
 @click.version_option(__version__, message="%(prog)s %(version)s")
 @click.pass_context
 def commands(context: click.Context) -> None:
-    """Fractals as signed distance fields, made into printable meshes, slices and pictures.
-
-    SCENE is an .xml file, or the name of a scene that ships with fracslice (see fracslice scenes). MODEL is
-    an .stl, .3mf, .ply, .obj or .glb file. A LENGTH is in mm, or has a unit: mm, cm, m, in or um.
-    """
+    """Print the help without a command."""
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
         context.exit(USAGE)

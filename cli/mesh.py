@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fracslice.common.messages import decimal
+from fracslice.common.parameters import alternatives
+from fracslice.formats import ENDINGS
 
 from .inputs import BadInput, check_folder, check_targets, load_scene, refuse_moved, refuse_options
 from .options import (
@@ -45,7 +47,7 @@ class MeshFileOptions(ClusterOptions, MeshOptions):
 
     source: str = argument("SCENE|MODEL")
     output: str = output(
-        "FILE", "An .stl, .3mf, .ply, .obj or .glb file; or .vdb, for the samples of the field."
+        "FILE", f"A file of {alternatives(*ENDINGS)}; or .vdb, for the samples of the field."
     )
     seconds: float | None = option(
         SECONDS, "Mesh the scene at this time of its <animation>, such as 2.5s.", "--time"
@@ -185,9 +187,8 @@ def store_in(folder: str | None) -> Store | None:
 
 def make_and_write(scene: Scene, given: MeshFileOptions, work: Work) -> Result:
     """Make the mesh and write it, or its samples, and the picture."""
-    from fracslice.export import write
-    from fracslice.jobs.mesh import make_mesh
-    from fracslice.jobs.mesh_writing import metadata
+    from fracslice.formats import write
+    from fracslice.jobs.mesh import make_mesh, metadata
 
     job, output, picture = given.mesh_job(scene), given.output, given.picture
     if picture is None and Path(output).suffix.lower() != GRID:
@@ -207,10 +208,8 @@ def make_and_write(scene: Scene, given: MeshFileOptions, work: Work) -> Result:
 
 def check_outputs(given: MeshFileOptions) -> None:
     """Check before any work is done that the output files can be written."""
-    from fracslice.export import FORMATS
-
-    if Path(given.output).suffix.lower() not in (*FORMATS, GRID):
-        known = ", ".join([*FORMATS, GRID])
+    if Path(given.output).suffix.lower() not in (*ENDINGS, GRID):
+        known = ", ".join([*ENDINGS, GRID])
         raise click.UsageError(f"{given.output}: unknown kind of file; known are {known}")
     check_targets(given.source, given.output, given.report, given.picture)
     if given.report is not None and is_table(given.report):
@@ -239,7 +238,7 @@ def write_report(report: Report, path: str) -> None:
     """Write the report as JSON."""
     import json
 
-    from fracslice.export import replacing
+    from fracslice.common.files import replacing
 
     with replacing(path) as file:
         file.write((json.dumps(report.as_dict(), indent=2) + "\n").encode())
@@ -271,7 +270,7 @@ def write_row(path: str, output: str, settings: Sequence[str], report: Report) -
     """Write the settings and numbers of a mesh to its row of a table; the rows of other outputs stay."""
     import csv
 
-    from fracslice.export import replacing
+    from fracslice.common.files import replacing
 
     numbers = {name: value for name, value in report.as_dict().items() if isinstance(value, int | float)}
     values = dict(setting.split("=", 1) for setting in settings)

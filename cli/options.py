@@ -38,10 +38,10 @@ from .execution import NOTHING, working
 from .inputs import BadInput
 
 if TYPE_CHECKING:
+    from fracslice.checks.layer_checks import PrintReport
     from fracslice.cluster import Pool
     from fracslice.scene import Scene
     from fracslice.slicing import Stack
-    from fracslice.slicing.layer_checks import PrintReport
     from fracslice.slicing.printers import Printer
     from fracslice.work import Work
 
@@ -416,9 +416,9 @@ def write_page(
     """Write the summary page of layers that were checked."""
     import numpy as np
 
-    from fracslice.export import replacing
+    from fracslice.checks.problems import verdict
+    from fracslice.common.files import replacing
     from fracslice.export.page import page
-    from fracslice.printing.problems import verdict
     from fracslice.slicing.preview import worst_layers
 
     with io.BytesIO() as picture, replacing(path) as file:

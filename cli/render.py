@@ -97,7 +97,7 @@ def render(given: RenderOptions) -> None:
 
 def note_on_denoising() -> None:
     """Say if Open Image Denoise is not installed."""
-    from fracslice.rendering.denoising import advice
+    from fracslice.jobs.pictures import advice
 
     if missing := advice():
         click.echo(f"--denoise: {missing}", err=True)

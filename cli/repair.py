@@ -6,6 +6,9 @@ import os
 
 import click
 
+from fracslice.common.parameters import alternatives
+from fracslice.formats import ENDINGS
+
 from .inputs import BadInput, check_targets, load_model
 from .options import RunOptions, argument, command, output
 from .summary import figures
@@ -15,7 +18,7 @@ class RepairOptions(RunOptions):
     """Options of `repair`."""
 
     source: str = argument("MODEL")
-    output: str = output("FILE", "The repaired model: an .stl, .3mf, .ply, .obj or .glb file.")
+    output: str = output("FILE", f"The repaired model: a file of {alternatives(*ENDINGS)}.")
 
 
 @command(RepairOptions, short_help="Make a solid of a MODEL that is none.")
@@ -29,12 +32,12 @@ def repair(given: RepairOptions) -> int:
     fracslice repair scan.stl -o solid.stl
     """
     from fracslice.errors import MeshError
-    from fracslice.export import FORMATS, write
+    from fracslice.formats import write
     from fracslice.mesh.models import faults
     from fracslice.mesh.repair import repair as repaired
 
-    if os.path.splitext(given.output)[1].lower() not in FORMATS:
-        raise click.UsageError(f"{given.output}: unknown kind of file; known are {', '.join(FORMATS)}")
+    if os.path.splitext(given.output)[1].lower() not in ENDINGS:
+        raise click.UsageError(f"{given.output}: unknown kind of file; known are {', '.join(ENDINGS)}")
     check_targets(given.source, given.output)
     mesh = load_model(given.source)
     with given.working() as work:

@@ -35,11 +35,11 @@ from .sweeps import families
 if TYPE_CHECKING:
     from fracslice.export.resins import Resin
     from fracslice.export.slice_run import SliceRun
-    from fracslice.jobs.completeness import Completeness
     from fracslice.jobs.slices import SliceRecipe
     from fracslice.scene import Scene
     from fracslice.slicing import Stack
     from fracslice.slicing.printers import Printer
+    from fracslice.volume.amount import Completeness
     from fracslice.work import Work
 
 DATE = "SOURCE_DATE_EPOCH"
@@ -126,7 +126,7 @@ def slice_(given: SliceOptions) -> int:
     """
     from fracslice.export.layers import PICTURES, PRINTS, slice_format, write_slices
     from fracslice.export.resuming import KEPT
-    from fracslice.jobs.completeness import layers_amount
+    from fracslice.slicing.layers import layers_amount
 
     output = given.output
     kind, resin = slice_format(output, given.form), resin_of(given)
@@ -269,7 +269,7 @@ def creation_date() -> datetime:
 
 def write_preview(stack: Stack, path: str, work: Work) -> None:
     """Write a contact sheet (.png) or an animation (.webp) of the layers."""
-    from fracslice.export import replacing
+    from fracslice.common.files import replacing
     from fracslice.slicing.preview import animation, contact_sheet
 
     with replacing(path) as file:

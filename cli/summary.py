@@ -13,17 +13,14 @@ from fracslice.records import JOINING
 if TYPE_CHECKING:
     import numpy as np
 
+    from fracslice.checks.layer_checks import PrintReport
     from fracslice.export.slice_run import SliceRun
     from fracslice.jobs.report import Report, Result
     from fracslice.mesh.checks import MeshReport
-    from fracslice.slicing.layer_checks import PrintReport
     from fracslice.volume import Drain
 
 DENSITIES = {"resin": 1.1, "pla": 1.24, "petg": 1.27, "abs": 1.04, "asa": 1.07, "tpu": 1.22}
 """Materials and their densities, g/ml; filaments as in PrusaResearch.ini of PrusaSlicer 2.5."""
-
-OF_RESIN = {"cavities", "cups", "traps", "holes", "fit"}
-"""Problems of liquid resin, and of the known printers, which are for resin."""
 
 FLAT = 50.0
 """Mean cross-section per area on the plate from which an object does not stand flat, as in the checks."""
@@ -88,7 +85,7 @@ class Closing:
             bodies = format_count(self.loose, "loose body", "loose bodies")
             yield f"{bodies}: --bridge {max(self.bridge, 1):.2g}mm, or --keep largest"
         if self.contact * FLAT < self.volume / self.height:
-            from fracslice.printing.problems import flat_base
+            from fracslice.checks.problems import flat_base
 
             plate = f"{significant(self.contact, 2)} mm2 on the plate"
             yield f"does not stand flat, {plate}: --base {flat_base(self.height)}"
@@ -129,7 +126,10 @@ def of_mesh(result: Result, material: str, price: float | None) -> Closing:
 
 def of_material(report: PrintReport, material: str) -> PrintReport:
     """Report on layers of a key of `DENSITIES`: its weight, and of a filament no problem of resin."""
-    problems = [p for p in report.problems if material == "resin" or p.kind not in OF_RESIN]
+    from fracslice.checks import checks
+
+    of_resin = {check.kind for check in checks() if check.of_resin and material != "resin"}
+    problems = [problem for problem in report.problems if problem.kind not in of_resin]
     return replace(report, weight_g=report.volume / 1000 * DENSITIES[material], problems=problems)
 
 

@@ -87,7 +87,7 @@ _WHERE = {
     "render": "api.pictures",
     "slice_layers": "api.slices",
     "to_xml": "scene",
-    "write": "export",
+    "write": "formats",
 }
 
 

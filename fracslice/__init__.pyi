@@ -5,7 +5,7 @@ from .api.pictures import render as render
 from .api.slices import Slices as Slices
 from .api.slices import slice_layers as slice_layers
 from .errors import FracsliceError as FracsliceError
-from .export import write as write
+from .formats import write as write
 from .formulas import Node as Node
 from .formulas import abox as abox
 from .formulas import amazing_surf as amazing_surf

@@ -495,7 +495,7 @@ class Reduction:
         """See `fracslice.mesh.simplify.Collapsed`."""
 
 class MeshField:
-    """See `fracslice.mesh.field.MeshField`. Refers to the arrays during its lifetime."""
+    """See `fracslice.mesh.models.MeshField`. Refers to the arrays during its lifetime."""
 
     def __init__(
         self,

@@ -253,7 +253,7 @@ def test_a_file_is_named_that_is_written_when_its_last_check_is_cancelled(monkey
     def stopped(*_):
         raise Cancelled("cancelled")
 
-    monkeypatch.setattr("fracslice.jobs.completeness.mesh_amount", stopped)
+    monkeypatch.setattr("fracslice.volume.amount.mesh_amount", stopped)
     target = tmp_path / "ball.stl"
     with pytest.raises(KeptError, match=r"^.*ball\.stl is written$"):
         make_mesh(BALL, MeshJob(resolution=16), path=target)

@@ -13,7 +13,7 @@ import click
 import pytest
 from fracslice.cli.main import NAMES, commands, run
 
-from fracslice.export import write
+from fracslice.formats import write
 
 from .mesh import shapes
 

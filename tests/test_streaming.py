@@ -24,7 +24,7 @@ from fracslice.formulas import (
     union,
 )
 from fracslice.jobs import surfaces
-from fracslice.mesh.reading import read_mesh
+from fracslice.mesh.models import read_mesh
 from fracslice.scene import Print, scene
 from fracslice.work import Work
 

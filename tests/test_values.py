@@ -14,6 +14,7 @@ import pytest
 
 from fracslice import MeshJob, Work
 from fracslice.bench.measurements import BenchmarkTask
+from fracslice.checks.problems import Limits
 from fracslice.common.parameters import AUTO, REQUIRED, Count, Number, Vector
 from fracslice.errors import FracsliceError
 from fracslice.export.resins import Resin
@@ -22,7 +23,6 @@ from fracslice.fields.registry import Formula
 from fracslice.formulas import Node, names, sphere
 from fracslice.formulas import get as formula
 from fracslice.mesh.simplify import simplify
-from fracslice.printing.problems import Limits
 from fracslice.rendering import Renderer
 from fracslice.scene import Print, parse_length, scene
 from fracslice.scene.view import PARTS, Camera, Film, View

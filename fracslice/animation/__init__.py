@@ -1,9 +1,8 @@
 """Films: a scene over time, its frames and their files."""
 
 from .encode import ENDINGS, check_film, encode, sheet_frames
-from .film import FilmJob
+from .film import FilmJob, write_frames
 from .flight import with_flight
-from .frames import write_frames
 from .timeline import Timeline
 
 __all__ = [

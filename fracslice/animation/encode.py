@@ -11,10 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from ..common.files import temporary_folder
+from ..common.files import replacing, temporary_folder
 from ..common.messages import lacking
 from ..errors import ExportError
-from ..export import replacing
 from ..work import Work
 
 CODECS = {

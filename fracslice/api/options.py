@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import Any, Literal, ParamSpec, TypeAlias, TypedDict, TypeVar, get_type_hints
 
 from ..common.messages import hint
-from ..common.parameters import MODELS, REQUIRED, AnyLength, AnyScale, Record, parameter_lines, short_repr
+from ..common.parameters import REQUIRED, AnyLength, AnyScale, Record, parameter_lines, short_repr
 from ..errors import SceneError
 from ..fields.devices import choose_device
 from ..fields.node import TriangleMesh
+from ..formats import ENDINGS
 from ..formulas import Formula, Node, get
 from ..formulas import names as formula_names
 from ..records import Colour, MeshJob, RenderJob, SliceJob
@@ -240,7 +241,7 @@ def resolve(source: Source) -> Node | Scene:
         how = "; formulas.shape makes a formula of a function" if callable(source) else ""
         raise SceneError(f"{short_repr(source)}: {wanted}{how}")
     path = Path(source)
-    if path.suffix.lower() in MODELS:
+    if path.suffix.lower() in ENDINGS:
         return get("model")(os.fspath(source))
     if path.exists() or path.name != os.fspath(source) or path.suffix:
         return read(path)

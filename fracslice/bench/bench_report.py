@@ -10,9 +10,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..common.files import replacing
 from ..common.messages import lacking
 from ..errors import BenchError
-from ..export import replacing
 from ..version import __version__
 from .measurements import Measurement
 

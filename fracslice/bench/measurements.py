@@ -26,7 +26,7 @@ from ..common.messages import format_count
 from ..common.parameters import Count, Number, attribute, validate, validate_value
 from ..errors import BenchError, FracsliceError, SharedError
 from ..work import Work
-from .methods import METHODS, WORKLOADS
+from .measure import METHODS, WORKLOADS
 
 PLACES = ("{workload}", "{resolution}", "{output}")
 

@@ -69,6 +69,12 @@ def open_regular(path: str | Path) -> Iterator[BinaryIO]:
         yield file
 
 
+def read_bytes(path: str | Path) -> bytes:
+    """Contents of a file, which is opened as by `open_regular`."""
+    with open_regular(path) as file:
+        return file.read()
+
+
 @contextmanager
 def private_folder(folder: Path) -> Iterator[int | None]:
     """Open a folder whose contents and path no other user can change; create it if it does not exist.

@@ -352,10 +352,6 @@ class Label(Parameter):
         return value
 
 
-MODELS = frozenset({".stl", ".3mf", ".ply", ".obj", ".glb"})
-"""Extensions of `mesh.reading.READERS`, which scenes need not import."""
-
-
 @dataclass(frozen=True)
 class File(Parameter):
     """Name of a file; in a scene file, relative to its folder.

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..common.files import replacing
+from ..common.packages import HEAD, package
+from ..formats._3mf import CORE_NAMES, mesh_element
 from ..mesh.model import Mesh
-from .packages import HEAD, package
-from .threemf import CORE_NAMES, mesh_element
 
 if TYPE_CHECKING:
     from ..fields.box import Box

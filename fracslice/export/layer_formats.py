@@ -26,10 +26,9 @@ from ..slicing import Layer
 from ..slicing.layers import Pictures
 from ..slicing.printers import Printer
 from ..work import ahead, in_background
-from .layer_tasks import Encode, begin, encoded_layers
 from .resins import Resin
 from .resuming import Journal, journal, resumable_folder
-from .slice_run import SliceRun
+from .slice_run import Encode, SliceRun, begin, encoded_layers
 
 
 @dataclass(frozen=True)

@@ -1,30 +1,151 @@
-"""Slice runs: a planned stack, and what its files hold besides layers."""
+"""Slice runs: a planned stack, what its files hold besides layers, and ranges of its layers as tasks of a
+cluster.
+"""
 
 from __future__ import annotations
 
+import io
 import json
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, field, fields
 from datetime import UTC, datetime
-from functools import cached_property
-from typing import TYPE_CHECKING
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, ClassVar, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..common.cache import key, program
-from ..errors import SliceError
+from ..common.messages import format_count
+from ..errors import ClusterError, ExportError, SharedError, SliceError
 from ..expr.host import toolchain
 from ..records import SECTIONS
-from ..slicing import Slicer, Stack
-from ..slicing.layers import MeanSlicer
+from ..slicing import Layer, Slicer, Stack
+from ..slicing.layers import SLAB, MeanSlicer, Pictures
 from ..slicing.raster import Screen
 from ..work import Work
-from .layer_tasks import Recipe
 from .resins import Resin
+from .resuming import Journal, whole_layers
 
 if TYPE_CHECKING:
+    from ..cluster import Contents
     from ..mesh.model import Mesh
+
+
+Encode = Callable[[Layer], bytes]
+"""Encodes a layer."""
+
+PIXELS, MOST = 1 << 20, 64
+"""Pixels along the longer side of all layers of a range, about two seconds; most ranges of a small stack."""
+
+
+class Recipe(Hashable, Protocol):
+    """Everything that a run is made from, without arrays; a worker plans it once."""
+
+    @property
+    def form(self) -> str:
+        """Format of the file."""
+
+    def run(self, work: Work) -> SliceRun:
+        """Plan the run."""
+
+    def encoder(self, run: SliceRun) -> Encode:
+        """Return the function that encodes the layers of a run in this format."""
+
+
+@dataclass(frozen=True)
+class RangeTask:
+    """Layers `first` to `end` - 1 of a run, encoded."""
+
+    stage: ClassVar[str] = "layers"  # first part of its name
+    recipe: Recipe  # the run
+    job: str  # key of the run and its encoding
+    first: int  # range
+    end: int
+
+    @classmethod
+    def all(cls, run: SliceRun, job: str, start: int = 0) -> list[Self]:
+        """Tasks of all layers."""
+        if run.recipe is None:
+            raise ExportError("a cluster needs the scene of the layers; these are planned by hand")
+        size = range_size(run)
+        begins = range(start // size * size, run.layers, size)
+        return [cls(run.recipe, job, first, min(first + size, run.layers)) for first in begins]
+
+    @property
+    def name(self) -> str:
+        """Name of the range."""
+        return f"{self.stage}-{self.first:06}-{self.end:06}"
+
+    def planned(self, form: str) -> SliceRun:
+        """The run, planned once in a process."""
+        run = _plan_run(self.recipe)
+        if run.key(form) != self.job:
+            raise ClusterError("the layers planned here are others than those of the job")
+        return run
+
+    def make(self, work: Work) -> Contents:
+        """Records of the encoded layers; see `Task.make`."""
+        run = self.planned(self.recipe.form)
+        encode = self.recipe.encoder(run)
+        file = io.BytesIO()
+        journal = Journal(file)
+        for data in run.slicer_with(work).map(encode, range(self.first, self.end)):
+            journal.append(data)
+        return file.getvalue()
+
+
+def begin(run: SliceRun, form: str) -> None:
+    """Begin to encode the layers of a run, before any file is touched."""
+    pool = run.work.cluster
+    if pool is None:
+        return
+    from ..cluster import Shard
+
+    if isinstance(pool, Shard) and not pool.first:
+        count = pool.share(RangeTask.all(run, run.key(form)), run.work)
+        raise SharedError(
+            f"this shard made {format_count(count, 'range')} of layers; shard 1 writes the file"
+        )
+
+
+def encoded_layers(
+    run: SliceRun, form: str, encode: Encode, start: int, pictures: Pictures | None = None
+) -> Iterator[bytes]:
+    """Encoded layers of a run in order, made by threads here or by the pool of its work."""
+    pool = run.work.cluster
+    if pool is None:
+        yield from run.slicer.map(encode, range(start, run.layers), pictures)
+        return
+    job = run.key(form)
+    tasks = RangeTask.all(run, job, start)
+    for task, data in zip(tasks, pool.results(tasks, run.work, "slicing"), strict=True):
+        layers = whole_layers(io.BytesIO(data), task.end - task.first)
+        for index, layer in enumerate(layers, task.first):
+            if index >= start:
+                yield layer
+    pool.finished(job)
+
+
+def range_size(run: SliceRun) -> int:
+    """Layers of a range, the same for any number of workers."""
+    return max(SLAB, min(PIXELS // max(run.stack.shape), run.layers // MOST) // SLAB * SLAB)
+
+
+_PLANNING = threading.Lock()
+
+
+def _plan_run(recipe: Recipe) -> SliceRun:
+    """The run of a recipe, planned once in a process."""
+    with _PLANNING:
+        return _keep_range(recipe)
+
+
+@lru_cache(maxsize=2)
+def _keep_range(recipe: Recipe) -> SliceRun:
+    return recipe.run(Work(threads=1))
+
 
 EPOCH = datetime(1980, 1, 1, tzinfo=UTC)
 """Date of files by default, so that equal jobs give equal bytes."""

@@ -868,13 +868,13 @@ def model(file: str, size: float | None = None, place: Literal['as is', 'centre'
     Parameters
     ----------
     file : the name of a file
-        an STL, OBJ, PLY, GLB or 3MF file, in the folder of the scene
+        a model, .3mf, .glb, .obj, .ply or .stl, in the folder of the scene
     size : a number > 0
         the longest side; without it, a scene unit is a millimetre of the model
     place : as is, centre or bed, default 'as is'
         where the file has it, with its box centred at the origin, or there with its lowest point at z = 0
     units : um, µm, mm, cm, in or m, default 'mm'
-        unit of an STL, OBJ or PLY file; GLB and 3MF state their own
+        unit of a file that states none, as .3mf and .glb do
     sha256 : the SHA-256 of the file, 64 hexadecimal digits
         hash of the file, by which a file that has changed is noticed
 

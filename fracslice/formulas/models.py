@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
-from ..common.parameters import MILLIMETRES, MODELS, REQUIRED, Choice, Digest, File, Number
+from ..common.parameters import MILLIMETRES, REQUIRED, Choice, Digest, File, Number, alternatives
 from ..errors import MeshError, SceneError
 from ..expr.vocabulary import solid_distance
 from ..fields.box import Box, Triple, three
 from ..fields.registry import Formula, Node, shape
+from ..formats import ENDINGS, mesh_format
 
 
 def identify_file(formula: Formula, name: str, known: Collection[str], what: str) -> None:
@@ -40,14 +42,14 @@ def reading(node: Node, name: str) -> Iterator[None]:
 
 
 @shape(
-    file=File(REQUIRED, "an STL, OBJ, PLY, GLB or 3MF file, in the folder of the scene", inside=True),
+    file=File(REQUIRED, f"a model, {alternatives(*ENDINGS)}, in the folder of the scene", inside=True),
     size=Number(None, "the longest side; without it, a scene unit is a millimetre of the model", above=0),
     place=Choice(
         "as is",
         "where the file has it, with its box centred at the origin, or there with its lowest point at z = 0",
         ("as is", "centre", "bed"),
     ),
-    units=Choice("mm", "unit of an STL, OBJ or PLY file; GLB and 3MF state their own", tuple(MILLIMETRES)),
+    units=Choice("mm", "unit of a file that states none, as .3mf and .glb do", tuple(MILLIMETRES)),
     sha256=Digest(None, "hash of the file, by which a file that has changed is noticed"),
 )
 def model(x, y, z, origin, scale, inverse, solid):  # type: ignore[no-untyped-def]
@@ -59,12 +61,12 @@ def model(x, y, z, origin, scale, inverse, solid):  # type: ignore[no-untyped-de
     return scale * solid_distance((x - ox) * inverse, (y - oy) * inverse, (z - oz) * inverse, solid)
 
 
-identify_file(model, "file", MODELS, "a model file")
+identify_file(model, "file", ENDINGS, "a model file")
 
 
 @model.check
 def model_check(node: Node) -> None:
-    if node["units"] != "mm" and node["file"].lower().endswith((".3mf", ".glb")):
+    if node["units"] != "mm" and mesh_format(Path(node["file"]).suffix.lower()).has_unit:
         raise node.fail(f'units="{node["units"]}": expected none, as the file states its own')
 
 

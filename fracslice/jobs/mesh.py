@@ -1,4 +1,6 @@
-"""The mesh job: from a scene to a checked, printable mesh, or to a 3MF file that holds its formula."""
+"""The mesh job: from a scene to a checked, printable mesh, which is written while it is checked, or to a 3MF
+file that holds its formula.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -19,20 +21,19 @@ from ..formulas import Node
 from ..records import MeshJob
 from ..scene import Print, Scene
 from ..version import __version__
-from ..work import Work, in_background
+from ..work import Work, ahead, in_background
 from . import surfaces
+from .mesh_steps import Checks, Executor, Finish, Local, surface_distances
 from .report import Clock, Placement, Report, Result, SurfaceError, SurfaceToMesh
 from .surfaces import Sized, apply_edits, in_mm, plan_mesh
 
 if TYPE_CHECKING:
+    from ..mesh import Mesh
+    from ..mesh.simplify import Simplified
     from ..volume import Plan, SignBricks
     from ..volume.sizing import Sizing
-    from .mesh_steps import Executor
     from .shared import MeshRecipe
     from .surfaces import Surface
-
-COLOURED = (".ply", ".glb", ".3mf")
-"""Formats that hold colours of vertices."""
 
 
 def make_mesh(
@@ -131,12 +132,14 @@ class _Job:
         """Raise the errors of invalid arguments before any work is done."""
         self.what.voxels(self.size.longest)
         if self.path is not None:
-            from ..export import check_format, check_target
+            from ..common.files import check_target
+            from ..formats import ENDINGS, check_format, mesh_format
 
             ending = check_format(self.path)
             check_target(self.path)
-            if self.what.colour is not None and ending not in COLOURED:
-                raise SceneError(f"colour: expected a file that holds colours: {', '.join(COLOURED)}")
+            if self.what.colour is not None and not mesh_format(ending).has_colours:
+                coloured = ", ".join(name for name in ENDINGS if mesh_format(name).has_colours)
+                raise SceneError(f"colour: expected a file that holds colours: {coloured}")
         if self.what.colour is not None and self.clock.work.cluster is not None:
             raise SceneError(f"colour {self.what.colour}: expected no cluster and no shard")
 
@@ -231,9 +234,8 @@ class _Job:
         """Finished mesh and report, and the refinement of the samples that does not lose the object."""
         from ..fields.depth import shallower
         from ..mesh.shells import touching_note
-        from .completeness import lost_size, mesh_amount
-        from .finishing import choose_bodies
-        from .mesh_writing import Writing
+        from ..volume.amount import lost_size, mesh_amount
+        from .mesh_steps import choose_bodies
 
         what, clock, scale, refined = self.what, self.clock, sized.scale, None
         planned, signs, thin = surface.planned, surface.signs, surface.thin
@@ -314,11 +316,10 @@ def make_implicit(
 
     `what`: the size, and the voxel that automatic depths follow from.
     """
-    from ..export import check_target
+    from ..common.files import check_target
     from ..export.implicit import write_implicit
     from ..fields.graph import graph
     from ..volume.sizing import sizing
-    from .mesh_writing import metadata
 
     what, clock = what or MeshJob(), Clock(work or Work())
     _refuse(what.edits(scene))
@@ -343,3 +344,98 @@ def _refuse(how: Print) -> None:
     changes += [name for name in ("keep", "cavities") if getattr(how, name) not in ("all", "keep")]
     if changes:
         raise SceneError(f"{changes[0]}: needs samples of the field; expected a mesh, or formulas alone")
+
+
+class Made(NamedTuple):
+    """A finished mesh."""
+
+    whole: Mesh | None  # the mesh, if in one piece
+    simplified: Simplified | None  # its simplification, if any
+    checks: Checks
+    back: np.ndarray  # distances from points of the surface, scene units
+
+
+@dataclass(frozen=True)
+class Writing:
+    """Last stages of a mesh job."""
+
+    scene: Scene  # scene of the mesh
+    what: MeshJob  # the job
+    clock: Clock  # threads, progress, cancellation and timing
+    path: Path | None  # file to write
+
+    def made(self, surface: Surface, finish: Finish, executor: Executor) -> Made:
+        """Finish, write and check a mesh."""
+        checks = Checks()
+        with self.clock("checking"):
+            back = surface_distances(surface, executor, self.clock.work)
+        if isinstance(executor, Local):
+            return Made(*self._written(finish, checks), checks, back)
+        from .shared import Shared, write_shared
+
+        assert isinstance(executor, Shared)
+        mesh = write_shared(finish, checks, executor, self.path, metadata(self.scene))
+        return Made(mesh, None, checks, back)
+
+    def _written(self, finish: Finish, checks: Checks) -> tuple[Mesh | None, Simplified | None]:
+        """Write the file while it is checked, by threads of this process. Returns the mesh, if in one piece,
+        and the result of its simplification, if any.
+        """
+        from ..common.files import flushing, replacing
+        from ..formats import mesh_format
+        from ..formats.stl import write_pieces
+        from ..mesh.cleaning import Finished
+        from ..mesh.tips import tips_last
+
+        finished, simplified, mesh = finish.each(self.clock), None, None
+        if self.what.simplify is not None:
+            from ..mesh.simplify import simplify
+
+            ((piece, near),) = finished
+            with self.clock("simplifying"):
+                mesh, simplified = simplify(piece.mesh, self.what.simplify, self.clock.work)
+            finished = iter([(Finished.whole(mesh), near)])
+        meshes = ahead(finish.passing(finished, checks, self.clock))
+        if several := len(finish.pieces) > 1:
+            meshes = tips_last(meshes, finish.tips)
+        if self.what.colour is not None:
+            meshes = self._painted(meshes, finish)
+        if self.path is None:
+            (mesh,) = meshes
+            return mesh, simplified
+
+        def timed() -> Iterator[Mesh]:
+            nonlocal mesh
+            for mesh in meshes:
+                with self.clock("writing"):  # the consumer writes during the yield
+                    yield mesh
+
+        about = metadata(self.scene)
+        with replacing(self.path) as file, flushing(file):
+            if self.path.suffix.lower() == ".stl":
+                write_pieces(timed(), file, about, self.clock.work)
+            else:
+                for whole in timed():
+                    mesh_format(self.path.suffix.lower()).write(whole, file, about, self.clock.work)
+        return None if several else mesh, simplified
+
+    def _painted(self, meshes: Iterator[Mesh], finish: Finish) -> Iterator[Mesh]:
+        """Colour the vertices. Edits that are no formulas have the colour of the object there."""
+        from ..rendering.painting import paint
+
+        assert self.what.colour is not None
+        field: Any = finish.of.planned.root
+        while field.tree is None:
+            field = field.root
+        for mesh in meshes:
+            with self.clock("colouring"):
+                points = finish.place.units(mesh.vertices)
+                done = paint(field.tree, points, self.what.colour, self.clock.work)
+            yield replace(mesh, colours=done.colours, scalars=done.scalars)
+
+
+def metadata(scene: Scene) -> dict[str, str]:
+    """Metadata of files made from a scene."""
+    from ..version import APPLICATION
+
+    return {"Application": APPLICATION, "Title": scene.name, "scene_hash": scene.hash}

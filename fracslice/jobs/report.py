@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from ..mesh.simplify import Simplified
     from ..mesh.topology import Removed
     from ..volume import Bricks, Plan
-    from .completeness import Amount
+    from ..volume.amount import Amount
 
 
 @dataclass(frozen=True)

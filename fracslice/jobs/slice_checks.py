@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
+from ..checks.layer_checks import LayerFindings, PrintReport, check_layers, findings_of
+from ..checks.problems import Limits
 from ..cluster import Contents, Files, Pool, Shard, pack_arrays, unpack_arrays
 from ..errors import SharedError
-from ..export.layer_tasks import RangeTask
-from ..export.slice_run import SliceRun
-from ..printing.problems import Limits
-from ..slicing.layer_checks import LayerFindings, PrintReport, check_layers, findings_of
+from ..export.slice_run import RangeTask, SliceRun
 from ..slicing.runs import LayerComponents, Nodes, Runs
 from ..work import Work
 
@@ -66,6 +64,7 @@ def _arrays(of: LayerFindings) -> Iterator[tuple[str, np.ndarray]]:
     for name, measured in (("walls", of.walls), ("gaps", of.gaps)):
         if measured is not None:
             yield name, measured
+    yield from ((f"measured-{kind}", np.array(number)) for kind, number in of.measured.items())
 
 
 def _read_layer_findings(files: Files, layer: str, width: int) -> LayerFindings:
@@ -78,5 +77,8 @@ def _read_layer_findings(files: Files, layer: str, width: int) -> LayerFindings:
         runs = Runs(**read("rows", "begin", "end"), width=width)
         return LayerComponents(runs, **read("label"), nodes=Nodes(**read("area", "middle", "open")))
 
-    widths: list[Any] = [files.get(f"{layer}{name}") for name in ("walls", "gaps")]
-    return LayerFindings(components("solid"), components("empty"), float(files[f"{layer}area"]), *widths)
+    walls, gaps = (files.get(f"{layer}{name}") for name in ("walls", "gaps"))
+    start = f"{layer}measured-"
+    measured = {name.removeprefix(start): float(n) for name, n in files.items() if name.startswith(start)}
+    area = float(files[f"{layer}area"])
+    return LayerFindings(components("solid"), components("empty"), area, walls, gaps, measured)

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..export.layer_tasks import Encode
 from ..export.layers import FORMATS
 from ..export.resins import Resin
-from ..export.slice_run import EPOCH, SliceRun
+from ..export.slice_run import EPOCH, Encode, SliceRun
 from ..formulas import Node
 from ..records import COARSEST, RESOLUTION, MeshJob
 from ..scene import Scene

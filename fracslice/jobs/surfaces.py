@@ -18,7 +18,7 @@ from ..common.messages import significant
 from ..errors import GridError, TooLargeError, VolumeError
 from ..records import MeshJob
 from ..scene import Print, Scene
-from ..volume.lattice import BRICK
+from ..volume.bricks import BRICK
 from ..volume.pruning import distinct
 from .report import Clock
 
@@ -127,7 +127,7 @@ def has_thin_walls(signs: SignBricks) -> bool:
     """True if walls thinner than a voxel hold too much of the material for the samples to distinguish
     bodies.
     """
-    from ..printing.components import thin_share
+    from ..printing.samples import thin_share
     from ..records import PIECES
 
     return thin_share(signs) >= PIECES

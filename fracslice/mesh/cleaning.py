@@ -15,8 +15,7 @@ from .. import _native
 from .._native import touching, turned
 from ..errors import MeshError
 from ..fields.algebra import dot, length
-from ..volume.bricks import SignBricks
-from ..volume.lattice import BRICK
+from ..volume.bricks import BRICK, SignBricks
 from .model import Mesh
 from .pieces import concatenate_at_seam, strip
 

@@ -18,8 +18,7 @@ from .._native import Cells, RootLoops
 from ..errors import MeshError
 from ..fields.field import Field
 from ..store import Arrays, stored
-from ..volume.bricks import Bricks, SignBricks
-from ..volume.lattice import BRICK
+from ..volume.bricks import BRICK, Bricks, SignBricks
 from ..work import Work, ahead, chunks
 from .model import Mesh
 from .roots import SURE, Roots

@@ -11,8 +11,7 @@ from .._native import Cells
 from ..expr.cuda_driver import device_array, pinned_array, require, to_device
 from ..expr.graph import NOTHING
 from ..fields.cuda import CudaFunction, CudaLoop, load_functions
-from .root_loops import collect, lay, start
-from .roots import SURE, Roots
+from .roots import SURE, Roots, collect, lay, start
 
 MOST_EDGES = 1 << 21
 """Grid edges of one round, which take 300 MB of GPU memory; a batch of a mesh on 16 cores has fewer."""

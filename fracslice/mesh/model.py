@@ -1,131 +1,33 @@
-"""Triangle mesh, and its export."""
+"""Triangle mesh: measures, selections, a small picture, and what other libraries make of it."""
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .._native import foremost
+from ..common.arrays import from_linear, to_linear
 from ..common.messages import format_count, lacking
+from ..common.triangles import Triangles
 from ..errors import MeshError
 from .topology import Sizes, component_sizes, edge_topology
 
 if TYPE_CHECKING:
-    import trimesh
     from manifold3d import Manifold
+
 
 CLAY = "#efe3d0"
 
 
-class Exchange:
-    """Export methods of `Mesh`."""
-
-    def _repr_png_(self) -> bytes | None:
-        """Picture in a notebook; None for an empty mesh."""
-        from .thumbnail import thumbnail
-
-        mesh = cast("Mesh", self)
-        return thumbnail(mesh) if len(mesh.triangles) else None
-
-    def export(self, path: str | Path, metadata: Mapping[str, str] | None = None) -> Path:
-        """Write the mesh to a file atomically.
-
-        Parameters
-        ----------
-        path : str or Path
-            File; the extension selects the format: .stl, .3mf, .ply, .obj or .glb.
-        metadata : mapping, optional
-            Names and values, as far as the format supports them, for example Title.
-
-        Returns
-        -------
-        Path
-            The file.
-
-        Raises
-        ------
-        ExportError
-            For an empty mesh, an unknown extension, or a file that cannot be written.
-        """
-        from ..export import write
-
-        return write(cast("Mesh", self), path, metadata)
-
-    def to_trimesh(self) -> trimesh.Trimesh:
-        """Copy of the mesh as a `trimesh.Trimesh`, unprocessed.
-
-        Returns
-        -------
-        trimesh.Trimesh
-            The same vertices and triangles; colours and, as vertex attributes, scalars.
-        """
-        import trimesh
-
-        mesh = cast("Mesh", self)
-        return trimesh.Trimesh(
-            mesh.vertices.copy(),
-            mesh.triangles.copy(),
-            process=False,
-            vertex_colors=None if mesh.colours is None else mesh.colours.copy(),
-            vertex_attributes={name: values.copy() for name, values in mesh.scalars.items()},
-        )
-
-    def to_pyvista(self) -> Any:
-        """Copy of the mesh as a `pyvista.PolyData`.
-
-        Returns
-        -------
-        pyvista.PolyData
-            The same vertices and triangles; scalars and, as "RGB", colours are point data.
-
-        Raises
-        ------
-        MeshError
-            If pyvista is not installed.
-        """
-        if reason := lacking("pyvista", "windows need"):
-            raise MeshError(reason)
-        import pyvista
-
-        mesh = cast("Mesh", self)
-        surface: Any = pyvista.PolyData
-        made = surface.from_regular_faces(mesh.vertices.copy(), mesh.triangles)
-        for name, values in mesh.scalars.items():
-            made.point_data[name] = values
-        if mesh.colours is not None:
-            made.point_data["RGB"] = mesh.colours
-        return made
-
-    def plot(self, **options: Any) -> Any:
-        """Show the mesh in a window, or in the output of a notebook cell.
-
-        Parameters
-        ----------
-        **options
-            Options of `pyvista.plot`, for example ``color`` or ``off_screen``.
-
-        Returns
-        -------
-        object
-            Result of `pyvista.plot`.
-
-        Raises
-        ------
-        MeshError
-            If pyvista is not installed.
-        """
-        mesh = cast("Mesh", self)
-        usual = {"color": CLAY} if mesh.colours is None else {"scalars": "RGB", "rgb": True}
-        return self.to_pyvista().plot(**{**usual, "split_sharp_edges": True, **options})
-
-
 @dataclass(frozen=True, eq=False, repr=False)
-class Mesh(Exchange):
+class Mesh(Triangles):
     """Triangle mesh with shared vertices. Both arrays are read-only.
 
     Attributes
@@ -155,11 +57,6 @@ class Mesh(Exchange):
     (True, 0.166667)
     """
 
-    vertices: NDArray[np.float64]
-    triangles: NDArray[np.int32]
-    colours: NDArray[np.uint8] | None = None
-    scalars: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
-
     def __post_init__(self) -> None:
         for name, kind in (("vertices", np.float64), ("triangles", np.int32)):
             array = np.asarray(getattr(self, name), kind).view()
@@ -171,7 +68,7 @@ class Mesh(Exchange):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle and copy the arrays, as mapping proxies and read-only flags are not."""
-        return Mesh, (self.vertices, self.triangles, self.colours, dict(self.scalars))
+        return Mesh, self._arrays
 
     def __repr__(self) -> str:
         x, y, z = self.size
@@ -301,7 +198,7 @@ class Mesh(Exchange):
             used = np.zeros(len(self.vertices), bool)
             used[self.triangles[keep]] = True
             number = np.cumsum(used, dtype=np.int32) - np.int32(1)
-            return self._taken(np.flatnonzero(used), number[self.triangles[keep]])
+            return Mesh(*self._taken(np.flatnonzero(used), number[self.triangles[keep]])._arrays)
         kept = selected(self.vertices, self.triangles, keep, threads)
         return Mesh(*kept) if kept else self
 
@@ -313,9 +210,7 @@ class Mesh(Exchange):
         Mesh
             The same triangles, in order, without unused vertices.
         """
-        from .._native import in_order
-
-        return self._taken(*in_order(self.triangles, len(self.vertices)))
+        return Mesh(*super().in_order()._arrays)
 
     def compact(self) -> Mesh:
         """Remove unused vertices.
@@ -331,11 +226,80 @@ class Mesh(Exchange):
         """Copy with other positions."""
         return Mesh(vertices, self.triangles, self.colours, self.scalars)
 
-    def _taken(self, index: NDArray[Any], triangles: NDArray[np.int32]) -> Mesh:
-        """Mesh of some of the vertices, with their colours and scalars."""
-        colours = None if self.colours is None else self.colours[index]
-        scalars = {name: values[index] for name, values in self.scalars.items()}
-        return Mesh(self.vertices[index], triangles, colours, scalars)
+    def _repr_png_(self) -> bytes | None:
+        """Picture in a notebook; None for an empty mesh."""
+
+        return thumbnail(self) if len(self.triangles) else None
+
+    def export(self, path: str | Path, metadata: Mapping[str, str] | None = None) -> Path:
+        """Write the mesh to a file atomically.
+
+        Parameters
+        ----------
+        path : str or Path
+            File; the extension selects the format, one of `fracslice.formats.ENDINGS`.
+        metadata : mapping, optional
+            Names and values, as far as the format supports them, for example Title.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        ExportError
+            For an empty mesh, an unknown extension, or a file that cannot be written.
+        """
+        from ..formats import write
+
+        return write(self, path, metadata)
+
+    def to_pyvista(self) -> Any:
+        """Copy of the mesh as a `pyvista.PolyData`.
+
+        Returns
+        -------
+        pyvista.PolyData
+            The same vertices and triangles; scalars and, as "RGB", colours are point data.
+
+        Raises
+        ------
+        MeshError
+            If pyvista is not installed.
+        """
+        if reason := lacking("pyvista", "windows need"):
+            raise MeshError(reason)
+        import pyvista
+
+        surface: Any = pyvista.PolyData
+        made = surface.from_regular_faces(self.vertices.copy(), self.triangles)
+        for name, values in self.scalars.items():
+            made.point_data[name] = values
+        if self.colours is not None:
+            made.point_data["RGB"] = self.colours
+        return made
+
+    def plot(self, **options: Any) -> Any:
+        """Show the mesh in a window, or in the output of a notebook cell.
+
+        Parameters
+        ----------
+        **options
+            Options of `pyvista.plot`, for example ``color`` or ``off_screen``.
+
+        Returns
+        -------
+        object
+            Result of `pyvista.plot`.
+
+        Raises
+        ------
+        MeshError
+            If pyvista is not installed.
+        """
+        usual = {"color": CLAY} if self.colours is None else {"scalars": "RGB", "rgb": True}
+        return self.to_pyvista().plot(**{**usual, "split_sharp_edges": True, **options})
 
 
 def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -345,13 +309,6 @@ def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64
         i, j = (k + 1) % 3, (k + 2) % 3
         out[:, k] = a[:, i] * b[:, j] - a[:, j] * b[:, i]
     return out
-
-
-def concatenate(meshes: list[Mesh]) -> Mesh:
-    """Concatenate meshes without welding."""
-    offsets = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
-    triangles = [mesh.triangles + np.int32(offset) for mesh, offset in zip(meshes, offsets, strict=True)]
-    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(triangles))
 
 
 _REASONS = {
@@ -376,3 +333,58 @@ def to_manifold(mesh: Mesh) -> Manifold:
     if status != "NoError":
         raise MeshError(f"the mesh is not a solid: {_REASONS.get(status, status)}")
     return solid
+
+
+WIDTH, HEIGHT, FINER = 480, 360, 2
+"""Pixels of the picture, and samples along each side of a pixel."""
+
+FILLED = 0.92
+"""Largest fraction of the picture's sides that the mesh fills."""
+
+COLOUR = (239, 227, 208)
+"""Colour of a mesh without colours, sRGB."""
+
+AMBIENT = 0.2
+"""Share of the light that comes from everywhere."""
+
+AXES = np.array([[0.876, 0.482, 0.0], [-0.2385, 0.4336, 0.8689], [0.4188, -0.7614, 0.4949]])
+"""Directions in space that point to the right, up, and to the viewer."""
+
+LIGHT = np.array([-0.48, 0.62, 0.62])
+"""Direction to the light: right, up, to the viewer."""
+
+
+def thumbnail(mesh: Mesh) -> bytes:
+    """Draw a mesh in its colours, or in clay, on a transparent background."""
+    from PIL import Image
+
+    file = io.BytesIO()
+    drawn = Image.fromarray(_render_small(mesh, WIDTH * FINER, HEIGHT * FINER))
+    drawn.resize((WIDTH, HEIGHT), Image.Resampling.BOX).save(file, "PNG")
+    return file.getvalue()
+
+
+def _render_small(mesh: Mesh, width: int, height: int) -> np.ndarray:
+    """The picture with one sample per pixel, uint8 [height, width, 4]."""
+    seen = mesh.vertices @ AXES.T
+    low, high = seen.min(0), seen.max(0)
+    across = np.maximum((high - low)[:2] / (width, height), 1e-30).max() / FILLED
+    seen = (seen - (low + high) / 2) / across + (width / 2, height / 2, 0)
+    front = foremost(seen, mesh.triangles, (height, width))
+    rows, columns = np.nonzero(front >= 0)
+    shown = np.zeros((height, width, 4), np.uint8)
+    shown[rows, columns] = _shades(mesh, seen, front[rows, columns])
+    return shown[::-1]
+
+
+def _shades(mesh: Mesh, seen: np.ndarray, which: np.ndarray) -> np.ndarray:
+    """Colours of some triangles in the light, uint8 [n, 4]."""
+    corners = mesh.triangles[which]
+    a, b, c = (seen[corners[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-30)[:, None]
+    lit = np.maximum(normals @ LIGHT * np.sign(normals[:, 2]), 0)
+    own = np.array([COLOUR] if mesh.colours is None else mesh.colours[corners].mean(1)) / 255
+    light = to_linear(own) * (AMBIENT + (1 - AMBIENT) * lit)[:, None]
+    opaque = np.full((len(which), 1), 255, np.uint8)
+    return np.hstack([np.uint8(255 * from_linear(np.minimum(light, 1)) + 0.5), opaque])

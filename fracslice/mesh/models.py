@@ -1,12 +1,16 @@
-"""Triangle models as solids of scenes: files and their hashes, checks, and signed distances."""
+"""Triangle models: read from files, welded like in a slicer, nothing repaired; as solids of scenes, with
+their hashes, checks and signed distances; and as fields.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import os
+import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -17,17 +21,54 @@ from ..common.files import open_regular
 from ..errors import MeshError, SceneError
 from ..expr.functions import InMemory
 from ..fields.box import Box
+from ..fields.field import Bounds, Device, Kernel, Precision
 from ..fields.node import TriangleMesh
 from ..fields.registry import Node, get
+from ..fields.tree import ArrayField
+from ..formats import ENDINGS, mesh_format
 from .checks import MeshReport, check_mesh
+from .cleaning import quantise_mesh
 from .model import Mesh
-from .reading import read_mesh
 from .spatial import build
 
-LARGEST, MOST = 1 << 27, 1 << 21
-"""Most bytes of a file, half of them where a triangle takes less than in an STL file; and most triangles."""
+MOST, MOST_BYTES = 1 << 21, 1 << 26
+"""Most triangles of a solid, and bytes of a file that is no format of meshes."""
+MOST_AROUND = 1 << 13
+"""Most triangles around a vertex, as each is compared with each."""
 CHUNK = 1 << 20
 """Bytes that are hashed at once."""
+
+
+def read_mesh(path: str | Path) -> Mesh:
+    """Read a mesh file, in mm.
+
+    STL, PLY and OBJ have no unit: mm are assumed. Coordinates are rounded to float32, equal positions welded,
+    and every triangle is kept.
+
+    Returns `Mesh` in mm.
+    """
+    path = Path(path)
+    if (ending := path.suffix.lower()) not in ENDINGS:
+        raise MeshError(f"{path}: not a model file that can be read; known are {', '.join(ENDINGS)}")
+    try:
+        if path.is_file() and not path.stat().st_size:
+            raise MeshError("the file is empty")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of NumPy: coordinates that are not finite are refused
+            whole = mesh_format(ending).read(path)
+            mesh = quantise_mesh(Mesh(whole.vertices, whole.triangles))
+    except FileNotFoundError:
+        raise MeshError(f"{path}: no such file") from None
+    except (OSError, MeshError) as error:
+        raise MeshError(f"{path}: {getattr(error, 'strerror', None) or error}") from error
+    if not len(mesh.triangles):
+        raise MeshError(f"{path}: the file has no triangles")
+    most = np.bincount(mesh.triangles.ravel()).max()
+    if most > MOST_AROUND:
+        raise MeshError(
+            f"{path}: {most} corners of triangles meet at a vertex: expected at most {MOST_AROUND}"
+        )
+    return mesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +114,8 @@ def file_hash(path: str) -> str:
     """SHA-256 of a file."""
     try:
         with open_regular(path) as file:
-            most = LARGEST if path.lower().endswith((".stl", ".obj")) else LARGEST // 2
+            ending = os.path.splitext(path)[1].lower()
+            most = mesh_format(ending).most if ending in ENDINGS else MOST_BYTES
             if (size := os.fstat(file.fileno()).st_size) > most:
                 large = f"a file of {size / 1e6:.0f} MB: expected at most {most / 1e6:.0f} MB"
                 raise MeshError(f"{large}, of fewer triangles or in a binary format")
@@ -165,3 +207,58 @@ def solid(file: str, sha256: str) -> Solid:
         raise MeshError(f"{', '.join(problems)}: expected a solid; {mended}")
     a, b, c = mesh.triangles.T
     return Solid.of(mesh.selected((a != b) & (b != c) & (c != a)))
+
+
+@dataclass(frozen=True, eq=False)
+class MeshField(ArrayField):
+    """Distance to a mesh, negative where the mesh winds around a point: bodies that overlap are united."""
+
+    mesh: Mesh  # A closed mesh; its unit is the scene unit
+
+    @cached_property
+    def bounds(self) -> Bounds:
+        """`Field.bounds`."""
+        low, high = self.mesh.vertices.min(0).tolist(), self.mesh.vertices.max(0).tolist()
+        return Bounds(Box(tuple(low), tuple(high)), 1.0, False)
+
+    @cached_property
+    def key(self) -> str:
+        """`Field.key`."""
+        return key("mesh", self.mesh.vertices, self.mesh.triangles)
+
+    def kernel(self, device: Device = "cpu", precision: Precision = "float32") -> Kernel:
+        """`Field.kernel`, always on the CPU."""
+        return _MeshKernel(self, np.dtype(precision))
+
+    def sign_kernel(self) -> Kernel:
+        """`Field.sign_kernel`: the winding number alone, without distances."""
+        return _MeshKernel(self, np.dtype("float32"), False)
+
+    @cached_property
+    def native(self) -> _native.MeshField:
+        """Evaluator of the field."""
+        return _native.MeshField(self.mesh.vertices, self.mesh.triangles, *build(self.mesh))
+
+
+class _MeshKernel(Kernel):
+    """Kernel of a mesh."""
+
+    batch = 1 << 14
+
+    def __init__(self, field: MeshField, dtype: np.dtype, measured: bool = True) -> None:
+        self._native, self.dtype, self._measured = field.native, dtype, measured
+
+    def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """`Kernel.points`."""
+        u, v, w = (np.asarray(a, np.float64).reshape(-1) for a in (x, y, z))
+        values = self._native.points(u, v, w, self._measured)
+        return values.reshape(np.shape(x)).astype(self.dtype, copy=False)
+
+    def bricks(
+        self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray
+    ) -> None:
+        """`Kernel.bricks`."""
+        if out.dtype == np.float32:
+            out[:] = self._native.bricks(corners, origin, voxel, self._measured)
+        else:
+            super().bricks(corners, origin, voxel, out)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from .._native import connected_components
 from ..volume import Plan
-from ..volume.lattice import values_at
+from ..volume.bricks import values_at
 from ..work import Work
 from .cleaning import quantise, used_vertices
 from .contouring import BLUNT, Piece

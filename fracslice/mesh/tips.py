@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from .._native import corners_by_vertex, pointed, touching
 from ..volume import Plan
+from ..volume.bricks import values_at
 from ..volume.extent import SLANTS, climb
-from ..volume.lattice import values_at
 from ..work import Work
 from .cleaning import quantise, used_vertices
 from .contouring import Piece

@@ -1,4 +1,4 @@
-"""Field edits that make an object printable, and printability checks of solids."""
+"""Field edits that make an object printable; what the checks measure of solids."""
 
 from __future__ import annotations
 

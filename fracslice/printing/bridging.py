@@ -14,11 +14,9 @@ from .._native import bricks_near, capsule_squares, steps_to
 from ..common.cache import key
 from ..fields.field import Kernel
 from ..volume import Bricks
-from ..volume.bricks import INSIDE, OUTSIDE
-from ..volume.lattice import values_at
+from ..volume.bricks import INSIDE, OUTSIDE, values_at
 from ..work import Work
-from .components import SolidComponents, components_of
-from .samples import Samples, positions
+from .samples import Samples, SolidComponents, components_of, positions
 
 NONE = -1
 """Marks samples in no body and cells without an entry."""

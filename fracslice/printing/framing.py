@@ -14,8 +14,8 @@ from ..volume import Plan, extent
 from ..volume.sizing import Sizing, box_of_the_rest
 from ..work import Work
 from .bridging import clusters, nearer
-from .components import SolidComponents, components_of
 from .edits import edited_field
+from .samples import SolidComponents, components_of
 from .thin_features import resolve_connectivity, sampled_object
 
 SAMPLES = 128, 384, 640

@@ -21,14 +21,13 @@ from ..formulas import Box, box, plane, transform
 from ..records import DUST, PIECES
 from ..scene import Print
 from ..volume import Bricks, Plan, extent, sample_scene
-from ..volume.lattice import values_at
+from ..volume.bricks import values_at
 from ..volume.sizing import Sizing
 from ..work import Work
 from .edits import edited_field
 
 if TYPE_CHECKING:
-    from .components import SolidComponents
-    from .samples import Samples
+    from .samples import Samples, SolidComponents
     from .walls import Walls
 
 # Measuring needs SciPy, whose import takes as long as a small mesh: import where needed.
@@ -105,7 +104,7 @@ class Preparation:
 
     def connected(self) -> SolidComponents:
         """Components of samples that resolve connectivity; shared by cavities, bodies and bridges."""
-        from .components import components_of
+        from .samples import components_of
         from .thin_features import resolve_connectivity
 
         if self.known is None:
@@ -274,7 +273,7 @@ class _Edits(Preparation):
     def rejoined(self) -> Field:
         """Join the fragments of bodies that the voxels of the mesh break, and drop broken tips."""
         from .bridging import capsules, fragments, nearer
-        from .components import components_of
+        from .samples import components_of
 
         known, voxel = self.known, max(self.planned.voxel, max(self.planned.box.size) / FINE)
         for _ in range(REPEATS if known or self.how.bridge else 0):
@@ -295,7 +294,7 @@ class _Edits(Preparation):
 
     def unsealed(self) -> Field:
         """Fill cavities that are sealed only at the sample spacing of the mesh."""
-        from .components import components_of
+        from .samples import components_of
 
         fine, self.known = self.known, components_of(sample_scene(self.planned, self.work))
         filled = self.without(self.known.sealed(fine)) if fine else self.root
@@ -334,8 +333,7 @@ class _Edits(Preparation):
         Pores that this seals are filled.
         """
         from .bridging import Capsules, capsules, contacts
-        from .components import components_of
-        from .samples import together
+        from .samples import components_of, together
         from .thin_features import all_walls
 
         solid, least, root = self.seen(self.how.thickness), self.how.thickness / self.scale, self.root
@@ -385,7 +383,7 @@ class _Edits(Preparation):
 
     def hollowed(self) -> Field:
         """Remove everything deeper than the wall thickness, and drill drain holes."""
-        from .hollowing import hollows
+        from .edits import hollows
 
         samples, how, root = self.sampled(self.how.hollow), self.how, self.root
         cuts, drains = hollows(samples, how.hollow / self.scale, how.drain / self.scale, self.planned.outer)

@@ -23,10 +23,9 @@ from ..fields.field import Bounds, Device, Field, Kernel, Precision
 from ..fields.tree import ArrayField
 from ..formulas.confining import moved_slope
 from ..volume import Bricks, Lattice, sample, sample_signs
-from ..volume.lattice import BRICK, values_at
+from ..volume.bricks import BRICK, values_at
 from ..work import Work
-from .components import sign_samples
-from .samples import Samples
+from .samples import Samples, sign_samples
 from .walls import AT_ONCE, AWAY, OPPOSITE, Direction, Walls, edge_crossings, in_blocks, slopes, walls
 
 ROUNDS = 400

@@ -1,11 +1,4 @@
-"""Thickness of a sampled solid and width of its gaps, measured from surface to surface.
-
-From each crossing of a grid edge a ray follows the normal to the opposite surface, in steps of the distance
-(sphere tracing, Hart 1996). Its length is the thickness of the wall there if the two faces look away from
-each other. So the edge of a cube is not a thin wall, as it would be for inscribed spheres (Hildebrand and
-Rüegsegger 1997), and a plate is as thick at its rim as in its middle. This is the shape diameter function
-(Shapira, Shamir and Cohen-Or 2008) with one ray.
-"""
+"""Thickness of a sampled solid, width of its gaps, measured from surface to surface; statistics."""
 
 from __future__ import annotations
 
@@ -15,9 +8,9 @@ from typing import TypeVar
 
 import numpy as np
 
-from ..common.arrays import Rows
+from ..common.arrays import Rows, weighted_quantiles
 from ..fields.field import Field, Kernel
-from ..volume.lattice import values_at
+from ..volume.bricks import values_at
 from ..work import Work, chunks
 from .samples import Samples
 
@@ -188,3 +181,32 @@ def project_faces(root: Field, walls: Walls, voxel: float, work: Work) -> Walls:
     width = ((ends[1] - ends[0]) * directions).sum(0)
     stays = np.where(across[0] & across[1], facing < OPPOSITE, across[0] | across[1]) & (width > 0)
     return Walls(ends[0].T, ends[1].T, width, walls.area, facing).chosen(stays)
+
+
+BINS = 0.05 * np.arange(41)
+"""Bin edges of the histogram, mm; the last bin includes everything thicker."""
+
+
+@dataclass(frozen=True)
+class Widths:
+    """Statistics of the widths of walls or gaps, mm."""
+
+    smallest: float  # minimum, first percentile and median
+    thinnest_hundredth: float
+    median: float
+    # weight in each bin: pixels of medial axes in layers, mm^2 of surface in solids
+    counts: tuple[float, ...]
+    edges: tuple[float, ...] = tuple(round(float(b), 3) for b in BINS)  # edges of the bins
+
+
+def widths_of(values: np.ndarray, weights: np.ndarray | None = None) -> Widths | None:
+    """Summarise widths.
+
+    `values`: float64 [n], mm; `weights`: float64 [n], optional.
+    """
+    if not len(values):
+        return None
+    weight = np.ones(len(values)) if weights is None else weights
+    low, hundredth, middle = weighted_quantiles(values, weight, 0, 0.01, 0.5)
+    counts = np.histogram(np.minimum(values, BINS[-1] - 1e-9), BINS, weights=weights)[0]
+    return Widths(low, hundredth, middle, tuple(counts.tolist()))

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from .accumulator import Accumulator
+from .accumulator import Accumulator, HostAccumulator
 from .film import develop, picture
-from .host_accumulator import HostAccumulator
 from .progressive import Pass, Renderer
 
 __all__ = ["Accumulator", "HostAccumulator", "Pass", "Renderer", "develop", "picture"]

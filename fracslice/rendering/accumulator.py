@@ -4,18 +4,28 @@ order.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Protocol
+from pathlib import Path
+from typing import Any, BinaryIO, Protocol
+from zipfile import BadZipFile
 
 import numpy as np
+from numpy.lib.npyio import NpzFile
 
+from ..errors import RenderError
+from ..expr.graph import NOTHING
+from ..expr.host import lane_count
+from ..expr.loops import WIDTH, load, loop, store
+from ..expr.machine import Function
+from ..expr.vocabulary import maximum, where
+from ..fields.cpu import load_functions
 from ..scene.view import View
-from ..work import chunks
-from .film import BAND
-
-if TYPE_CHECKING:
-    from .host_accumulator import HostAccumulator
+from ..work import Work, chunks
+from .film import BAND, develop, levels
+from .units.pixel import UNKNOWN, squared_error
 
 CHANNELS = 8
 """Numbers per pixel: sums of red, green, blue, displayed brightness and its square, sample count, goal,
@@ -191,3 +201,399 @@ def tile_order(width: int, height: int) -> np.ndarray:
     bands = [order + np.int32(rows.start << 16) for rows in chunks(height, BAND)]
     pixels = np.concatenate(bands)
     return pixels[pixels >> 16 < height]
+
+
+@lru_cache
+def _loops(dtype: np.dtype) -> dict[str, Function]:
+    """Compiled loops of a float type."""
+    bits = dtype.itemsize * 8
+    return load_functions(NOTHING, bits, lane_count(bits), LOOPS)
+
+
+@dataclass(eq=False)
+class HostAccumulator:
+    """Picture in progress in host memory.
+
+    Attributes
+    ----------
+    width, height : int
+        Picture size, pixels.
+    sums : ndarray, shape (height * width * CHANNELS,)
+        Sums in the kernel's float type.
+    passes : int
+        Completed passes.
+    work : Work
+        Threads.
+    """
+
+    width: int
+    height: int
+    sums: np.ndarray
+    passes: int = 0
+    work: Work = field(default_factory=lambda: Work(1))
+
+    @classmethod
+    def empty(cls, width: int, height: int, dtype: np.dtype, work: Work | None = None) -> HostAccumulator:
+        """Create an accumulator without samples.
+
+        Parameters
+        ----------
+        width, height : int
+            Picture size, pixels.
+        dtype : dtype
+            Kernel float type.
+        work : Work, optional
+            Threads; one by default.
+
+        Returns
+        -------
+        HostAccumulator
+            The empty accumulator.
+        """
+        sums = np.zeros(width * height * CHANNELS, dtype)
+        return cls(width, height, sums, work=work or Work(1))
+
+    def anew(self) -> HostAccumulator:
+        """Return an empty accumulator of the same size; see `Accumulator.anew`."""
+        return self.empty(self.width, self.height, self.sums.dtype, self.work)
+
+    def host(self) -> HostAccumulator:
+        """Return the accumulator itself; see `Accumulator.host`."""
+        return self
+
+    @property
+    def channels(self) -> np.ndarray:
+        """View of the sums, shape (height, width, CHANNELS)."""
+        return self.sums.reshape(self.height, self.width, CHANNELS)
+
+    @property
+    def counts(self) -> np.ndarray:
+        """Samples of each pixel, shape (height, width)."""
+        return self.channels[..., COUNT]
+
+    def mean(self) -> np.ndarray:
+        """Return the mean of the samples.
+
+        Returns
+        -------
+        ndarray of float32, shape (height, width, 4)
+            Linear light, and the fraction of the samples whose camera ray hit; pixels without samples have
+            the mean of the smallest block around them that has some.
+        """
+        return self._spread(self._known())
+
+    def shown(self, view: View) -> np.ndarray:
+        """Develop the picture; see `Accumulator.shown`."""
+        return self._spread(levels(develop(self._known(), view, self.work)))
+
+    def developed(self, view: View) -> np.ndarray:
+        """Develop the picture to floats; see `film.develop`."""
+        return self._spread(develop(self._known(), view, self.work))
+
+    def _known(self) -> np.ndarray:
+        """Mean of the pixels, float32: between passes over grids that of the finer grid's pixels."""
+        spacings = grids(self.width, self.height)
+        if 0 < self.passes < len(spacings):
+            step, finer = spacings[self.passes - 1 : self.passes + 1]
+            if not self.channels[: finer + 1 : finer, : finer + 1 : finer, GOAL].all():
+                return self._means(step)
+        return fill_gaps(self._means(1), self.counts > 0, self.work)
+
+    def _means(self, step: int) -> np.ndarray:
+        sums = self.channels[::step, ::step]
+        means = np.empty((*sums.shape[:2], 4), np.float32)
+
+        def divided(rows: slice) -> None:
+            means[rows] = sums[rows][..., (0, 1, 2, COVER)] / np.maximum(sums[rows, :, COUNT, None], 1)
+
+        self.work.map(divided, chunks(len(sums), BAND))
+        return means
+
+    def _spread(self, known: np.ndarray) -> np.ndarray:
+        """Expand the pixels of a grid to the whole picture."""
+        if known.shape[:2] == (self.height, self.width):
+            return known
+        step = grids(self.width, self.height)[self.passes - 1]
+        wide = known.repeat(step, 0).repeat(step, 1)
+        return np.ascontiguousarray(wide[: self.height, : self.width])
+
+    def _banded(self, task: Callable[[int, int, np.ndarray], None]) -> np.ndarray:
+        """Run a task on every band, given its first row and rows, and return the sums of each."""
+        bands = chunks(self.height, BAND)
+        sums = np.zeros((len(bands), 4), self.sums.dtype)
+
+        def run(band: int) -> None:
+            task(bands[band].start, bands[band].stop - bands[band].start, sums[band])
+
+        self.work.map(run, range(len(bands)))
+        return sums.astype(np.float64)
+
+    def _measure(self, first: int, rows: int, result: np.ndarray) -> tuple[np.ndarray, int]:
+        """Planes of `measure` of a band, and numbers per row; its sums go to `result`."""
+        real = self.sums.dtype
+        lanes, none = lane_count(8 * real.itemsize), np.zeros(1, real)
+        stride = -(-self.width // lanes) * lanes + max(lanes, 2)
+        planes = np.zeros((3, (rows + 2) * stride + lanes), real)
+        numbers = first, rows, self.width, self.height, stride
+        _loops(real)["measure"](none, self.sums, *planes, result, *numbers)
+        return planes, stride
+
+    def _totals(self) -> np.ndarray:
+        """The sums of `measure` over the picture."""
+
+        def measured(first: int, rows: int, result: np.ndarray) -> None:
+            self._measure(first, rows, result)
+
+        return np.asarray(self._banded(measured).sum(0))
+
+    def statistics(self) -> tuple[float, float]:
+        """Return the statistics of the picture; see `Accumulator.statistics`."""
+        total, known, samples, _ = self._totals()
+        return float(samples) / (self.width * self.height), float(np.sqrt(total / known)) if known else np.inf
+
+    def plan(self, most: int, tolerance: float) -> PassPlan:
+        """Set the goals of the next pass; see `Accumulator.plan`."""
+        *_, left = self._totals()
+        if left:
+            return self._unfinished()
+        if self.passes < len(spacings := grids(self.width, self.height)):
+            step = spacings[self.passes]
+            goals = self.channels[::step, ::step, GOAL]
+            np.maximum(goals, 1, out=goals)
+            if (plan := self._unfinished()).samples:
+                return plan
+        self._judge(most, tolerance)
+        return self._unfinished()
+
+    def _judge(self, most: int, tolerance: float) -> None:
+        """Set the goals of the unfinished pixels with the largest gain."""
+        loops, real, pixels = _loops(self.sums.dtype), self.sums.dtype, self.width * self.height
+        limit, gains = np.array([tolerance * tolerance], real), np.empty(pixels, real)
+
+        def judged(first: int, rows: int, result: np.ndarray) -> None:
+            planes, stride = self._measure(first, rows, result)
+            loops["judge"](limit, *planes, gains, result, first, rows, self.width, stride, most)
+
+        def chosen(first: int, rows: int, _: np.ndarray) -> None:
+            loops["choose"](least, self.sums, gains, first, rows, self.width, most)
+
+        largest = float(self._banded(judged)[:, 0].max())
+        if largest <= 0:
+            return
+        grid_passes = len(grids(self.width, self.height))
+        self.passes = grid_passes + next_choice(self.passes - grid_passes, largest)
+        least = np.array([least_gain(self.passes - grid_passes)], real)
+        self._banded(chosen)
+
+    def _unfinished(self) -> PassPlan:
+        """Pixels that have not reached their goals."""
+        unfinished, none = _loops(self.sums.dtype)["unfinished"], np.zeros(1, self.sums.dtype)
+        order, _ = band_order(self.width)
+        pixels = np.empty((-(-self.height // BAND), len(order)), np.int32)
+
+        def listed(first: int, rows: int, result: np.ndarray) -> None:
+            numbers = first, rows, self.width, len(order)
+            left = np.empty((rows + 1) * self.width, self.sums.dtype)
+            unfinished(none, self.sums, order, pixels[first // BAND], left, result, *numbers)
+
+        sums = self._banded(listed)
+        rows = [row[: int(n)] for row, n in zip(pixels, sums[:, 2], strict=True)]
+        return PassPlan(np.concatenate(rows), int(sums[:, 0].sum()), int(sums[:, 1].max()))
+
+
+def fill_gaps(mean: np.ndarray, known: np.ndarray, work: Work) -> np.ndarray:
+    """Give each pixel without samples the mean of the smallest block around it that has some.
+
+    `mean`: float32 (height, width, 4), mean of the samples of a pixel; `known`: bool (height, width), true
+    for a pixel with samples. Returns float32 (height, width, 4).
+    """
+    if known.all() or not known.any():
+        return mean
+    count = _blocks(known.astype(np.float32))
+    means = fill_gaps(_blocks(mean) / np.maximum(count, 1)[..., None], count > 0, work)
+
+    def spread(rows: slice) -> None:
+        part = means[rows.start // COARSE : -(-rows.stop // COARSE)].repeat(COARSE, 0).repeat(COARSE, 1)
+        near = part[: rows.stop - rows.start, : mean.shape[1]]
+        np.copyto(mean[rows], near, where=~known[rows, :, None])
+
+    work.map(spread, chunks(len(mean), BAND))
+    return mean
+
+
+def _blocks(values: np.ndarray) -> np.ndarray:
+    """Sums over blocks."""
+    rows, columns = (np.arange(0, n, COARSE) for n in values.shape[:2])
+    return np.asarray(np.add.reduceat(np.add.reduceat(values, columns, 1), rows, 0))
+
+
+MOST_PASSES, MOST_SAMPLES = 1 << 24, 1 << 20
+"""Limits of a saved picture's passes and samples per pixel."""
+HEADER = 1 << 12
+"""Maximum header size of an array in a file, bytes."""
+INVALID = "expected a picture in progress, complete, as it was saved"
+
+
+def save_state(file: BinaryIO, key: str, picture: HostAccumulator) -> None:
+    """Write the sums as an .npz file."""
+    shape = np.array([picture.width, picture.height, picture.passes])
+    np.savez(file, sums=picture.sums, shape=shape, key=np.array(key))
+
+
+def load_state(path: str | Path, key: str, like: HostAccumulator) -> HostAccumulator:
+    """Read a file written by `save_state`. Its contents are validated before native code sees them."""
+    try:
+        with open(path, "rb") as file, NpzFile(file) as stored:
+            if str(_array(stored, "key")) != key:
+                raise RenderError(f"{path}: is of another scene, view, size, seed or version")
+            width, height, passes = map(int, _array(stored, "shape"))
+            sums = _array(stored, "sums", like.sums.nbytes)
+    except OSError as error:
+        raise RenderError(f"{path}: {error.strerror or error}") from None
+    except (ValueError, KeyError, EOFError, BadZipFile, NotImplementedError, zlib.error):
+        raise RenderError(f"{path}: {INVALID}") from None
+    saved = HostAccumulator(width, height, sums, passes, like.work)
+    if not _fits(saved, like):
+        raise RenderError(f"{path}: {INVALID}")
+    return saved
+
+
+def _fits(saved: HostAccumulator, like: HostAccumulator) -> bool:
+    """True if a picture is consistent and has the size and float type of another."""
+    return (
+        (saved.width, saved.height) == (like.width, like.height)
+        and (saved.sums.shape, saved.sums.dtype) == (like.sums.shape, like.sums.dtype)
+        and 0 <= saved.passes < MOST_PASSES
+        and all(_counts(saved.channels[..., channel]) for channel in (COUNT, GOAL, COVER))
+        and bool((saved.counts <= saved.channels[..., GOAL]).all())
+        and bool((saved.channels[..., COVER] <= saved.counts).all())
+    )
+
+
+def _counts(n: np.ndarray) -> bool:
+    """True if all values are numbers of samples."""
+    return bool(((n >= 0) & (n <= MOST_SAMPLES) & (n == np.floor(n))).all())
+
+
+def _array(stored: NpzFile, name: str, most: int = 0) -> np.ndarray:
+    """Load an array of at most `most` bytes from a file.
+
+    A small file can expand to a large array.
+    """
+    assert stored.zip
+    if stored.zip.getinfo(f"{name}.npy").file_size > most + HEADER:
+        raise ValueError(name)
+    return np.asarray(stored[name])
+
+
+@loop("rrrrrrnnnnn")
+def measure(P, A, N, E, R, T, first, rows, width, height, stride):
+    """Compute the squared error of each pixel of a band and around it, and its ratio to the samples.
+
+    `P`: unused; `A`: sums of the picture; `N`, `E`, `R`: zeros; `T`: pixels with a known error.
+    """
+    total = 0.0
+    known = 0.0
+    samples = 0.0
+    left = 0.0
+    for y in range(max(first - 1, 0), min(first + rows + 1, height)):
+        own = 1.0 if y >= first and y < first + rows else 0.0
+        begin = (y + 1 - first) * stride + 1
+        for x in range(width):
+            a = CHANNELS * (y * width + x)
+            E[begin + x] = A[a + 3]
+            R[begin + x] = A[a + 4]
+            N[begin + x] = A[a + COUNT]
+            left += own * (A[a + GOAL] - A[a + COUNT])
+        for e in range(begin, begin + width, WIDTH):
+            store(E, e, squared_error(load(E, e), load(R, e), load(N, e)))
+        for e in range(begin, begin + width):
+            samples += own * N[e]
+            if N[e] >= 2.0:
+                total += own * E[e]
+                known += own
+        for e in range(begin, begin + width, WIDTH):
+            n = load(N, e)
+            square = where(n > 0.0, where(n < TRUSTED, UNKNOWN, load(E, e)), 0.0)
+            store(E, e, square)
+            store(R, e, square / maximum(n, 1.0))
+    T[0] = total
+    T[1] = known
+    T[2] = samples
+    T[3] = left
+
+
+@loop("rrrrrrnnnnn")
+def judge(P, N, E, R, G, T, first, rows, width, stride, most):
+    """Compute the gain of one more sample in each pixel of a band.
+
+    `P`: squared error at which a pixel has converged; `N`, `E`, `R`: samples, squared errors, ratios; `G`:
+    written: -1 for a finished pixel; `T`: written: largest gain; `first`, `rows`, `width`, `stride`, `most`:
+    maximum samples per pixel.
+    """
+    largest = 0.0
+    for y in range(rows):
+        for x in range(0, width, WIDTH):
+            e = y * stride + x
+            worst = load(E, e)
+            gain = load(R, e)
+            for near in range(1, 9):
+                worst = maximum(worst, load(E, e + near // 3 * stride + near % 3))
+                gain = maximum(gain, load(R, e + near // 3 * stride + near % 3))
+            store(R, e, where(worst > P[0], gain, -1.0))  # not needed any more
+        for x in range(width):
+            g = (first + y) * width + x
+            G[g] = -1.0
+            if N[(y + 1) * stride + x + 1] < most and R[y * stride + x] >= 0.0:
+                G[g] = R[y * stride + x]
+                largest = max(largest, G[g])
+    T[0] = largest
+
+
+@loop("rrrnnnn")
+def choose(P, A, G, first, rows, width, most):
+    """Set the goals of the pixels of a band: the next power of two if the gain is at least `P[0]`.
+
+    `P`: smallest gain; `A`, `G`: sums of the picture, whose goals are written, and gains; `first`, `rows`,
+    `width`, `most`: maximum samples per pixel.
+    """
+    for k in range(first * width, (first + rows) * width):
+        n = A[CHANNELS * k + COUNT]
+        goal = n
+        if G[k] >= P[0]:
+            goal = 1.0
+            while goal <= n:
+                goal = goal + goal
+            goal = goal if goal < most else most
+        A[CHANNELS * k + GOAL] = goal
+
+
+@loop("rriirrnnnn")
+def unfinished(P, A, order, pixels, L, T, first, rows, width, size):
+    """List the pixels of a band that have not reached their goals.
+
+    `P`, `A`: unused, and sums of the picture; `L`, `T`: written: samples to take in each pixel and a row of
+    zeros.
+    """
+    total = 0.0
+    most = 0.0
+    for x in range(width):
+        L[rows * width + x] = 0.0
+    for k in range(rows * width):
+        a = CHANNELS * (first * width + k)
+        left = A[a + GOAL] - A[a + COUNT]
+        L[k] = left
+        total += left
+        most = A[a + GOAL] if A[a + GOAL] > most else most
+    kept = 0
+    for k in range(size):
+        y = min(order[k] >> 16, rows)
+        if L[y * width + (order[k] & 65535)] > 0.0:
+            pixels[kept] = order[k] + (first << 16)
+            kept += 1
+    T[0] = total
+    T[1] = most
+    T[2] = kept
+
+
+LOOPS = measure, judge, choose, unfinished

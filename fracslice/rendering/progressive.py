@@ -23,12 +23,11 @@ from ..fields.registry import Node
 from ..scene import Scene, reads, to_xml
 from ..scene.view import Camera, Film, View
 from ..work import Work
-from .accumulator import CHANNELS, Accumulator, PassPlan, grids
-from .cpu import CpuTracer
+from .accumulator import CHANNELS, Accumulator, HostAccumulator, PassPlan, grids
 from .crops import Crop
 from .film import picture
-from .host_accumulator import HostAccumulator
 from .linking import Frame, link_frame
+from .packets import CpuTracer
 from .sequence import SampleRange
 from .setup import clip_scene, optics, prepare
 
@@ -406,7 +405,7 @@ class Renderer:
         file : BinaryIO
             Writable binary file.
         """
-        from .host_accumulator import save_state
+        from .accumulator import save_state
 
         save_state(file, self.key, self.accumulator.host())
 
@@ -423,7 +422,7 @@ class Renderer:
         RenderError
             If the file belongs to another picture or is damaged.
         """
-        from .host_accumulator import load_state
+        from .accumulator import load_state
 
         self.accumulator = self._placed(load_state(path, self.key, self._empty))
 

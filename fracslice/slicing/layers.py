@@ -35,7 +35,10 @@ import numpy as np
 
 from .._slices import BorderError, Encoding, Memory, ProbeBounds, Slab
 from ..errors import SliceError
+from ..fields.algebra import dot
+from ..fields.box import Box
 from ..fields.field import Bounds, Field, Kernel
+from ..volume.amount import Completeness, compare_volumes
 from ..work import Work
 from .contours import Contours, contours
 from .stack import Stack
@@ -380,3 +383,33 @@ def _sections(stack: Stack, n: int) -> Stack:
     within = (bottoms[:, None] + shares * stack.heights[:, None]).ravel()
     z = stack.z[0] + (within - stack.heights[0] / 2) / stack.scale
     return replace(stack, z=z, tops=np.cumsum(heights))
+
+
+SLABS = 6
+"""Slabs of a stack whose volume is measured, evenly distributed."""
+
+
+def layers_amount(slicer: Slicer, work: Work) -> Completeness:
+    """Compare the volume of some slabs of a stack with that of its field."""
+    stack = slicer.stack
+    starts = np.arange(0, len(stack.z), SLAB)
+    chosen = [s.tolist() for s in np.split(np.arange(len(stack.z)), starts[1:])]
+    chosen = [
+        chosen[k] for k in sorted(set(np.linspace(0, len(starts) - 1, SLABS).round().astype(int).tolist()))
+    ]
+    layers = [layer for slab in chosen for layer in slab]
+    for _ in slicer.map(lambda layer: layer.area, [k for k in layers if k not in slicer.areas]):
+        pass  # the slicer keeps the areas
+    areas = np.array([slicer.areas[k] for k in layers])
+    (x0, y0, dx, dy), height = stack.frame.tolist(), stack.heights / stack.scale
+    low, high = stack.z - height / 2, stack.z + height / 2
+    (left, front, _), (right, back, _) = stack.outer.lo, stack.outer.hi
+    boxes = [Box((left, front, low[s[0]]), (right, back, high[s[-1]])) for s in chosen]
+    least = float(stack.heights.min())
+
+    def sampling(share: float) -> str:
+        return f"pixels of {share * min(stack.pixel):.2g} mm and layers of {share * least:.2g} mm"
+
+    grid = (x0, y0, float(stack.z[0])), (dx, dy, least / stack.scale), sampling
+    made = dot(areas, stack.heights[layers])
+    return compare_volumes(stack.root, boxes, made, stack.scale, grid, len(chosen) == len(starts), work)

@@ -10,11 +10,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..common.files import temporary_folder
+from ..common.files import replacing, temporary_folder
 from ..common.messages import lacking
 from ..common.parameters import Choice, Vector, validate_value
 from ..errors import RenderError
-from ..export import replacing
 from ..mesh.model import Mesh
 from . import plotter
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from itertools import count
 from pathlib import Path
 
+from ..common.files import replacing
 from ..errors import ExportError
-from ..export import replacing
 from ..rendering.live import CameraInput, Live
 from ..scene.model import to_xml
 from ..scene.view import Camera

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..mesh.model import Mesh
-from ..mesh.reading import read_mesh
+from ..mesh.models import read_mesh
 from .plotter import body, set_lighting
 from .screen import need_screen
 

@@ -15,8 +15,8 @@ from ..fields.field import Field
 from ..fields.registry import Node
 from ..records import RESOLUTION
 from ..work import Work
+from .bricks import Lattice
 from .extent import Extent, extent, reached
-from .lattice import Lattice
 
 if TYPE_CHECKING:
     from .bricks import Bricks, SignBricks

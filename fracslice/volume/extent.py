@@ -14,7 +14,7 @@ from ..fields.box import Box, possible_cells
 from ..fields.field import Field, Kernel
 from ..formulas import Node
 from ..work import Work
-from .lattice import values_at
+from .bricks import values_at
 
 SLANTS = np.stack(np.meshgrid((-1, 0, 1), (-1, 0, 1), 0.1 ** np.arange(0, 3.5, 0.5))).reshape(3, -1)
 """Steps straight along the last axis or slanted, [3, w]."""

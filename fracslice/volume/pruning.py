@@ -14,8 +14,7 @@ import numpy as np
 
 from ..fields.field import Bounds, Cells, Kernel
 from ..work import Work, chunks
-from .bricks import INSIDE, OUTSIDE
-from .lattice import BRICK, Lattice
+from .bricks import BRICK, INSIDE, OUTSIDE, Lattice
 
 FACES = [(axis, step) for axis in range(3) for step in (-1, 1)]
 

@@ -26,8 +26,7 @@ from ..fields.depth import with_depth_advice
 from ..fields.field import Bounds, Kernel
 from ..store import Arrays, stored
 from ..work import Work, chunks
-from .bricks import Bricks, SignBricks
-from .lattice import BRICK, Lattice
+from .bricks import BRICK, Bricks, Lattice, SignBricks
 from .pruning import (
     BORDER,
     CANDIDATE,

@@ -17,7 +17,7 @@ from fracslice import Mesh, MeshJob, Result, Work, box, make_mesh, read, sphere,
 from fracslice.api.options import MeshKeywords, PrintKeywords, WorkKeywords
 from fracslice.errors import Cancelled, ExportError, SceneError
 from fracslice.jobs.mesh import make_mesh as make_mesh_job
-from fracslice.mesh.reading import read_mesh
+from fracslice.mesh.models import read_mesh
 from fracslice.scene import Print, scene
 
 SHAPE = box((2, 2, 1)) - sphere(0.6)

@@ -11,12 +11,11 @@ import pytest
 from fracslice.cli.main import run
 
 from fracslice.bench import measurements
-from fracslice.bench.measure import errors, surface_points
+from fracslice.bench.measure import WORKLOADS, errors, surface_points
 from fracslice.bench.measurements import BenchmarkTask, Peer, measure
-from fracslice.bench.methods import WORKLOADS
 from fracslice.cluster import ResultFolder, Shard
 from fracslice.errors import BenchError, Cancelled, SharedError
-from fracslice.export import write
+from fracslice.formats import write
 from fracslice.work import Work
 
 from ..mesh import shapes
@@ -55,7 +54,7 @@ def test_samples_lie_evenly_on_the_mesh():
 
 
 def test_every_closed_form_is_that_of_its_field():
-    from fracslice.bench.methods import exact
+    from fracslice.bench.measure import exact
 
     for name in ("sphere", "torus", "menger3"):
         what = WORKLOADS[name]

@@ -86,7 +86,7 @@ def test_scenes(text, message, folder, capfd):
         ("mesh mandelblub -o out/x.stl", "mandelblub: no such scene; did you mean mandelbulb?"),
         ("mesh ball.xml", "Missing option '-o'"),
         ("mesh -o out/x.stl", "Missing argument 'SCENE|MODEL'"),
-        ("mesh ball.xml -o out/x.foo", "out/x.foo: unknown kind of file; known are .stl"),
+        ("mesh ball.xml -o out/x.foo", "out/x.foo: unknown kind of file; known are .3mf"),
         ("mesh ball.xml -o out", "unknown kind of file"),
         ("mesh ball.xml -o none/x.stl", "none/x.stl: the folder"),
         ("mesh ball.xml -o ball.xml/x.stl", "is a file, not a folder"),
@@ -205,8 +205,8 @@ def test_a_pipe(ending, folder, capfd):
 @pytest.mark.parametrize(
     ("number", "reader", "name"),
     [
-        (signal.SIGINT, "fracslice.mesh.reading.read_mesh", "ball.stl"),
-        (signal.SIGTERM, "fracslice.mesh.reading.read_mesh", "ball.stl"),
+        (signal.SIGINT, "fracslice.mesh.models.read_mesh", "ball.stl"),
+        (signal.SIGTERM, "fracslice.mesh.models.read_mesh", "ball.stl"),
         (signal.SIGTERM, "fracslice.scene.read", "ball.xml"),
     ],
 )

@@ -19,8 +19,8 @@ from fracslice.cli.check import Deadline, place
 from fracslice.cli.main import run
 from PIL import Image
 
+from fracslice.checks.problems import Problem, mends
 from fracslice.mesh import Mesh
-from fracslice.printing.problems import Problem, mends
 
 pytestmark = pytest.mark.once
 
@@ -124,9 +124,7 @@ def test_fix_leaves_out_what_does_not_help(
     ]
     assert run(command) == 0
     assert json.loads(capfd.readouterr().out)["flags"].startswith("--base")
-    monkeypatch.setattr(
-        "fracslice.printing.problems.severity", lambda problems: (1, 0.0)
-    )  # nothing is better
+    monkeypatch.setattr("fracslice.checks.problems.severity", lambda problems: (1, 0.0))  # nothing is better
     assert run(command) == 1
     report = json.loads(capfd.readouterr().out)
     assert report["flags"] == "" and report["after"] == report["before"]

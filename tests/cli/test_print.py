@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from fracslice.cli.main import run
 
-from fracslice.mesh.reading import read_mesh
+from fracslice.mesh.models import read_mesh
 
 PROGRAM = """#!{python}
 import json, os, shutil, sys

@@ -15,7 +15,7 @@ from fracslice.cli.main import run
 from PIL import Image
 
 from fracslice.jobs import pictures
-from fracslice.rendering import Pass, Renderer, cpu, denoising
+from fracslice.rendering import Pass, Renderer, packets
 from fracslice.rendering.accumulator import CHANNELS, COARSE, COUNT, PassPlan
 from fracslice.rendering.crops import BYTES
 
@@ -225,7 +225,7 @@ def test_a_time_limit_interrupts_the_first_pass(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """No tile is begun after the limit, and all pixels have light."""
-    load, begun = cpu.load_functions, list[np.ndarray]()
+    load, begun = packets.load_functions, list[np.ndarray]()
 
     def slow(*of: Any) -> dict[str, Any]:
         functions = load(*of)
@@ -237,7 +237,7 @@ def test_a_time_limit_interrupts_the_first_pass(
 
         return functions | {"tile": tile}
 
-    monkeypatch.setattr(cpu, "load_functions", slow)
+    monkeypatch.setattr(packets, "load_functions", slow)
     options = ["--size", "800x600", "--time", "0.1s", "--device", "cpu", "--threads", "1"]
     options += ["--set", "shading.ambient=0.1", "--state", str(tmp_path / "s.npz")]
     assert run(["render", str(scene), "-o", str(tmp_path / "a.png"), *options]) == 0
@@ -262,7 +262,7 @@ def test_a_signal_while_noise_is_removed_keeps_the_picture(
         os.kill(os.getpid(), signal.SIGTERM)
         renderer.work.check()
 
-    monkeypatch.setattr(denoising, name, stopped)
+    monkeypatch.setattr(pictures, name, stopped)
     options = ["--denoise", "--device", "cpu", "-o", str(tmp_path / "a.png")]
     assert run(["render", str(scene), *options]) == 143
     assert "a.png: 40 x 24 pixels, 3.0 samples a pixel" in capsys.readouterr().err
@@ -282,8 +282,8 @@ def test_a_time_limit_includes_the_removal_of_noise(
         time.sleep(1)
         return remove(*of)
 
-    remove = denoising.denoise
-    monkeypatch.setattr(denoising, "denoise", slow)
+    remove = pictures.denoise
+    monkeypatch.setattr(pictures, "denoise", slow)
     monkeypatch.setattr(pictures, "_limit_time", seen)
     options = ["--denoise", "--time", "60s", "--device", "cpu", "-o", str(tmp_path / "a.png")]
     assert run(["render", str(scene), *options]) == 0
@@ -298,7 +298,7 @@ def test_a_time_limit_before_the_first_sample_is_doubled(scene: Path, tmp_path: 
 def test_noise_is_removed_from_a_picture_of_light(
     scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from fracslice.rendering.denoising import advice
+    from fracslice.jobs.pictures import advice
 
     common = ["render", str(scene), "-q", "--device", "cpu", "-o"]
     assert run([*common, str(tmp_path / "a.png")]) == 0

@@ -9,7 +9,7 @@ import pytest
 from fracslice.cli.main import run
 
 from fracslice.jobs.shared import MeshRecipe
-from fracslice.mesh.reading import read_mesh
+from fracslice.mesh.models import read_mesh
 from fracslice.records import MeshJob
 from fracslice.scene import read, to_xml
 from tests.examples import BRACKET

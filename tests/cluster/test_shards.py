@@ -12,13 +12,12 @@ import pytest
 from fracslice.cli.main import run as command
 
 from fracslice.cluster import ResultFolder, Shard
-from fracslice.common import files
+from fracslice.common import files, packages
 from fracslice.errors import ClusterError, SharedError
-from fracslice.export import packages
-from fracslice.export.layer_tasks import RangeTask
 from fracslice.export.layers import write_slices
+from fracslice.export.slice_run import RangeTask
 from fracslice.formulas import box, cone, flake, sphere
-from fracslice.jobs import shared, shared_writing
+from fracslice.jobs import shared
 from fracslice.jobs.mesh import Result, make_mesh
 from fracslice.mesh import shells
 from fracslice.records import MeshJob
@@ -96,13 +95,11 @@ def test_shards_of_a_mesh_make_one_file(tmp_path: Path, monkeypatch: pytest.Monk
     Tasks write the triangles to their places: the file is the one that they wrote, under another name.
     """
     monkeypatch.setattr(shared, "LEAST", 1)
-    monkeypatch.setattr(shared_writing, "FIRST", 7)
-    monkeypatch.setattr(shared_writing, "ROWS", 1000)
+    monkeypatch.setattr(shared, "FIRST", 7)
+    monkeypatch.setattr(shared, "ROWS", 1000)
     monkeypatch.setattr(files, "append_file", None)
-    places, place = list[int](), shared_writing.Place.result
-    monkeypatch.setattr(
-        shared_writing.Place, "result", lambda of, n, work: (places.append(n), place(of, n, work))[1]
-    )
+    places, place = list[int](), shared.Place.result
+    monkeypatch.setattr(shared.Place, "result", lambda of, n, work: (places.append(n), place(of, n, work))[1])
     monkeypatch.setattr(shells, "FAN", 2)
     joins, join = list[str](), shared.JoinTask.make
     monkeypatch.setattr(shared.JoinTask, "make", lambda of, work: (joins.append(of.name), join(of, work))[1])
@@ -154,14 +151,14 @@ def test_a_3mf_file_is_concatenated(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     """By two shards; vertices at seams and at a tip's triangles, which come last, are numbered once."""
     monkeypatch.setattr(shared, "LEAST", 1)
     monkeypatch.setattr(packages, "ROWS", 256)
-    monkeypatch.setattr(shared_writing, "BLOCKS", 2)
-    monkeypatch.setattr(shared_writing, "joined_pieces", None)
+    monkeypatch.setattr(shared, "BLOCKS", 2)
+    monkeypatch.setattr(shared, "joined_pieces", None)
     turned = scene(cone(radius=0.5, height=2.0).rotate(70.0, (0.0, 1.0, 0.2)), size="20mm")
     shards = [Shard(ResultFolder(str(tmp_path / "pieces")), number, 2, patience=600) for number in (1, 2)]
     files, made = {number: tmp_path / f"{number}.3mf" for number in (0, 1, 2)}, list[str]()
-    encode = shared_writing.Encode.result
+    encode = shared.Encode.result
     monkeypatch.setattr(
-        shared_writing.Encode,
+        shared.Encode,
         "result",
         lambda of, n, work: (made.append(f"{of.name}-{n}"), encode(of, n, work))[1],
     )

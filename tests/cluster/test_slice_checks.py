@@ -8,16 +8,16 @@ from typing import Any
 import pytest
 from fracslice.cli.main import run as command
 
+from fracslice.checks.layer_checks import check_layers, findings_of
 from fracslice.cluster import ResultFolder, Shard
 from fracslice.errors import SharedError
-from fracslice.export.layer_tasks import range_size
+from fracslice.export.slice_run import range_size
 from fracslice.formulas import box, cylinder, sphere
 from fracslice.jobs.slice_checks import CheckTask, check_run
 from fracslice.jobs.slices import SliceRecipe
 from fracslice.scene import scene
 from fracslice.scene.model import to_xml
 from fracslice.slicing import SliceJob
-from fracslice.slicing.layer_checks import check_layers, findings_of
 from fracslice.work import Work
 
 pytestmark = pytest.mark.once

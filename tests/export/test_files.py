@@ -16,9 +16,16 @@ from typing import Any
 
 import pytest
 
-from fracslice.common.files import link_or_copy, temporary_folder, write_small_file
+from fracslice.common.files import (
+    check_target,
+    flushing,
+    link_or_copy,
+    replacing,
+    temporary_folder,
+    write_small_file,
+)
 from fracslice.errors import ExportError
-from fracslice.export import check_target, flushing, replacing, write
+from fracslice.formats import write
 from tests.mesh.shapes import cube
 
 
@@ -188,7 +195,7 @@ def test_kill_in_mid_write_leaves_no_broken_file(tmp_path: Path) -> None:
     path = tmp_path / "model.stl"
     path.write_text("old")
     code = (
-        "import sys, time; from fracslice.export import replacing\n"
+        "import sys, time; from fracslice.common.files import replacing\n"
         "with replacing(sys.argv[1]) as file:\n"
         "    file.write(b'half' * 100000); file.flush(); print('writing', flush=True); time.sleep(60)"
     )

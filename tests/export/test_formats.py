@@ -14,13 +14,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fracslice.common import packages
+from fracslice.common.triangles import concatenate
 from fracslice.errors import ExportError, MeshError
-from fracslice.export import FORMATS, application, packages, write
+from fracslice.formats import ENDINGS, write
 from fracslice.mesh import Mesh
 from fracslice.mesh.checks import check_mesh
 from fracslice.mesh.cleaning import quantise_mesh
-from fracslice.mesh.model import concatenate
-from fracslice.mesh.reading import read_mesh
+from fracslice.mesh.models import read_mesh
+from fracslice.version import APPLICATION
 from tests.mesh.shapes import cube, inverted, sphere
 
 METADATA = {"Title": 'A <sphere> & "more" é', "scene_hash": "ab12"}
@@ -34,7 +36,7 @@ def mesh() -> Mesh:
     )
 
 
-@pytest.mark.parametrize("ending", FORMATS)
+@pytest.mark.parametrize("ending", ENDINGS)
 def test_comes_back_bit_by_bit(tmp_path: Path, mesh: Mesh, ending: str) -> None:
     path = write(mesh, tmp_path / f"model{ending}", METADATA)
     back = read_mesh(path)
@@ -42,12 +44,12 @@ def test_comes_back_bit_by_bit(tmp_path: Path, mesh: Mesh, ending: str) -> None:
     assert check_mesh(back) == check_mesh(mesh)
 
 
-@pytest.mark.parametrize("ending", FORMATS)
+@pytest.mark.parametrize("ending", ENDINGS)
 def test_same_mesh_same_bytes_whatever_the_clock_says(tmp_path: Path, mesh: Mesh, ending: str) -> None:
     first = write(mesh, tmp_path / f"first{ending}", METADATA).read_bytes()
     code = (
         "import time; time.time = lambda: 2e9; time.localtime = lambda *_: time.gmtime(2e9)\n"
-        "import sys; from fracslice.export import write; from fracslice.mesh.reading import read_mesh\n"
+        "import sys; from fracslice.formats import write; from fracslice.mesh.models import read_mesh\n"
         f"write(read_mesh(sys.argv[1]), sys.argv[2], {METADATA!r})"
     )
     second = tmp_path / f"second{ending}"
@@ -58,7 +60,7 @@ def test_same_mesh_same_bytes_whatever_the_clock_says(tmp_path: Path, mesh: Mesh
 
 def test_stl_is_what_the_format_says(tmp_path: Path) -> None:
     data = write(cube(), tmp_path / "cube.stl").read_bytes()
-    assert application() in data[:80].decode()
+    assert APPLICATION in data[:80].decode()
     assert b"mm" in data[:80]
     assert not data.startswith(b"solid")
     assert struct.unpack_from("<I", data, 80) == (12,)
@@ -87,7 +89,7 @@ def test_3mf_passes_lib3mf_in_strict_mode(tmp_path: Path, mesh: Mesh) -> None:
     }
     assert result["Title"] == METADATA["Title"]
     assert result["scene_hash"] == "ab12"
-    assert result["Application"] == application()
+    assert result["Application"] == APPLICATION
 
 
 @pytest.mark.parametrize("is_large", [False, True])
@@ -129,7 +131,7 @@ def test_extreme_coordinates_survive_text(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("far", [np.nan, np.inf, 1e39])
-@pytest.mark.parametrize("ending", FORMATS)
+@pytest.mark.parametrize("ending", ENDINGS)
 def test_invalid_meshes_are_not_written(tmp_path: Path, far: float, ending: str) -> None:
     mesh = cube()
     with pytest.raises(ExportError, match="not a finite number of 32 bits"):
@@ -147,14 +149,14 @@ def test_arrays_of_another_shape_are_no_mesh() -> None:
 
 
 def test_unknown_ending_and_empty_mesh(tmp_path: Path) -> None:
-    with pytest.raises(ExportError, match=r"known are \.stl, \.3mf"):
+    with pytest.raises(ExportError, match=r"known are \.3mf, \.glb"):
         write(cube(), tmp_path / "cube.step")
     with pytest.raises(ExportError, match="no triangles"):
         write(Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32)), tmp_path / "empty.stl")
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("ending", FORMATS)
+@pytest.mark.parametrize("ending", ENDINGS)
 @pytest.mark.parametrize("part", [0.0, 0.3, 0.5, 0.95])
 def test_a_file_cut_off_is_one_clear_line(tmp_path: Path, mesh: Mesh, ending: str, part: float) -> None:
     whole = write(mesh, tmp_path / f"whole{ending}").read_bytes()

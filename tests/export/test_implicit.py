@@ -18,7 +18,7 @@ from fracslice.fields import graph as graphs
 from fracslice.fields.reference import reference
 from fracslice.formulas import Node, mandelbulb, menger, sphere, transform, twist, union
 from fracslice.jobs.mesh import make_implicit
-from fracslice.mesh.reading import read_mesh
+from fracslice.mesh.models import read_mesh
 from fracslice.records import MeshJob
 from fracslice.scene import Print, library, read, scene
 from tests.scene.trees import OTHERS, SHAPES

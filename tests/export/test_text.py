@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from fracslice._native import text_rows
-from fracslice.export import packages, write
-from fracslice.export.packages import number_rows
+from fracslice.common import packages
+from fracslice.common.packages import number_rows
+from fracslice.formats import write
 from fracslice.work import Work
 from tests.mesh.shapes import sphere
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from fracslice.common.triangles import concatenate
 from fracslice.mesh import Mesh
-from fracslice.mesh.model import concatenate
 
 CUBE = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
 CUBE_SIDES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]

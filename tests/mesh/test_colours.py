@@ -127,7 +127,7 @@ def test_the_command_and_what_it_refuses(tmp_path: Path, capsys: pytest.CaptureF
     assert run([*args, str(tmp_path / "a.ply")]) == 0
     assert b"property uchar red" in (tmp_path / "a.ply").read_bytes()
     assert run([*args, str(tmp_path / "a.stl")]) == 2
-    assert "colour: expected a file that holds colours: .ply, .glb, .3mf" in capsys.readouterr().err
+    assert "colour: expected a file that holds colours: .3mf, .glb, .ply" in capsys.readouterr().err
     assert not (tmp_path / "a.stl").exists()
     with pytest.raises(SceneError, match="colour='red': expected material, point"):
         make_mesh(sphere(), size="1cm", resolution=8, colour="red")  # type: ignore[arg-type]

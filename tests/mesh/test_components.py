@@ -7,13 +7,13 @@ import time
 import numpy as np
 import pytest
 
+from fracslice.common.triangles import concatenate
 from fracslice.errors import MeshError
 from fracslice.formulas import sphere as ball
 from fracslice.mesh import Mesh
 from fracslice.mesh import shells as surveys
 from fracslice.mesh.checks import check_mesh
 from fracslice.mesh.contouring import Piece, contour_pieces
-from fracslice.mesh.model import concatenate
 from fracslice.mesh.pieces import Pieces
 from fracslice.mesh.shells import WholeShells, survey
 from fracslice.mesh.topology import Removed, Shells, choose

@@ -9,7 +9,7 @@ import trimesh
 from fracslice.fields.field import Field
 from fracslice.formulas import box, sphere
 from fracslice.mesh import Mesh
-from fracslice.mesh.field import MeshField
+from fracslice.mesh.models import MeshField
 from fracslice.mesh.spatial import Nearest
 from fracslice.printing.edits import Does, edited_field
 from fracslice.volume import plan

@@ -15,6 +15,7 @@ import pytest
 import trimesh
 
 from fracslice import from_trimesh, make_mesh
+from fracslice.common.triangles import concatenate
 from fracslice.errors import FracsliceWarning, MeshError, SceneError
 from fracslice.expr.intervals import ARRAYS, Interval
 from fracslice.fields import cpu
@@ -23,7 +24,6 @@ from fracslice.fields.linker import link
 from fracslice.fields.reference import enclosure, reference
 from fracslice.formulas import Node, box, model, shell, sphere, transform, twist, union
 from fracslice.mesh import Mesh, models
-from fracslice.mesh.model import concatenate
 from fracslice.scene import read, reads, to_xml
 from tests.examples import BRACKET
 
@@ -57,7 +57,7 @@ def distances(mesh: Mesh, points: np.ndarray) -> np.ndarray:
 
 
 def bracket() -> Mesh:
-    from fracslice.mesh.reading import read_mesh
+    from fracslice.mesh.models import read_mesh
 
     return read_mesh(BRACKET)
 

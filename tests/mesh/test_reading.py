@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 
 from fracslice.errors import MeshError
-from fracslice.export import write
+from fracslice.formats import write
 from fracslice.mesh import Mesh
 from fracslice.mesh.checks import check_mesh
-from fracslice.mesh.reading import read_mesh
+from fracslice.mesh.models import read_mesh
 
 from .shapes import cube
 

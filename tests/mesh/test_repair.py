@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 from fracslice.cli.main import run
 
+from fracslice.common.triangles import concatenate
 from fracslice.mesh import Mesh
 from fracslice.mesh.cleaning import quantise_mesh
-from fracslice.mesh.model import concatenate
-from fracslice.mesh.models import faults
-from fracslice.mesh.reading import read_mesh
+from fracslice.mesh.models import faults, read_mesh
 from fracslice.mesh.repair import repair
 
 from . import shapes
@@ -102,4 +101,4 @@ def test_what_cannot_be_repaired_is_said(
     assert run(["repair", "none.stl", "-o", "x.stl"]) == 2
     assert capfd.readouterr().err == "fracslice: none.stl: no such file\n"
     assert run(["repair", "one.stl", "-o", "x.xml"]) == 2
-    assert "x.xml: unknown kind of file; known are .stl" in capfd.readouterr().err
+    assert "x.xml: unknown kind of file; known are .3mf" in capfd.readouterr().err

@@ -19,7 +19,7 @@ from fracslice import make_mesh
 from fracslice.errors import SceneError
 from fracslice.fields.reference import reference
 from fracslice.formulas import text
-from fracslice.mesh import fonts, outlines
+from fracslice.mesh import outlines
 from fracslice.scene import read, reads, scene, to_xml
 from tests.examples import FONT
 
@@ -104,7 +104,7 @@ def test_letters_have_the_distances_of_their_curves(letter: str) -> None:
 
 
 def area(file: str, words: str, variations: str = "") -> shapely.Geometry:
-    return outlines.area_of(fonts.lettered(file, words, variations), 1.0)
+    return outlines.area_of(outlines.lettered(file, words, variations), 1.0)
 
 
 def test_glyphs_that_overlap_are_one_solid(tmp_path: Path) -> None:
@@ -125,7 +125,7 @@ def test_a_variable_font_is_drawn_at_a_place_on_its_axes(tmp_path: Path) -> None
 
 
 def glyphs_of(words: str) -> int:
-    return len(fonts.lettered(FONT, words, ""))
+    return len(outlines.lettered(FONT, words, ""))
 
 
 def test_ligatures_and_scripts_from_the_right() -> None:

@@ -11,9 +11,9 @@ from fracslice.mesh import contouring
 from fracslice.mesh.contouring import contour_pieces
 from fracslice.printing import bridging, printable
 from fracslice.printing import thin_features as connectivity
-from fracslice.printing.components import SolidComponents, components_of, thin_share
 from fracslice.printing.edits import EditedField
 from fracslice.printing.preparation import COARSE
+from fracslice.printing.samples import SolidComponents, components_of, thin_share
 from fracslice.printing.thin_features import resolve_connectivity, thin_features
 from fracslice.scene import Print, scene
 from fracslice.volume import Lattice, Plan, plan, sample, sample_scene_signs

@@ -8,7 +8,7 @@ import trimesh
 
 from fracslice.formulas import mandelbulb, sphere, transform
 from fracslice.mesh import Mesh
-from fracslice.mesh.field import MeshField
+from fracslice.mesh.models import MeshField
 from fracslice.printing.edits import EditedField
 
 pytestmark = pytest.mark.once

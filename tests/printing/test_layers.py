@@ -6,12 +6,12 @@ import math
 
 import pytest
 
+from fracslice.checks.layer_checks import PrintReport, check_layers
+from fracslice.checks.problems import Limits
 from fracslice.errors import VolumeError
 from fracslice.formulas import Node, box, cone, sphere, transform, union
-from fracslice.printing.problems import Limits
 from fracslice.scene import Print
 from fracslice.slicing import SliceJob, plan_stack
-from fracslice.slicing.layer_checks import PrintReport, check_layers
 
 pytestmark = pytest.mark.once
 

@@ -7,9 +7,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fracslice.checks.problems import Limits
+from fracslice.checks.solid_checks import SolidReport, check_object
 from fracslice.formulas import Node, box, difference, julia, shell, sphere, transform, union
-from fracslice.printing.problems import Limits
-from fracslice.printing.solid_checks import SolidReport, check_object
 from fracslice.volume import plan
 
 pytestmark = pytest.mark.once

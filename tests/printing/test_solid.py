@@ -14,6 +14,8 @@ import numpy as np
 import pytest
 
 from fracslice import MeshJob, make_mesh
+from fracslice.checks.problems import Limits, Problem
+from fracslice.checks.solid_checks import SolidReport, check_object
 from fracslice.errors import VolumeError
 from fracslice.formulas import (
     Node,
@@ -34,13 +36,9 @@ from fracslice.formulas import (
     union,
 )
 from fracslice.printing import printable
-from fracslice.printing.components import components_of
 from fracslice.printing.framing import frame_bodies
-from fracslice.printing.problems import Limits, Problem
-from fracslice.printing.samples import Samples
-from fracslice.printing.solid_checks import SolidReport, check_object
-from fracslice.printing.walls import walls
-from fracslice.printing.widths import Widths
+from fracslice.printing.samples import Samples, components_of
+from fracslice.printing.walls import Widths, walls
 from fracslice.scene import Print, scene
 from fracslice.slicing import SliceJob, plan_stack
 from fracslice.slicing.layers import Slicer
@@ -422,7 +420,7 @@ def test_a_raft_that_no_voxel_holds_is_refused() -> None:
 
 def test_the_sharp_rim_of_a_drain_hole_is_no_thin_wall(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "fracslice.printing.solid_checks.resolve_connectivity", lambda root, bricks, *others, **more: bricks
+        "fracslice.checks.solid_checks.resolve_connectivity", lambda root, bricks, *others, **more: bricks
     )
     hole = transform(cylinder(radius=1, height=22), translate=(0, 0, 5))
     thing = plan(difference(cone(radius=6, height=22), hole), 100)

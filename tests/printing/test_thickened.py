@@ -12,8 +12,7 @@ from scipy.spatial.transform import Rotation
 from fracslice.formulas import Node, box, cylinder, difference, julia, shell, sphere, transform, union
 from fracslice.printing import preparation, printable
 from fracslice.printing.bridging import contacts
-from fracslice.printing.components import SolidComponents, components_of
-from fracslice.printing.samples import Samples, together
+from fracslice.printing.samples import Samples, SolidComponents, components_of, together
 from fracslice.printing.walls import walls
 from fracslice.scene import Print
 from fracslice.volume import Plan, plan, sample_scene

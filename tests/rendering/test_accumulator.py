@@ -14,11 +14,12 @@ from fracslice.rendering.accumulator import (
     GOAL,
     SOON,
     UNIFORM,
+    HostAccumulator,
+    fill_gaps,
     grids,
     least_gain,
     tile_order,
 )
-from fracslice.rendering.host_accumulator import HostAccumulator, fill_gaps
 from fracslice.rendering.units.pixel import squared_error
 from fracslice.scene.view import View
 from fracslice.work import Work

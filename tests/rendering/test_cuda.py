@@ -15,12 +15,9 @@ import pytest
 from fracslice.expr import cuda_driver
 from fracslice.expr.compiler import compile_ptx
 from fracslice.expr.graph import NOTHING
-from fracslice.rendering.accumulator import CHANNELS, PassPlan, tile_order
-from fracslice.rendering.cpu import CpuTracer
-from fracslice.rendering.cuda import CudaAccumulator, CudaTracer
-from fracslice.rendering.cuda_loops import LOOPS
-from fracslice.rendering.host_accumulator import HostAccumulator
-from fracslice.rendering.packets import loops
+from fracslice.rendering.accumulator import CHANNELS, HostAccumulator, PassPlan, tile_order
+from fracslice.rendering.cuda import LOOPS, CudaAccumulator, CudaTracer
+from fracslice.rendering.packets import CpuTracer, loops
 from fracslice.scene.view import Film, Light, Shading, View
 from fracslice.work import Work
 from tests.examples import stamped

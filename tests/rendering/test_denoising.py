@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from fracslice.formulas import Node, box, material, plane, sphere
-from fracslice.rendering import Renderer, denoising
+from fracslice.jobs import pictures
+from fracslice.rendering import Renderer
 from fracslice.scene.view import Camera, Light, View
 from fracslice.work import Work
 
@@ -49,10 +50,10 @@ def error(shown: np.ndarray) -> float:
 
 
 def test_the_error_falls_without_the_library(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(denoising, "advice", lambda: "missing")
+    monkeypatch.setattr(pictures, "advice", lambda: "missing")
     noisy = rendered(4)
     before = noisy.seen()
-    after = denoising.denoise(noisy)
+    after = pictures.denoise(noisy)
     errors = [error(seen.developed) for seen in (after, before)]
     assert errors[0] < 0.6 * errors[1], errors
     assert (after.alpha == before.alpha).all()
@@ -60,10 +61,10 @@ def test_the_error_falls_without_the_library(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_open_image_denoise_falls_further(monkeypatch: pytest.MonkeyPatch) -> None:
-    if denoising.advice():
+    if pictures.advice():
         pytest.skip("pyoidn is not there")
     noisy = rendered(4)
-    errors = [error(seen.developed) for seen in (denoising.denoise(noisy), noisy.seen())]
+    errors = [error(seen.developed) for seen in (pictures.denoise(noisy), noisy.seen())]
     assert errors[0] < 0.55 * errors[1], errors
 
 
@@ -77,9 +78,9 @@ def test_the_library_is_given_linear_light_and_its_guides(monkeypatch: pytest.Mo
     library = ModuleType("pyoidn")
     library.denoise = denoise  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "pyoidn", library)
-    monkeypatch.setattr(denoising, "advice", lambda: "")
+    monkeypatch.setattr(pictures, "advice", lambda: "")
     noisy = rendered(1)
-    clean = denoising.denoise(noisy)
+    clean = pictures.denoise(noisy)
     assert np.allclose(clean.image, 2 * noisy.seen().image)
     albedo, normal = given["albedo"], given["normal"]
     assert given["hdr"] is True

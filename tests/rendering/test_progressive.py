@@ -12,7 +12,7 @@ import pytest
 
 from fracslice.errors import Cancelled, RenderError
 from fracslice.formulas import material, menger, sphere, union
-from fracslice.rendering import Renderer, cpu, progressive
+from fracslice.rendering import Renderer, packets, progressive
 from fracslice.rendering.accumulator import CHANNELS, COUNT, COVER, GOAL
 from fracslice.rendering.units.random import sample
 from fracslice.scene import library, read
@@ -173,7 +173,7 @@ def test_a_cancelled_pass_keeps_its_samples_and_continues_to_the_same_picture(
         tile(*arguments)
         work.cancel.set()
 
-    monkeypatch.setattr(cpu, "TILE", 512)
+    monkeypatch.setattr(packets, "TILE", 512)
     of.tracer._tile = stopping
     with pytest.raises(Cancelled):
         next(passes)

@@ -9,6 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fracslice.checks.fitting import misfit
+from fracslice.checks.layer_checks import PrintReport, check_layers
+from fracslice.checks.problems import Limits, Problem, verdict
 from fracslice.formulas import (
     Node,
     box,
@@ -21,14 +24,11 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.printing.problems import Limits, Problem, verdict
 from fracslice.scene import Print
 from fracslice.slicing import SliceJob, Slicer, plan_stack
 from fracslice.slicing.feature_graph import Graph, farthest, unsupported_pixels
-from fracslice.slicing.layer_checks import PrintReport, check_layers, misfit
 from fracslice.slicing.printers import PRINTERS
-from fracslice.slicing.runs import Runs, layer_components, overlaps
-from fracslice.slicing.thickness import widths
+from fracslice.slicing.runs import Runs, layer_components, overlaps, widths
 from fracslice.volume import extent
 from fracslice.work import Work
 

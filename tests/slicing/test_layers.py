@@ -28,10 +28,9 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.jobs.completeness import layers_amount
 from fracslice.scene import scene
 from fracslice.slicing import Layer, SliceJob, Slicer, Stack, plan_stack
-from fracslice.slicing.layers import Sampler
+from fracslice.slicing.layers import Sampler, layers_amount
 from fracslice.work import Work
 from tests.examples import EXAMPLES, stamped
 

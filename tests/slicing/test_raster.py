@@ -14,9 +14,8 @@ from fracslice._slices import Encoding, encoded
 from fracslice.errors import SliceError
 from fracslice.formulas import Node, box, mandelbulb, menger, sphere, transform, union
 from fracslice.slicing import Layer, SliceJob, Slicer, Stack, plan_stack
-from fracslice.slicing.compensation import compensate
 from fracslice.slicing.printers import Printer, printer
-from fracslice.slicing.raster import Screen, blur
+from fracslice.slicing.raster import Screen, blur, compensate
 
 pytestmark = pytest.mark.once
 

@@ -10,6 +10,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from fracslice.checks.layer_checks import PrintReport, check_layers
+from fracslice.checks.problems import Limits, Problem, verdict
 from fracslice.formulas import (
     Node,
     box,
@@ -23,10 +25,8 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.printing.problems import Limits, Problem, verdict
 from fracslice.scene import Print
 from fracslice.slicing import SliceJob, plan_stack
-from fracslice.slicing.layer_checks import PrintReport, check_layers
 from fracslice.volume import extent
 from tests.examples import stamped
 

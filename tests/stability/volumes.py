@@ -10,9 +10,9 @@ from fracslice import MeshJob, make_mesh
 from fracslice.errors import VolumeError
 from fracslice.fields.cpu import compile_scene
 from fracslice.formulas import Box, Node
-from fracslice.jobs.completeness import layers_amount
 from fracslice.scene import scene
 from fracslice.slicing import SliceJob, Slicer, plan_stack
+from fracslice.slicing.layers import layers_amount
 from fracslice.work import Work
 
 SIZE = 50.0

@@ -183,7 +183,7 @@ def test_too_fine_a_voxel_is_refused_before_starting() -> None:
 
 def test_a_grid_that_needs_more_memory_than_there_is(monkeypatch: pytest.MonkeyPatch) -> None:
     cube = Box((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
-    monkeypatch.setattr("fracslice.volume.lattice.available_bytes", lambda: 10**10)
+    monkeypatch.setattr("fracslice.volume.bricks.available_bytes", lambda: 10**10)
     assert Lattice.around(cube, 1 / 4096).bricks == (513, 513, 513)
     with pytest.raises(TooLargeError, match=r"1025 x 1025 x 1022 bricks, which needs 12\.9 GB of memory"):
         Lattice.around(Box((0.0, 0.0, 0.0), (1.0, 1.0, 0.997)), 1 / 8190)

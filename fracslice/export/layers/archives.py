@@ -1,4 +1,4 @@
-"""Print files that are ZIP archives of PNG pictures: .sl1 of Prusa, .nanodlp of NanoDLP."""
+"""PNG pictures in a folder, or in ZIP archives: .sl1 of Prusa, .nanodlp of NanoDLP."""
 
 from __future__ import annotations
 
@@ -16,10 +16,9 @@ from ..._slices import Encoding
 from ...errors import ExportError
 from ...version import __version__
 from .. import png
-from ..layer_formats import PrintData, PrintFormat
-from ..layer_tasks import Encode
+from ..layer_formats import FolderFormat, PrintData, PrintFormat
 from ..png import write_png
-from ..slice_run import SliceRun
+from ..slice_run import Encode, SliceRun
 
 MOST_MEMBERS = 65_535
 
@@ -243,6 +242,13 @@ def _profile(job: PrintData) -> dict[str, object]:
 
 
 FORMATS = (
+    FolderFormat(
+        "png",
+        png.encode_layer,
+        lambda run: {"manifest.json": run.describe()},
+        encoding=Encoding.PNG,
+        endings=("",),
+    ),
     Sl1Format(
         "sl1",
         png.encode_layer,

@@ -8,12 +8,11 @@ from typing import BinaryIO
 
 import numpy as np
 
+from ...common.packages import package, rows
 from ...errors import ExportError
 from ...slicing import Layer
 from ..layer_formats import FileFormat
-from ..layer_tasks import Encode
-from ..packages import package, rows
-from ..slice_run import SliceRun
+from ..slice_run import Encode, SliceRun
 
 LEVEL = 1
 HEAD = (
@@ -41,7 +40,7 @@ class SlicesAndMesh(FileFormat):
 
 
 def _assemble(run: SliceRun, layers: Iterable[bytes], file: BinaryIO) -> None:
-    from ..threemf import mesh_element  # of this format alone
+    from ...formats._3mf import mesh_element  # of this format alone
 
     assert run.mesh
     middle = np.array(run.stack.shape[::-1]) * run.stack.pixel / 2

@@ -11,8 +11,7 @@ from dataclasses import replace
 
 from fracslice import read
 from fracslice.rendering import Renderer
-from fracslice.rendering.accumulator import GOAL, PassPlan, tile_order
-from fracslice.rendering.host_accumulator import HostAccumulator
+from fracslice.rendering.accumulator import GOAL, HostAccumulator, PassPlan, tile_order
 from fracslice.scene import library
 from fracslice.scene.view import Camera
 

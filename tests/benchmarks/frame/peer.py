@@ -14,10 +14,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from fracslice.formulas import mandelbulb
-from fracslice.rendering.accumulator import GOAL, PassPlan, tile_order
-from fracslice.rendering.cpu import CpuTracer
-from fracslice.rendering.host_accumulator import HostAccumulator
+from fracslice.rendering.accumulator import GOAL, HostAccumulator, PassPlan, tile_order
 from fracslice.rendering.linking import link_frame
+from fracslice.rendering.packets import CpuTracer
 from fracslice.rendering.setup import optics
 from fracslice.scene.view import Camera, Light, Shading, View
 from fracslice.work import Work

@@ -12,9 +12,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fracslice.bench.measure import WARM
-from fracslice.bench.methods import WORKLOADS, Workload, grid
-from fracslice.export import write
+from fracslice.bench.measure import WARM, WORKLOADS, Workload, grid
+from fracslice.formats import write
 from fracslice.mesh import Mesh
 from fracslice.work import Work
 

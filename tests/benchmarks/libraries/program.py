@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fracslice.export import write
+from fracslice.formats import write
 from fracslice.mesh import Mesh
 
 from ..programs import output

@@ -18,8 +18,7 @@ import trimesh
 
 from fracslice.formulas import Node, model
 from fracslice.mesh import Mesh, models
-from fracslice.mesh.field import MeshField
-from fracslice.mesh.reading import read_mesh
+from fracslice.mesh.models import MeshField, read_mesh
 
 from ..runner import Figures, Row, Run, timed
 

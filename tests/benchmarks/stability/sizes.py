@@ -12,10 +12,11 @@ import numpy as np
 from fracslice import MeshJob
 from fracslice.errors import VolumeError
 from fracslice.formulas import Node, julia, mandelbulb, quaternion_mandelbrot
-from fracslice.jobs.completeness import Completeness, layers_amount
 from fracslice.jobs.mesh import make_mesh
 from fracslice.scene import library, read, scene
 from fracslice.slicing import SliceJob, Slicer, plan_stack
+from fracslice.slicing.layers import layers_amount
+from fracslice.volume.amount import Completeness
 from fracslice.volume.extent import _kept
 from fracslice.work import Work
 from tests.examples import EXAMPLES

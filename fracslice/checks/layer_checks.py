@@ -1,119 +1,23 @@
-"""Printability checks of layers, and the problems that they find."""
+"""Checks of all layers of an object."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from ..common.messages import format_count, significant
-from ..printing.problems import SUPPORTS, Limits, Problem, flat_base
-from ..printing.solid_checks import FILL, SolidReport, check_object, loose, may_close
-from ..printing.widths import Widths, widths_of
-from ..scene import Print
+from ..printing.walls import Widths, widths_of
+from ..slicing.feature_graph import Feature, Graph, Neck, Overhang, farthest, unsupported_pixels, weakest
+from ..slicing.layers import Layer, Slicer
+from ..slicing.printers import Printer
+from ..slicing.runs import LayerComponents, layer_components, widths
+from ..slicing.stack import Stack
 from ..work import Work
-from .feature_graph import Feature, Graph, Neck, Overhang, farthest, unsupported_pixels, weakest
-from .layers import Layer, Slicer
-from .printers import PRINTERS, Printer
-from .runs import LayerComponents, layer_components
-from .stack import Stack
-from .thickness import widths
-
-
-def misfit(stack: Stack, printer: Printer | None) -> Problem | None:
-    """Compare the size of a planned stack with a printer, before any layer is sampled."""
-    share = {
-        p: min(most / mine for most, mine in zip(p.build_volume, stack.size, strict=True))
-        for p in ([printer] if printer else PRINTERS.values())
-    }
-    nearest = max(share, key=lambda p: share[p])
-    if share[nearest] >= 1 - 1e-6:
-        return None
-    mine, most = (" x ".join(significant(s, 4) for s in size) for size in (stack.size, nearest.build_volume))
-    which = f"the {nearest.title}" if printer else f"any known printer, not even the {nearest.title}"
-    size = math.floor(10 * share[nearest] * stack.side) / 10
-    text = f"does not fit {which}: {mine} mm, and it has {most} mm"
-    return Problem("fit", text, mend=(("size", f"{size:g}mm"),))
-
-
-def problems_of(report: PrintReport, stack: Stack, limits: Limits) -> list[Problem]:
-    """Problems that a report shows, except for the size."""
-
-    def where(feature: Feature) -> dict[str, Any]:
-        layer = feature.layers[0]
-        return {"layer": layer, "at": (*feature.at, _bottom(stack, layer))}
-
-    problems = []
-    lowest = min(
-        (body.layers[0] for body in report.bodies), default=0
-    )  # several on the plate are as many parts
-    if hanging := [body for body in report.bodies if body.layers[0] > lowest]:
-        problems.append(loose(len(hanging), **where(hanging[0])))
-    if report.islands:
-        largest = max(report.islands, key=lambda i: i.area)
-        first = min(i.layers[0] for i in report.islands)
-        text = f"{format_count(len(report.islands), 'island')} in the air, the first from layer {first} on"
-        text += f", the largest of {significant(largest.area)} mm2"
-        problems.append(
-            Problem("islands", text, advice=SUPPORTS, count=len(report.islands), **where(largest))
-        )
-    if report.overhang:
-        far = report.overhang
-        text = f"a flat overhang reaches {far.reach:.3g} mm, {significant(far.area)} mm2 of it too far"
-        at = (*far.at, _bottom(stack, far.layer))
-        problems.append(Problem("overhangs", text, far.layer, at, advice=f"--up, or {SUPPORTS}"))
-    if report.neck and report.neck.ratio > limits.neck:
-        problems.append(_narrow_neck(report.neck, stack, limits))
-    if report.cavities:
-        count, volume = len(report.cavities), sum(c.volume for c in report.cavities)
-        sealed = format_count(count, "sealed cavity", "sealed cavities")
-        text = f"{sealed} with {significant(volume)} mm3 of resin"
-        place = where(report.cavities[0])
-        problems.append(Problem("cavities", text, mend=FILL, count=count, resin=volume, **place))
-    for kind, noun, hollows in (("cups", "suction cup", report.cups), ("traps", "resin trap", report.traps)):
-        remaining = [hollow for hollow in hollows if hollow not in report.cavities]
-        if remaining:
-            largest = max(remaining, key=lambda h: h.area)
-            volume = sum(h.volume for h in remaining)
-            text = f"{format_count(len(remaining), noun)} with {significant(volume)} mm3 of resin"
-            text += f", the largest {significant(largest.area)} mm2"
-            advice, count = "--up, or a drain hole", len(remaining)
-            if kind == "cups" and all(hollow.layers[0] == 0 for hollow in remaining):
-                advice += f", or {SUPPORTS}"  # off the plate, it is open upwards
-            place = where(largest)
-            problems.append(Problem(kind, text, advice=advice, count=count, resin=volume, **place))
-    return [*problems, *_narrow_drains(stack, limits), *report.solid.thin]
-
-
-def _narrow_drains(stack: Stack, limits: Limits) -> Iterator[Problem]:
-    """Problem of drain holes that may close while they are printed."""
-    narrow = [drain for drain in stack.drains if 2 * drain.radius * stack.scale < limits.hole]
-    if narrow:
-        x, y, z = (stack.scale * (np.array(narrow[0].start) - stack.origin)).tolist()
-        text = may_close(len(narrow), "drain hole", 2 * narrow[0].radius * stack.scale, limits.hole)
-        layer, mend = int(np.searchsorted(stack.tops, z)), (("drain", f"{Print().drain:g}mm"),)
-        yield Problem("holes", text, layer, (x, y, z), mend, count=len(narrow))
-
-
-def _narrow_neck(neck: Neck, stack: Stack, limits: Limits) -> Problem:
-    """Problem of a cross-section that is too small for what it carries."""
-    at = (*neck.at, _bottom(stack, neck.layer))
-    if neck.layer == 0:
-        text = f"it stands on {significant(neck.area, 2)} mm2 and is {significant(neck.carried)} mm2 wide"
-        base = flat_base(stack.size[2])
-        return Problem("necks", text, 0, at, mend=(("base", base),), advice=f"--raft 1mm, or {SUPPORTS}")
-    text = f"{significant(neck.carried)} mm2 hang on {significant(neck.area, 2)} mm2"
-    width = 1.2 * math.sqrt(4 / math.pi * neck.carried / limits.neck)
-    return Problem("necks", text, neck.layer, at, mend=(("thickness", f"{width:.2g}mm"),), advice=SUPPORTS)
-
-
-def _bottom(stack: Stack, layer: int) -> float:
-    """Lower face of a layer, mm."""
-    return float(stack.tops[layer] - stack.heights[layer])
-
+from . import checks_of, problems_of
+from .problems import Limits, Problem
+from .solid_checks import SolidReport, check_object
 
 THICKNESS_LAYERS = 24
 """Layers, evenly spaced over the height, in which walls and gaps are measured."""
@@ -166,17 +70,41 @@ class LayerFindings:
     area: float  # area, mm^2
     walls: np.ndarray | None  # widths; None in a layer that is not measured
     gaps: np.ndarray | None
+    measured: dict[str, float]  # what checks measure, by their kind
+
+
+@dataclass(frozen=True, eq=False)
+class LayersEvidence:
+    """What is known of all layers."""
+
+    stack: Stack
+    report: PrintReport  # all but its problems
+    printer: Printer | None
+    limits: Limits
+    work: Work
+    measured: dict[str, list[float]]  # what checks measure of each layer, by their kind
+
+    def where(self, feature: Feature) -> dict[str, Any]:
+        """Layer and place of a feature, as a `Problem` has them."""
+        layer = feature.layers[0]
+        return {"layer": layer, "at": (*feature.at, self.bottom(layer))}
+
+    def bottom(self, layer: int) -> float:
+        """Lower face of a layer, mm."""
+        return float(self.stack.tops[layer] - self.stack.heights[layer])
 
 
 def findings_of(slicer: Slicer, layers: range) -> Iterator[LayerFindings]:
     """Examine some layers, each by itself."""
     stack = slicer.stack
+    measures = {check.kind: check.measure for check in checks_of("layers") if check.measure}
     chosen = set(np.linspace(0, len(stack.z) - 1, THICKNESS_LAYERS).astype(int).tolist())
 
     def make(layer: Layer) -> LayerFindings:
         runs = layer.runs
-        measured = widths(runs, stack.pixel) if layer.index in chosen else (None, None)
-        return LayerFindings(*layer_components(runs), layer.area, *measured)
+        walls, gaps = widths(runs, stack.pixel) if layer.index in chosen else (None, None)
+        numbers = {kind: float(measure(layer)) for kind, measure in measures.items()}
+        return LayerFindings(*layer_components(runs), layer.area, walls, gaps, numbers)
 
     return slicer.map(make, layers)
 
@@ -192,7 +120,7 @@ def check_layers(
     limits, work = limits or Limits(), work or Work()
     finest, origin = max(stack.pixel), stack.origin
     solid = check_object(stack.root, stack.outer, stack.scale, limits, work, finest, origin, stack.drains)
-    return _Collector(stack, limits, printer, solid).report(
+    return _Collector(stack, limits, printer, solid, work).report(
         findings or findings_of(Slicer(stack, work), range(len(stack.z)))
     )
 
@@ -205,13 +133,14 @@ class _Collector:
     limits: Limits
     printer: Printer | None
     solid: SolidReport
+    work: Work
 
     def report(self, findings: Iterator[LayerFindings]) -> PrintReport:
         """The report of findings in the order of the layers."""
         stack, solid, empty = self.stack, Graph(), Graph()
         square = stack.pixel[0] * stack.pixel[1]
         areas, overhangs, walls, gaps = list[float](), [], [np.empty((0, 2))], [np.empty((0, 2))]
-        limits, far = self.limits, list[Overhang]()
+        limits, far, measured = self.limits, list[Overhang](), dict[str, list[float]]()
         for k, now in enumerate(findings):
             below = solid.last
             reach = max(float(stack.heights[k]) / min(stack.pixel), 1.0)
@@ -224,11 +153,12 @@ class _Collector:
             solid.add(now.solid)
             empty.add(now.empty)
             areas.append(now.area)
+            for kind, number in now.measured.items():
+                measured.setdefault(kind, []).append(number)
             if now.walls is not None and now.gaps is not None:
                 walls.append(now.walls)
                 gaps.append(now.gaps)
         volume = sum(area * height for area, height in zip(areas, stack.heights.tolist(), strict=True))
-        unfit = misfit(stack, self.printer)
         overhang = np.array(overhangs)
         islands = self.groups(solid, solid.islands())
         bodies = self.groups(solid, np.ones(solid.count, bool))
@@ -241,7 +171,7 @@ class _Collector:
             layers=len(stack.z),
             pixels=stack.shape[::-1],
             size=stack.size,
-            fits=not unfit if self.printer else None,
+            fits=None,
             areas=areas,
             volume=volume,
             weight_g=volume * self.limits.density / 1000,
@@ -260,8 +190,10 @@ class _Collector:
             worst=_worst(overhang, real, far),
             solid=self.solid,
         )
-        report.problems.extend([*([unfit] if unfit else []), *problems_of(report, stack, self.limits)])
-        return report
+        evidence = LayersEvidence(stack, report, self.printer, self.limits, self.work, measured)
+        problems = [*problems_of("layers", evidence), *self.solid.unlayered]
+        fits = all(problem.kind != "fit" for problem in problems) if self.printer else None
+        return replace(report, fits=fits, problems=problems)
 
     def groups(self, graph: Graph, chosen: np.ndarray) -> list[Feature]:
         """Chosen nodes as connected groups."""

@@ -1,9 +1,5 @@
 """Problems of an object: the limits of the checks, what is wrong, where, how much, and the option that
 mends it.
-
-Guides of makers of resin printers advise supports for flat cantilevers over 1 mm (Addema, "Recommendations -
-SLA"; EnvisionTEC, "Self-Supporting Features") and keep bridges under 21 mm (Addema): beyond, surfaces
-suffer. Prints fail later; the limit of cantilevers, 5 mm, is ours, as are those of necks, cups and specks.
 """
 
 from __future__ import annotations
@@ -14,6 +10,7 @@ from dataclasses import dataclass
 from ..common.messages import place
 from ..common.parameters import Length, Number, attribute, validate
 from ..errors import SceneError
+from . import checks
 
 SUPPORTS = "supports in the slicer"
 
@@ -25,9 +22,7 @@ Place = tuple[float, float, float]
 class Problem:
     """One reason why an object would not print."""
 
-    # "bodies", "islands", "overhangs", "necks", "cavities", "cups", "traps", "holes", "walls", "floors",
-    # "fit", "lost" or "mesh"
-    kind: str
+    kind: str  # kind of the check
     text: str  # description with the size
     layer: int | None = None  # first layer of the largest one; None if layers were not examined
     at: Place | None = None  # place of the largest one
@@ -48,32 +43,25 @@ class Problem:
         )
 
 
-def verdict(problems: Sequence[object]) -> str:
+def verdict(problems: Sequence[Problem]) -> str:
     """Say whether an object with some problems would print: as it is, with supports, or not."""
     if not problems:
         return "would print"
-    held = all(isinstance(problem, Problem) and SUPPORTS in problem.advice for problem in problems)
+    held = all(SUPPORTS in problem.advice for problem in problems)
     return "would print with supports" if held else "would not print"
 
 
-WEIGHTS = {"fit": 1000.0, "bodies": 100.0, "cavities": 10.0, "cups": 10.0, "traps": 10.0}
-"""What a feature of a kind counts among problems; 1 by default."""
-
-
-def severity(problems: Sequence[object]) -> tuple[int, float]:
+def severity(problems: Sequence[Problem]) -> tuple[int, float]:
     """How bad problems are: the rank of their verdict, then a weighted count of what is wrong."""
     rank = ["would print", "would print with supports", "would not print"].index(verdict(problems))
-    own = [problem for problem in problems if isinstance(problem, Problem)]
-    return rank, 1000.0 * (len(problems) - len(own)) + sum(WEIGHTS.get(p.kind, 1.0) * p.count for p in own)
+    weights = {check.kind: check.weight for check in checks()}
+    return rank, sum(weights[problem.kind] * problem.count for problem in problems)
 
 
-def mends(made: Sequence[object], others: Sequence[object]) -> bool:
+def mends(made: Sequence[Problem], others: Sequence[Problem]) -> bool:
     """True if problems are less bad than others: in the verdict, or in number while no more resin stays."""
     mine, theirs = severity(made), severity(others)
-    resin, of_others = (
-        sum(problem.resin for problem in problems if isinstance(problem, Problem))
-        for problems in (made, others)
-    )
+    resin, of_others = (sum(problem.resin for problem in problems) for problems in (made, others))
     return mine[0] < theirs[0] or (mine < theirs and resin <= of_others)
 
 

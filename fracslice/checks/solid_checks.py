@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -12,14 +12,13 @@ from ..common.messages import format_count, place, significant
 from ..fields.box import Triple
 from ..fields.field import Field
 from ..formulas import Box
+from ..printing.samples import Samples, components_of
+from ..printing.thin_features import narrow_holes, resolve_connectivity, sampled_object, thin_features
+from ..printing.walls import BINS, Measure, Walls, Widths, project_faces, walls_of, widths_of
 from ..volume import Bricks, Drain
 from ..work import Work
-from .components import components_of
+from . import checks_of, problems_of
 from .problems import Limits, Problem
-from .samples import Samples
-from .thin_features import narrow_holes, resolve_connectivity, sampled_object, thin_features
-from .walls import Measure, Walls, project_faces, walls_of
-from .widths import BINS, Widths, widths_of
 
 COARSE, FINE = 96, 192
 """Minimum and maximum number of samples along the longest side."""
@@ -36,12 +35,6 @@ PARALLEL = -0.94
 """Maximum cosine between the normals of the faces of a wall that is too thin: a wedge of more than 20 degrees
 is a sharp edge.
 """
-
-THICKEN = 1 / 250
-"""Least thickness that can be restored, as a fraction of the longest side."""
-
-BRIDGE, FILL = (("bridge", "1mm"),), (("cavities", "fill"),)
-"""Print settings that join bodies and fill cavities."""
 
 
 @dataclass(frozen=True)
@@ -61,13 +54,33 @@ class SolidReport:
     problems: list[Problem]  # the problems
 
     @property
-    def thin(self) -> list[Problem]:
-        """Problems that neither a mesh nor layers reveal: thin walls and floors."""
-        return [problem for problem in self.problems if problem.kind in ("walls", "floors")]
+    def unlayered(self) -> list[Problem]:
+        """Problems that layers do not reveal, such as thin walls and floors."""
+        kinds = {check.kind for check in checks_of("layers")}
+        return [problem for problem in self.problems if problem.kind not in kinds]
 
     def as_dict(self) -> dict[str, Any]:
         """The report as plain JSON types."""
         return asdict(self)
+
+
+@dataclass(frozen=True, eq=False)
+class SolidEvidence:
+    """What is known of a sampled solid. Places and widths of walls in scene units, volumes in mm3."""
+
+    root: Field  # the field, its samples, and mm per scene unit
+    bricks: Bricks
+    scale: float
+    limits: Limits
+    middle: np.ndarray  # point from which places are measured
+    size: Triple  # sides of the object
+    bodies: list[float]  # volumes, the largest first
+    cavities: list[float]
+    walls: Walls  # measured across the solid, along z, and across what is empty
+    floors: Walls
+    gaps: Walls
+    thin_walls: Walls  # those below the limits, without sharp edges and rims of drain holes
+    thin_floors: Walls
 
 
 def check_object(
@@ -136,12 +149,10 @@ def check_solid(
         result = _volumes(fine, speck)
     bodies, cavities = ([v * scale**3 for v in volumes] for volumes in result)
     middle = np.array(origin or (*solid.bounds.box.centre[:2], bricks.origin[2]))
-    thickening = THICKEN * scale * max(solid.bounds.box.size)
-    problems = [
-        *_problems_of_components(bodies, cavities),
-        *_too_thin("walls", narrow, limits.wall, limits.thin, thickening, scale, middle),
-        *_too_thin("floors", bare, limits.floor, limits.thin, thickening, scale, middle),
-    ]
+    evidence = SolidEvidence(
+        *(root, bricks, scale, limits, middle, solid.bounds.box.size, bodies, cavities),
+        *(thick, floors, between, narrow, bare),
+    )
     unseen = _unseen(thick, finest or bricks.voxel * scale, limits.thin, scale, middle)
     tunnels = between.chosen(between.width * scale < 0.99 * limits.hole)
     for drain in drains:  # these are named by themselves
@@ -158,33 +169,8 @@ def check_solid(
         thin_floors=float(bare.area.sum()) * scale**2,
         unseen=unseen,
         holes=_closing(holes, limits.hole, scale, middle),
-        problems=problems,
+        problems=problems_of("solid", evidence),
     )
-
-
-def _problems_of_components(bodies: Sequence[float], cavities: Sequence[float]) -> Iterator[Problem]:
-    """Problems of the bodies and cavities of these volumes, mm3."""
-    if len(bodies) > 1:
-        yield loose(len(bodies))
-    if cavities:
-        sealed = format_count(len(cavities), "sealed cavity", "sealed cavities")
-        yield Problem("cavities", f"{sealed} of {significant(sum(cavities))} mm3", mend=FILL)
-
-
-def _too_thin(
-    kind: str, under: Walls, limit: float, least: float, thickening: float, scale: float, middle: np.ndarray
-) -> Iterator[Problem]:
-    """Problem of walls or floors below a limit in mm, if their area is at least `least` mm2.
-
-    thickening: minimum thickness that mends them, mm; middle: point from which the place is measured.
-    """
-    area = float(under.area.sum()) * scale**2
-    if area < least:
-        return
-    text = f"{significant(area)} mm2 of {kind} are thinner than {limit:g} mm"
-    x, y, z = (scale * (under.middle[under.width.argmin()] - middle)).tolist()
-    mend = (("thickness", f"{max(limit, thickening):.2g}mm"),)
-    yield Problem(kind, text, at=(x, y, z), mend=mend)
 
 
 def _widths(walls: Walls, scale: float) -> Widths | None:
@@ -250,15 +236,3 @@ def _from_side(walls: Walls, drain: Drain) -> np.ndarray:
     start, along = np.array(drain.start), np.array(drain.end) - drain.start
     share = np.clip((walls.middle - start) @ along / (along @ along), 0, 1)
     return np.asarray(np.linalg.norm(walls.middle - start - share[:, None] * along, axis=1) - drain.radius)
-
-
-def loose(count: int, **where: Any) -> Problem:
-    """Problem of bodies that nothing holds."""
-    return Problem(
-        "bodies",
-        format_count(count, "loose body", "loose bodies"),
-        mend=BRIDGE,
-        advice="--keep largest",
-        count=count,
-        **where,
-    )

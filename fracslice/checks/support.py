@@ -1,0 +1,83 @@
+"""What holds an object: loose bodies, islands, overhangs and necks.
+
+Guides of makers of resin printers advise supports for flat cantilevers over 1 mm (Addema, "Recommendations -
+SLA"; EnvisionTEC, "Self-Supporting Features") and keep bridges under 21 mm (Addema): beyond, surfaces
+suffer. Prints fail later; the limit of cantilevers, 5 mm, is ours, as is that of necks.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from ..common.messages import format_count, significant
+from ..slicing.feature_graph import Neck
+from . import Check
+from .layer_checks import LayersEvidence
+from .problems import SUPPORTS, Problem, flat_base
+from .solid_checks import SolidEvidence
+
+BRIDGE = (("bridge", "1mm"),)
+"""Print setting that joins bodies."""
+
+
+def _loose(count: int, **where: Any) -> Problem:
+    """Problem of bodies that nothing holds."""
+    text = format_count(count, "loose body", "loose bodies")
+    return Problem("bodies", text, mend=BRIDGE, advice="--keep largest", count=count, **where)
+
+
+def _bodies_of_solid(of: SolidEvidence) -> Iterator[Problem]:
+    if len(of.bodies) > 1:
+        yield _loose(len(of.bodies))
+
+
+def _bodies(of: LayersEvidence) -> Iterator[Problem]:
+    bodies = of.report.bodies
+    lowest = min((body.layers[0] for body in bodies), default=0)  # several on the plate are as many parts
+    if hanging := [body for body in bodies if body.layers[0] > lowest]:
+        yield _loose(len(hanging), **of.where(hanging[0]))
+
+
+def _islands(of: LayersEvidence) -> Iterator[Problem]:
+    islands = of.report.islands
+    if islands:
+        largest = max(islands, key=lambda i: i.area)
+        first = min(i.layers[0] for i in islands)
+        text = f"{format_count(len(islands), 'island')} in the air, the first from layer {first} on"
+        text += f", the largest of {significant(largest.area)} mm2"
+        yield Problem("islands", text, advice=SUPPORTS, count=len(islands), **of.where(largest))
+
+
+def _overhangs(of: LayersEvidence) -> Iterator[Problem]:
+    if far := of.report.overhang:
+        text = f"a flat overhang reaches {far.reach:.3g} mm, {significant(far.area)} mm2 of it too far"
+        at = (*far.at, of.bottom(far.layer))
+        yield Problem("overhangs", text, far.layer, at, advice=f"--up, or {SUPPORTS}")
+
+
+def _necks(of: LayersEvidence) -> Iterator[Problem]:
+    if of.report.neck and of.report.neck.ratio > of.limits.neck:
+        yield _narrow_neck(of.report.neck, of)
+
+
+def _narrow_neck(neck: Neck, of: LayersEvidence) -> Problem:
+    """Problem of a cross-section that is too small for what it carries."""
+    at = (*neck.at, of.bottom(neck.layer))
+    if neck.layer == 0:
+        text = f"it stands on {significant(neck.area, 2)} mm2 and is {significant(neck.carried)} mm2 wide"
+        base = flat_base(of.stack.size[2])
+        return Problem("necks", text, 0, at, mend=(("base", base),), advice=f"--raft 1mm, or {SUPPORTS}")
+    text = f"{significant(neck.carried)} mm2 hang on {significant(neck.area, 2)} mm2"
+    width = 1.2 * math.sqrt(4 / math.pi * neck.carried / of.limits.neck)
+    return Problem("necks", text, neck.layer, at, mend=(("thickness", f"{width:.2g}mm"),), advice=SUPPORTS)
+
+
+CHECKS = (
+    Check("bodies", "solid", _bodies_of_solid, rank=20, weight=100),
+    Check("bodies", "layers", _bodies, rank=20, weight=100),
+    Check("islands", "layers", _islands, rank=30),
+    Check("overhangs", "layers", _overhangs, rank=31),
+    Check("necks", "layers", _necks, rank=32),
+)

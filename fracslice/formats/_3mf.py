@@ -1,0 +1,350 @@
+"""3MF, by the core specification 1.3.
+
+Written: one object in millimetres and, for colours, materials 1.2. Read: the build, with the production
+extension.
+"""
+
+from __future__ import annotations
+
+import zipfile
+import zlib
+from array import array
+from collections.abc import Iterable, Iterator, Mapping
+from functools import partial
+from html import escape
+from itertools import chain
+from pathlib import Path
+from typing import IO, Any, BinaryIO
+from xml.parsers import expat
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common.files import open_regular
+from ..common.packages import HEAD, Fragment, Text, append, deflate, join, number_rows, rows
+from ..common.triangles import COPIES, DEEPEST, LARGEST, MOST_PARTS, Triangles, concatenate, count, moved
+from ..errors import MeshError
+from ..work import Work
+from . import MeshFormat
+
+MODEL = (
+    HEAD + '<model unit="millimeter" xml:lang="en-US" '
+    'xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02" '
+    'xmlns:fracslice="urn:fracslice:metadata">\n'
+)
+PLAIN, VERTICES, TRIANGLES, END_OF_MESH, END = (
+    b'<object id="1" type="model">',
+    b"<mesh>\n<vertices>\n",
+    b"</vertices>\n<triangles>\n",
+    b"</triangles>\n</mesh>",
+    b'</object></resources>\n<build><item objectid="1"/></build>\n</model>\n',
+)
+TRIANGLE, END_OF_ROW = ('<triangle v1="', '" v2="', '" v3="'), '"/>\n'
+CORE_NAMES = {"Title", "Designer", "Description", "Copyright", "LicenseTerms", "Rating", "Application"}
+CORE_NAMES |= {"CreationDate", "ModificationDate"}
+MATERIALS = "http://schemas.microsoft.com/3dmanufacturing/material/2015/02"
+GROUP = 2
+"""Number of the group of colours, of the materials extension."""
+
+
+def _write(mesh: Triangles, file: BinaryIO, metadata: Mapping[str, str], work: Work) -> None:
+    """Write a mesh, streamed: threads make and deflate blocks of the text, which are joined.
+
+    See `MeshFormat`. Metadata that 3MF does not define get fracslice's namespace.
+    """
+    mesh = mesh.in_order()
+    coloured = mesh.colours is not None
+    is_large = _is_large(len(mesh.vertices), len(mesh.triangles), coloured)
+    blocks = work.ordered(lambda text: deflate(text()), _model(mesh, metadata))
+    join(file, (partial(append, block) for block in blocks), is_large)
+
+
+def write_fragments(
+    vertices: tuple[int, Iterable[Fragment]],
+    triangles: tuple[int, Iterable[Fragment]],
+    file: BinaryIO,
+    metadata: Mapping[str, str],
+) -> None:
+    """Write a mesh whose rows are deflated."""
+
+    def texts(*blocks: bytes) -> Iterator[Fragment]:
+        return (partial(append, deflate(text)) for text in blocks)
+
+    fragments = chain(
+        texts(*_head(metadata), PLAIN, VERTICES),
+        vertices[1],
+        texts(TRIANGLES),
+        triangles[1],
+        texts(END_OF_MESH, END),
+    )
+    join(file, fragments, _is_large(vertices[0], triangles[0], False))
+
+
+def _is_large(vertices: int, triangles: int, coloured: bool) -> bool:
+    """True if the text may exceed the 2 GiB of a plain ZIP member; rows take at most 66 and 54 bytes."""
+    vertex, triangle = (92, 108) if coloured else (66, 54)  # with a colour for each vertex
+    return vertex * vertices + triangle * triangles > 2**31 - 2**20
+
+
+def _head(metadata: Mapping[str, str], model: str = MODEL) -> Iterator[bytes]:
+    """Text before the resources."""
+    yield model.encode()
+    for key, value in metadata.items():
+        name = key if key in CORE_NAMES else f"fracslice:{key}"
+        yield f'<metadata name="{escape(name)}">{escape(value)}</metadata>\n'.encode()
+    yield b"<resources>"
+
+
+def _model(mesh: Triangles, metadata: Mapping[str, str]) -> Iterator[Text]:
+    if mesh.colours is None:
+        yield from _texts(*_head(metadata), PLAIN)
+        yield from mesh_element(mesh)
+    else:
+        yield from _texts(*_head(metadata, MODEL.replace("<model ", f'<model xmlns:m="{MATERIALS}" ')))
+        colours, index = np.unique(mesh.colours, axis=0, return_inverse=True)
+        yield from _texts(f'<m:colorgroup id="{GROUP}">\n'.encode())
+        yield from _texts(*rows('<m:color color="#%02X%02X%02X"/>\n', colours))
+        yield from _texts(f'</m:colorgroup>\n<object id="1" type="model" pid="{GROUP}" pindex="0">'.encode())
+        yield from mesh_element(mesh, index.reshape(-1).astype(np.int32))
+    yield from _texts(END)
+
+
+def _texts(*blocks: bytes) -> Iterator[Text]:
+    return (partial(bytes, block) for block in blocks)
+
+
+def mesh_element(mesh: Triangles, colours: NDArray[np.int32] | None = None) -> Iterator[Text]:
+    """Encode a mesh as the mesh element of an object, in blocks.
+
+    `mesh` in mm; `colours`: int32 (n,).
+    """
+    yield from _texts(VERTICES)
+    yield from vertex_rows(mesh.vertices)
+    yield from _texts(TRIANGLES)
+    if colours is None:
+        yield from triangle_rows(mesh.triangles)
+    else:
+        before = *TRIANGLE, f'" pid="{GROUP}" p1="', '" p2="', '" p3="'
+        yield from number_rows(before, END_OF_ROW, np.hstack([mesh.triangles, colours[mesh.triangles]]))
+    yield from _texts(END_OF_MESH)
+
+
+def vertex_rows(vertices: NDArray[np.floating]) -> Iterator[Text]:
+    """Encode vertices, in blocks of `text.ROWS`.
+
+    `vertices`: float (n, 3), mm.
+    """
+    return number_rows(('<vertex x="', '" y="', '" z="'), END_OF_ROW, vertices)
+
+
+def triangle_rows(triangles: NDArray[np.integer]) -> Iterator[Text]:
+    """Encode triangles, in blocks of `text.ROWS`.
+
+    `triangles`: int (n, 3).
+    """
+    return number_rows(TRIANGLE, END_OF_ROW, triangles)
+
+
+MILLIMETRES = {
+    "micron": 1e-3,
+    "millimeter": 1.0,
+    "centimeter": 10.0,
+    "inch": 25.4,
+    "foot": 304.8,
+    "meter": 1000.0,
+}
+LONGEST, CHUNK = 1 << 20, 1 << 16
+"""Most bytes of a tag, and bytes that are parsed at once."""
+MODEL_RELATION = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
+
+
+def _read(path: Path) -> Triangles:
+    """The build of a file, mm."""
+    try:
+        with open_regular(path) as file, zipfile.ZipFile(file) as archive:
+            relations, package = _Relations(), _Package()
+            with archive.open("_rels/.rels") as part:
+                _parse(part, relations.start)
+            package.read(archive, relations.model)
+            return package.laid_out()
+    except (zipfile.BadZipFile, EOFError, KeyError, RuntimeError, zlib.error) as error:
+        raise MeshError("not a whole 3MF file: it is cut short, or of another kind") from error
+    except (expat.ExpatError, ValueError, OverflowError) as error:
+        raise MeshError(f"not a valid 3MF file: {error}") from error
+
+
+def _parse(part: IO[bytes], start: Any, end: Any = None) -> None:
+    """Stream XML through handlers. A document type, and hence entities, is refused."""
+    parser = expat.ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.StartDoctypeDeclHandler = _refuse
+    given = 0
+    while data := part.read(CHUNK):
+        parser.Parse(data, False)
+        given += len(data)
+        if given - parser.CurrentByteIndex > LONGEST:  # which takes quadratic time
+            raise MeshError(f"not a valid 3MF file: it has a tag of more than {LONGEST >> 20} MB")
+    parser.Parse(b"", True)
+
+
+def _refuse(*_: Any) -> None:
+    """Refuse a document type."""
+    raise MeshError("not a valid 3MF file: it has a document type")
+
+
+class _Relations:
+    """Finds the 3D model in the relationships of the package."""
+
+    model = ""
+
+    def start(self, name: str, attributes: dict[str, str]) -> None:
+        if attributes.get("Type") == MODEL_RELATION:
+            self.model = attributes.get("Target", "")
+
+
+_Name = tuple[str, str]
+"""File of an object in the package, and its identifier there."""
+
+_Placed = tuple[_Name, NDArray[np.float64]]
+"""Object and its transform."""
+
+
+IN_PLACE = np.vstack([np.eye(3), np.zeros(3)])
+"""Transform that moves nothing."""
+
+
+class _Package:
+    """Collects the meshes of a 3MF model from XML streams, then expands its build.
+
+    Objects may lie in further files of the package, as its production extension has it.
+    """
+
+    def __init__(self) -> None:
+        self.meshes: dict[_Name, Triangles] = {}
+        self.parts: dict[_Name, list[_Placed]] = {}
+        self.build: list[_Placed] = []
+        self.unit, self.file, self.object = "millimeter", "", ("", "")
+        self.vertices, self.triangles = array("d"), array("q")
+        self.count = 0
+        self.expanded: dict[_Name, Triangles] = {}
+
+    def read(self, archive: zipfile.ZipFile, model: str) -> None:
+        """Read a model, whose unit and build count, and the files that components name."""
+        self.parse(archive, model.lstrip("/"))
+        unit, build, known = self.unit, self.build, {self.file}
+        while more := self.named(build) - known:
+            known |= more
+            for file in sorted(more):
+                self.parse(archive, file)
+        self.unit, self.build = unit, build
+
+    def parse(self, archive: zipfile.ZipFile, file: str) -> None:
+        """Collect the objects of a file; its unit and build take the place of earlier ones."""
+        self.file, self.build = file, []
+        with archive.open(file) as part:
+            _parse(part, self.start, self.end)
+
+    def named(self, build: list[_Placed]) -> set[str]:
+        """Files of the objects that are built or components of others."""
+        return {name[0] for placed in (build, *self.parts.values()) for name, _ in placed}
+
+    def start(self, name: str, get: dict[str, str]) -> None:
+        """Handle the start of an element."""
+        match name.rpartition(":")[2]:
+            case "triangle":
+                self.triangles.extend((int(get["v1"]), int(get["v2"]), int(get["v3"])))
+            case "vertex":
+                self.vertices.extend((float(get["x"]), float(get["y"]), float(get["z"])))
+            case "object":
+                self.count_part()
+                self.object = self.file, get["id"]
+                self.parts[self.object] = []
+            case "levelset":
+                raise MeshError("the 3MF file holds a formula (a level set), and no mesh")
+            case "component":
+                self.parts[self.object].append(self.reference(get))
+            case "item":
+                self.build.append(self.reference(get))
+            case "model":
+                self.unit = get.get("unit", self.unit)
+
+    def reference(self, get: dict[str, str]) -> _Placed:
+        """The object that an item or a component names, in this file or in that of its path."""
+        self.count_part()
+        paths = [value for key, value in get.items() if key.rpartition(":")[2] == "path"]
+        file = paths[0].lstrip("/") if paths else self.file
+        return (file, get["objectid"]), _matrix(get.get("transform"))
+
+    def count_part(self) -> None:
+        """Count an object, a component or an item."""
+        self.count += 1
+        if self.count > MOST_PARTS:
+            raise MeshError(f"not a valid 3MF file: it has more than {MOST_PARTS} objects and parts")
+
+    def end(self, name: str) -> None:
+        """Handle the end of an element."""
+        if name.rpartition(":")[2] == "object":
+            self.meshes[self.object] = _validated_mesh(self.vertices, self.triangles)
+            self.vertices, self.triangles = array("d"), array("q")
+
+    def laid_out(self) -> Triangles:
+        """All build items as one mesh, mm."""
+        if self.unit not in MILLIMETRES:
+            raise MeshError(f"not a valid 3MF file: no such unit: {self.unit}")
+        if not self.build:
+            raise MeshError("the 3MF file asks to build nothing")
+        known: dict[_Name, tuple[int, int]] = {}
+        most = max(LARGEST, COPIES * sum(map(count, self.meshes.values())))
+        if sum(self.size(name, known)[0] for name, _ in self.build) > most:
+            raise MeshError(f"not a valid 3MF file: it builds more than {most} vertices, triangles and parts")
+        whole = concatenate([self.placed(*item) for item in self.build])
+        return Triangles(whole.vertices * MILLIMETRES[self.unit], whole.triangles)
+
+    def size(self, name: _Name, known: dict[_Name, tuple[int, int]], depth: int = 0) -> tuple[int, int]:
+        """Vertices, triangles and objects of an expanded object, and levels of its components.
+
+        An unknown object, and components nested too deep, are refused.
+        """
+        if name in self.meshes and depth <= DEEPEST:
+            if name not in known:
+                inner = [self.size(part, known, depth + 1) for part, _ in self.parts[name]]
+                sizes, levels = zip((count(self.meshes[name]), -1), *inner, strict=True)
+                known[name] = 1 + sum(sizes), 1 + max(levels)
+            if depth + known[name][1] <= DEEPEST:
+                return known[name]
+        raise MeshError(f"not a valid 3MF file: no such object: {name[1]}")
+
+    def placed(self, name: _Name, matrix: NDArray[np.float64]) -> Triangles:
+        """An object with its components, in the frame of the build."""
+        if name not in self.expanded:
+            inner = [self.placed(*part) for part in self.parts[name]]
+            self.expanded[name] = concatenate([self.meshes[name], *inner])
+        whole = self.expanded[name]
+        turned = sum(whole.vertices[:, k, None] * matrix[k] for k in range(3))
+        return moved(whole, turned + matrix[3], matrix[:3])
+
+
+def _matrix(text: str | None) -> NDArray[np.float64]:
+    """3MF transform: four rows of three numbers, applied to row vectors. Raises ValueError."""
+    if text is None:
+        return IN_PLACE
+    matrix = np.array(text.split(), dtype=np.float64).reshape(4, 3)
+    if not np.isfinite(matrix).all():
+        raise ValueError(f"a transform that is not of finite numbers: {text[:60]}")
+    return matrix
+
+
+def _validated_mesh(vertices: array[float], triangles: array[int]) -> Triangles:
+    """Validated mesh of an object."""
+    corners = np.array(vertices, dtype=np.float64).reshape(-1, 3)
+    indices = np.array(triangles, dtype=np.int64).reshape(-1, 3)
+    if not np.isfinite(corners).all():
+        raise MeshError("not a valid 3MF file: a coordinate is not a finite number")
+    if len(indices) and not 0 <= indices.min() <= indices.max() < len(corners):
+        raise MeshError("not a valid 3MF file: a triangle names a vertex that does not exist")
+    if (indices == np.roll(indices, 1, axis=1)).any():
+        raise MeshError("not a valid 3MF file: a triangle names a vertex twice")
+    return Triangles(corners, indices.astype(np.int32))
+
+
+FORMAT = MeshFormat(_read, _write, has_unit=True, has_colours=True)
