@@ -52,7 +52,7 @@ def description() -> tuple[str, str, str]:
 
 @lru_cache(maxsize=1)
 def toolchain() -> str:
-    """Return the key of everything that machine code depends on besides the linked text."""
+    """Return the key of everything that machine code depends on besides the functions."""
     own = texts(*(path for name in TRANSLATORS for path in sorted((PACKAGE / name).glob("*.py"))))
     return key(own, description(), llvmlite.__version__)
 
