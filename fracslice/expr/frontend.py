@@ -16,7 +16,7 @@ import operator
 import re
 import textwrap
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache, reduce
 from types import FunctionType
 from typing import Any, NoReturn
@@ -57,15 +57,19 @@ class Source:
     """Text of a function, and what it sees outside."""
 
     name: str
+    names: tuple[str, ...]  # of its arguments
+    identity: str
     place: str  # file and kind, for errors, with braces for the line
     tree: Callable[[], ast.FunctionDef]
     scope: Callable[[], Mapping[str, Any]]
+    is_written: bool = False  # whether it is written for a kernel, by code
 
     @classmethod
     def of(cls, function: Callable[..., Any], kind: str) -> Source:
         """Source of a function of Python."""
         place = f"{function.__code__.co_filename}:{{}}: {kind} {function.__name__}: "
-        return cls(function.__name__, place, lambda: syntax(function), lambda: scope(function))
+        names, about = tuple(parameters(function)), identity(function)
+        return cls(function.__name__, names, about, place, lambda: syntax(function), lambda: scope(function))
 
     def error(self, node: Any, message: str) -> KernelError:
         """Error about a statement or an expression."""
@@ -102,12 +106,14 @@ def syntax(function: Callable[..., Any]) -> ast.FunctionDef:
     return tree
 
 
-def formula(function: Callable[..., Any], fixed: Fixed = ()) -> Function:
+def formula(function: Callable[..., Any] | Function, fixed: Fixed = ()) -> Function:
     """Return a function in the language of formulas with some arguments fixed.
 
     When it is compiled or evaluated, it is read, and refused with a `KernelError` if it is not in the
     language.
     """
+    if isinstance(function, Function):
+        return _read_again(function, fixed) if fixed else function
     return _function(FormulaReader, function, fixed, function.__name__, _mark(function, fixed))
 
 
@@ -126,16 +132,55 @@ def _function(
     kind: type[Reader], function: Callable[..., Any], fixed: Fixed, name: str, _: object
 ) -> Function:
     """Function that a reader reads, cached."""
-    known, source = dict(fixed), Source.of(function, kind.kind)
-    names = tuple(name for name in parameters(function) if name not in known)
-    about = identified(kind.__name__, identity(function, *known.values()), *known)
+    about = identity(function, *(value for _, value in fixed))
+    return source_function(kind, replace(Source.of(function, kind.kind), name=name, identity=about), fixed)
+
+
+@lru_cache(maxsize=256)
+def _read_again(function: Function, fixed: Fixed) -> Function:
+    """Function whose text is written, with some arguments fixed."""
+    about = identified(function.source.identity, *(repr(value) for _, value in fixed))
+    return source_function(FormulaReader, replace(function.source, identity=about), fixed)
+
+
+def source_function(kind: type[Reader], source: Source, fixed: Fixed, **given: Any) -> Function:
+    """Return the function of a source.
+
+    `kind`: its reader, which takes what is `given`, of text identities.
+    """
+    known = dict(fixed)
+    names = tuple(name for name in source.names if name not in known)
 
     def read(width: Width) -> Graph:
-        reader = kind(width, source=source, fixed=known)
+        reader = kind(width, source=source, fixed=known, **given)
         reader.begin(names)
         return reader.read()
 
-    return Function(name, names, about, read, source.error, function)
+    about = identified(kind.__name__, source.identity, *known, *map(str, given.values()))
+    return Function(source.name, names, about, read, source.error, source)
+
+
+def text_function(
+    name: str, names: Sequence[str], lines: Sequence[str], called: Mapping[str, Function]
+) -> Function:
+    """Return the function of some lines, which are written for a kernel.
+
+    `called`: functions that they may call, by name.
+    """
+    text = "\n    ".join([f"def {name}({', '.join(names)}):", *lines])
+    functions = {word: called[word] for word in dict.fromkeys(_WORD.findall(text)) if word in called}
+    about, place = identified(text, *functions.values()), f"<{name}>:{{}}: "
+    source = Source(name, tuple(names), about, place, lambda: _parsed(text), lambda: functions, True)
+    return source_function(FormulaReader, source, ())
+
+
+_WORD = re.compile(r"[A-Za-z_]\w*")
+
+
+def _parsed(text: str) -> ast.FunctionDef:
+    (tree,) = parse(text).body
+    assert isinstance(tree, ast.FunctionDef)
+    return tree
 
 
 @dataclass
@@ -554,12 +599,9 @@ class FormulaReader(Reader):
     kind = "formula"
 
     def read(self) -> Graph:
-        self.check()
+        source = self.source
+        self.points = set() if source.is_written else check(source.tree(), source.scope(), source.error)
         return super().read()
-
-    def check(self) -> None:
-        """Check that the function is in the language."""
-        self.points = check(self.source.tree(), self.source.scope(), self.source.error)
 
     def binary(self, node: ast.expr, op: str, a: Value, b: Value) -> Value:
         """An operator; remainders and floored quotients of points are those of Python."""
@@ -580,40 +622,3 @@ class FormulaReader(Reader):
 
     def expression(self, node: ast.expr) -> None:
         """The mark of a step of an orbit, which only some readers use."""
-
-
-@dataclass
-class TextReader(FormulaReader):
-    """Reads text that is written for a kernel."""
-
-    def check(self) -> None:
-        self.points = set()
-
-
-def text_function(
-    name: str, names: Sequence[str], lines: Sequence[str], called: Mapping[str, Function]
-) -> Function:
-    """Return the function of some lines.
-
-    `called`: functions that they may call, by name.
-    """
-    text = "\n    ".join([f"def {name}({', '.join(names)}):", *lines])
-    used = [word for word in dict.fromkeys(_WORD.findall(text)) if word in called]
-    functions = {word: called[word] for word in used}
-    source = Source(name, f"<{name}>:{{}}: ", lambda: _parsed(text), lambda: functions)
-
-    def read(width: Width) -> Graph:
-        reader = TextReader(width, source=source)
-        reader.begin(names)
-        return reader.read()
-
-    return Function(name, tuple(names), identified(text, *functions.values()), read, source.error)
-
-
-_WORD = re.compile(r"[A-Za-z_]\w*")
-
-
-def _parsed(text: str) -> ast.FunctionDef:
-    (tree,) = parse(text).body
-    assert isinstance(tree, ast.FunctionDef)
-    return tree

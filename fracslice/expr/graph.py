@@ -29,6 +29,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+from . import vocabulary
+
 ARITHMETIC = frozenset(("add", "sub", "mul", "truediv"))
 COMPARISONS = frozenset(("lt", "le", "gt", "ge", "eq", "ne"))
 WHOLE_ONLY = frozenset(("floordiv", "mod", "xor", "lshift", "rshift"))
@@ -121,8 +123,12 @@ class Function:
     identity: str  # of everything that it is made of
     read: Callable[[Width], Graph]
     fail: Callable[[Any, str], Exception]  # error about a statement of it
-    python: Any = None  # what it is read from
+    source: Any = None  # what it is read from
     _graphs: dict[Width, Graph] = field(default_factory=dict)
+
+    def __call__(self, *given: Any) -> Any:
+        """Evaluate the function on NumPy arrays."""
+        return _ON_ARRAYS(self, *given)
 
     def graph(self, width: Width) -> Graph:
         """Return the body for a number of lanes."""
@@ -386,6 +392,14 @@ class Evaluator:
 _OPERATIONS: dict[str, Callable[..., Any]] = {name: getattr(operator, name) for name in BINARY | UNARY} | {
     "element": operator.getitem, "set": operator.setitem, "truth": bool, "int": int, "min": min, "max": max
 }  # fmt: skip
+
+
+ON_ARRAYS: Mapping[str, Callable[..., Any]] = {
+    name: getattr(vocabulary, name) for name in vocabulary.NAMES | vocabulary.OF_CELLS
+}
+"""The vocabulary on arrays."""
+
+_ON_ARRAYS = Evaluator(ON_ARRAYS)
 
 
 def text(*functions: Function, width: Width = ARRAYS) -> str:

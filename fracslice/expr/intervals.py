@@ -11,15 +11,15 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import reduce
-from types import FunctionType
 from typing import Any
 
 import numpy as np
 
 from . import vocabulary
+from .graph import ON_ARRAYS, Evaluator
 
 Bound = Any
 """Lanes or NumPy array."""
@@ -341,8 +341,8 @@ def _on_arrays(value: Any) -> Interval:
     return value if isinstance(value, Interval) else Interval.at(np.asarray(value, np.float64), ARRAYS)
 
 
-def on_intervals(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function in the language of formulas that takes intervals."""
-    assert isinstance(function, FunctionType)
-    names = vocabulary.NAMES | vocabulary.OF_CELLS
-    return FunctionType(function.__code__, {name: on_cells(name) for name in names})
+ON_CELLS: Mapping[str, Callable[..., Any]] = {name: on_cells(name) for name in ON_ARRAYS}
+"""The vocabulary on intervals."""
+
+evaluate_on_cells = Evaluator(ON_CELLS)
+"""Evaluates a function of the language on intervals."""

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ..expr import functions
-from ..expr.intervals import ARRAYS, Interval, on_intervals
+from ..expr.graph import Function
+from ..expr.intervals import ARRAYS, Interval, evaluate_on_cells
 from .box import Corners, undecided_cells
 from .orbit_code import R2, Round, function_of_text
 
@@ -76,8 +76,8 @@ def least_size(
     `values`: those of the arguments of the steps, and squares of the radii where orbits stop.
     The bound is huge where all orbits stop.
     """
-    function = on_intervals(_last_size(steps, first))
-    given = [values[name] for name in functions.parameters(function)[9:]]
+    function = _last_size(steps, first)
+    given = [values[name] for name in function.parameters[9:]]
 
     def least(lo: Corners, hi: Corners, far: np.ndarray) -> np.ndarray:
         constants = Interval.at(far if size is None else np.full_like(far, size), ARRAYS)
@@ -88,7 +88,7 @@ def least_size(
         middle = (Interval.at(m, ARRAYS).outward() for m in (lo + hi) / 2)
         reach = Interval.at(np.sqrt(((hi - lo) ** 2).sum(0)) / 2, ARRAYS).outward(4)
         with np.errstate(all="ignore"):
-            bound = function(*box, *middle, reach, constants, UNIT, *given)
+            bound = evaluate_on_cells(function, *box, *middle, reach, constants, UNIT, *given)
         return np.broadcast_to(bound.lo, far.shape)
 
     return least
@@ -108,7 +108,7 @@ def constant_stretch(steps: Round, first: int, values: Mapping[str, Any]) -> flo
     return product * (1 + MARGIN)
 
 
-def _last_size(steps: Round, first: int) -> Callable[..., Any]:
+def _last_size(steps: Round, first: int) -> Function:
     """Write the function of |w| at the end of a round, from a box and a ball around w.
 
     The box x, y, z is the image by intervals. The ball around mx, my, mz grows by the stretch over the box;

@@ -15,7 +15,8 @@ from typing import Any, cast
 import numpy as np
 
 from ..expr import functions
-from ..expr.intervals import Interval, on_intervals
+from ..expr.graph import Function
+from ..expr.intervals import Interval, evaluate_on_cells
 from . import orbit_code
 from .box import Box, possible_cells, proved_half
 from .escape import CORE, levels
@@ -344,7 +345,7 @@ def _half(
     """
     function = field(steps, Form(bound.by_power, bound.scaled))
     own = {**arguments(steps, bound, iterations), **values}
-    given = [own[name] for name in functions.parameters(function)[3:]]
+    given = [own[name] for name in function.parameters[3:]]
 
     def evaluate(points: np.ndarray) -> np.ndarray:
         with np.errstate(all="ignore"):
@@ -384,7 +385,7 @@ MIDDLE = [f"m{v} = cell_middle({v})" for v in "xyz"]
 REACH = [*(f"e{v} = cell_extent({v})" for v in "xyz"), "reach = sqrt(ex * ex + ey * ey + ez * ez)"]
 
 
-def sign(steps: Round, scaled: bool) -> Callable[..., Any]:
+def sign(steps: Round, scaled: bool) -> Function:
     """Write the function of ``|w_N|^2 - R^2`` where an orbit does not stop before, else of 1.
 
     Of a cell, it follows a box and a ball around the image of its middle; each holds the images of all
@@ -394,7 +395,7 @@ def sign(steps: Round, scaled: bool) -> Callable[..., Any]:
 
 
 @lru_cache(maxsize=256)
-def _sign(steps: Round, scaled: bool, _: object) -> Callable[..., Any]:
+def _sign(steps: Round, scaled: bool, _: object) -> Function:
     given, setup, loop = [], [], []
     for place, code in enumerate(steps):
         given += [*code.arguments(place), f"stop{place}"]
@@ -484,11 +485,11 @@ def proved_box(steps: Round, values: tuple[tuple[str, Any], ...], grown: Growth,
     signed = sign_arguments(steps, grown, iterations)
     if signed is None:
         return Box.centred(radius)
-    enclosed, own = on_intervals(sign(steps, grown.scaled)), {**signed, **dict(values)}
-    given = [own[name] for name in functions.parameters(enclosed)[3:]]
+    function, own = sign(steps, grown.scaled), {**signed, **dict(values)}
+    given = [own[name] for name in function.parameters[3:]]
 
     def outside(*cells: Interval) -> Interval:
         with np.errstate(all="ignore"):
-            return cast("Interval", enclosed(*cells, *given))
+            return cast("Interval", evaluate_on_cells(function, *cells, *given))
 
     return Box.centred(*proved_half(outside, radius, grown.half))

@@ -23,8 +23,7 @@ import numpy as np
 
 from ..common.parameters import AUTO
 from ..errors import KernelError
-from ..expr import functions
-from ..expr.frontend import FormulaReader, Source, formula, text_function
+from ..expr.frontend import FormulaReader, formula, text_function
 from ..expr.functions import Fixed, InMemory, words
 from ..expr.graph import Function, Graph, Program, Value, Width, Writer, identified, written
 from ..expr.language import CHILD
@@ -110,7 +109,7 @@ def append_numbers(value: Any, numbers: list[float]) -> Passed:
 class Arguments:
     """Function of a node and its arguments."""
 
-    function: Callable[..., Any]  # function of the formula
+    function: Callable[..., Any] | Function  # function of the formula
     fixed: tuple[tuple[str, Any], ...]  # arguments that are known when the function is read
     passed: tuple[Passed, ...]  # places of the other arguments, in the function's order
     numbers: tuple[float, ...]  # numbers in P
@@ -129,13 +128,14 @@ class Arguments:
 def arguments(node: Node, leading: int) -> Arguments:
     """Return the function of a node and its arguments."""
     function, values = node.function, node.arguments
-    names = functions.parameters(function)[leading:]
+    whole = formula(function)
+    names = whole.parameters[leading:]
     if set(names) != set(values):
-        place = f"{function.__code__.co_filename}:{function.__code__.co_firstlineno}"
         wanted, given = (", ".join(s) or "nothing" for s in (values, names))
+        code = function.__code__
         raise KernelError(
-            f"{place}: formula {node.formula.name}: expected {function.__name__} to take {wanted} "
-            f"after its points, found {given}"
+            f"{code.co_filename}:{code.co_firstlineno}: formula {node.formula.name}: expected "
+            f"{whole.name} to take {wanted} after its points, found {given}"
         )
     fixed = tuple((name, values[name].value) for name in names if isinstance(values[name], Fixed))
     numbers: list[float] = []
@@ -399,8 +399,8 @@ def domain_function(kind: type[DomainReader], name: str, given: Arguments, child
 
     `kind`: its reader.
     """
-    source, known = Source.of(given.function, "formula"), dict(given.fixed)
-    rest = [a for a in functions.parameters(given.function)[4:] if a not in known]
+    source, known = formula(given.function).source, dict(given.fixed)
+    rest = given.read.parameters[4:]
 
     def read(width: Width) -> Graph:
         reader = kind(width, source=source, fixed=known, child=child)

@@ -13,14 +13,15 @@ across a tear of a step.
 from __future__ import annotations
 
 import ast
-import linecache
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass
 from functools import lru_cache
 from typing import Any
 
-from ..expr import functions, vocabulary
+from ..expr import functions
+from ..expr.frontend import formula, text_function
 from ..expr.functions import identity
+from ..expr.graph import Function
 from ..expr.host import kept_text
 from ..expr.language import parse_expression
 from .escape import potential_distance, sure_distance
@@ -205,13 +206,13 @@ class Form:
         return self.by_power and self.critical and code.is_fixed(0)
 
 
-def field(steps: Round, form: Form) -> Callable[..., Any]:
+def field(steps: Round, form: Form) -> Function:
     """Write the function of an orbit's field."""
     return _field(steps, form, tuple(functions.fingerprint(code.step) for code in steps))
 
 
 @lru_cache(maxsize=256)
-def _field(steps: Round, form: Form, _: object) -> Callable[..., Any]:
+def _field(steps: Round, form: Form, _: object) -> Function:
     given, setup, loop = [], [], []
     by_power, scaled = form.by_power, form.scaled
     for place, code in enumerate(steps):
@@ -276,16 +277,8 @@ def indent_lines(lines: Sequence[str]) -> list[str]:
     return [f"    {line}" for line in lines]
 
 
-def function_of_text(steps: Round, arguments: Sequence[str], body: Sequence[str]) -> Callable[..., Any]:
-    """Make a function of written text, which tracebacks and the linker can read."""
+def function_of_text(steps: Round, arguments: Sequence[str], body: Sequence[str]) -> Function:
+    """Return the function of written lines."""
     name = "_".join(code.step.__name__.strip("_") for code in steps)[:60]
-    text = "\n    ".join([f"def {name}({', '.join(arguments)}):", *body]) + "\n"
-    file = f"<orbit {name} {abs(hash((steps, text))):x}>"
-    scope: dict[str, Any] = {
-        n: getattr(vocabulary, n) for n in (*vocabulary.NAMES, *vocabulary.OF_CELLS, "orbit")
-    }
-    scope |= {"potential_distance": potential_distance, "sure_distance": sure_distance}
-    exec(compile(text, file, "exec"), scope)
-    linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
-    function: Callable[..., Any] = scope[name]
-    return function
+    called = {function.__name__: formula(function) for function in (potential_distance, sure_distance)}
+    return text_function(name, arguments, body, called)

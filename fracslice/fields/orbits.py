@@ -9,6 +9,7 @@ import numpy as np
 
 from ..common.parameters import AUTO, Count, Parameter, Vector
 from ..expr.functions import Fixed
+from ..expr.graph import Function
 from .algebra import affine, inverse, product, stretches
 from .box import Box
 from .growth import Growth, arguments, growth, proved_box, sign, sign_arguments
@@ -148,11 +149,10 @@ def orbit_bounds(node: Node) -> Box:
 def orbit_arguments(node: Node) -> dict[str, object]:
     made, values = steps(node)
     own = {**arguments(made, growth_of(node), node["iterations"]), **values}
-    code = orbit_select(node).__code__
-    return {name: own[name] for name in code.co_varnames[3 : code.co_argcount]}
+    return {name: own[name] for name in orbit_select(node).parameters[3:]}
 
 
-def orbit_sign(node: Node) -> tuple[Callable[..., Any], dict[str, object]] | None:
+def orbit_sign(node: Node) -> tuple[Function, dict[str, object]] | None:
     code, values = steps(node)
     grown_by = growth_of(node)
     own = sign_arguments(code, grown_by, node["iterations"])
@@ -166,7 +166,7 @@ def orbit_proved_bounds(node: Node) -> Box:
     return proved_box(code, tuple(values.items()), growth_of(node), rounds(node))
 
 
-def escape_sign(node: Node, radius: float, escape2: float) -> tuple[Callable[..., Any], dict[str, object]]:
+def escape_sign(node: Node, radius: float, escape2: float) -> tuple[Function, dict[str, object]]:
     """Function with the sign of an escape-time fractal's field, and its arguments.
 
     `escape2`: square of the radius where its orbits stop.
@@ -176,7 +176,7 @@ def escape_sign(node: Node, radius: float, escape2: float) -> tuple[Callable[...
     return sign(code, False), {**own, **values}
 
 
-def orbit_select(node: Node) -> Callable[..., Any]:
+def orbit_select(node: Node) -> Function:
     code = steps(node)[0]
     return field(code, growth_of(node).form(code, node.is_conservative))
 

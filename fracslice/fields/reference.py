@@ -9,20 +9,12 @@ import numpy as np
 
 from ..expr import vocabulary
 from ..expr.functions import words
-from ..expr.graph import Evaluator
-from ..expr.intervals import Interval, enclosed, on_cells
+from ..expr.graph import ON_ARRAYS, Evaluator
+from ..expr.intervals import ON_CELLS, Interval, enclosed
 from .linker import FIELD, link
 
 if TYPE_CHECKING:
     from .node import Node
-
-ON_ARRAYS: Mapping[str, Callable[..., Any]] = {
-    name: getattr(vocabulary, name) for name in vocabulary.NAMES | vocabulary.OF_CELLS
-}
-"""The vocabulary on arrays."""
-
-ON_CELLS: Mapping[str, Callable[..., Any]] = {name: on_cells(name) for name in ON_ARRAYS}
-"""The vocabulary on intervals."""
 
 
 def reference(root: Node) -> Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]:

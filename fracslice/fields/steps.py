@@ -23,7 +23,7 @@ from typing import Any, cast
 
 from ..errors import KernelError
 from ..expr import functions, graph
-from ..expr.frontend import FormulaReader, Source
+from ..expr.frontend import FormulaReader, Source, source_function
 from ..expr.functions import EVALUATED
 from ..expr.graph import MismatchError
 from ..expr.language import parse, parse_expression
@@ -528,15 +528,8 @@ def step_function(
     function: Callable[..., Any], sizes: Mapping[str, int], fixed: Mapping[str, Any]
 ) -> graph.Function:
     """Return the function of a step or of a verb; `sizes`: numbers of components of its arguments."""
-    source = Source.of(function, "step")
-    names = tuple(name for name in functions.parameters(function) if name not in fixed)
-
-    def read(width: graph.Width) -> graph.Graph:
-        reader = StepReader(width, source=source, fixed=dict(fixed), sizes=sizes)
-        reader.begin(names)
-        return reader.read()
-
-    return graph.Function(function.__name__, names, "", read, source.error, Verb(function, fixed))
+    made = source_function(StepReader, Source.of(function, "step"), tuple(fixed.items()), sizes=sizes)
+    return replace(made, source=Verb(function, fixed))
 
 
 @dataclass(frozen=True, eq=False)
@@ -661,7 +654,7 @@ class _Follower(graph.Evaluator):
 
     # --- calls ---
     def called(self, function: graph.Function, given: list[Value]) -> Value:
-        value, verb = self(function, *given), function.python
+        value, verb = self(function, *given), function.source
         if not (isinstance(value, tuple) and len(value) == 2 and isinstance(value[0], Vector3)):
             return value
         if not (given and isinstance(given[0], Vector3)):

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ..expr import functions
-from ..expr.frontend import FormulaReader, Source, formula
-from ..expr.graph import Function, Graph, Value, Width, Writer, identified
+from ..expr.frontend import FormulaReader, formula, source_function
+from ..expr.graph import Function, Graph, Value, Writer, identified
 from ..expr.vocabulary import absolute, atan2, minimum, sqrt, where
 from ..fields.linker import (
     Arguments,
@@ -261,18 +261,13 @@ class TraceDialect(FieldDialect):
         return domain_function(PaintReader, name, given, runs[0])
 
 
-def trapped(function: Callable[..., Any], fixed: tuple[tuple[str, Any], ...], trap: str) -> Function:
+def trapped(
+    function: Callable[..., Any] | Function, fixed: tuple[tuple[str, Any], ...], trap: str
+) -> Function:
     """Return the function of a shape that returns its field and the running value of an orbit's trap."""
-    source, plain = Source.of(function, "formula"), formula(function, fixed)
-    updating = formula(_TRAPS[trap][1])
-
-    def read(width: Width) -> Graph:
-        reader = TrapReader(width, source=source, fixed=dict(fixed), trap=trap)
-        reader.begin(plain.parameters)
-        return reader.read()
-
-    about = identified("trap", _TRAPS[trap][0], plain, updating)
-    return Function(f"{plain.name}_{trap}", plain.parameters, about, read, source.error)
+    plain = formula(function, fixed)
+    about = identified(plain, _TRAPS[trap][0], formula(_TRAPS[trap][1]))
+    return source_function(TrapReader, replace(plain.source, identity=about), fixed, trap=trap)
 
 
 TEXELS = 1024 * 1024

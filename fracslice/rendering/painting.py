@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import from_linear
-from ..expr.graph import Evaluator, Function
+from ..expr.graph import ON_ARRAYS, Evaluator, Function
 from ..fields.linker import Linker, link_tree
-from ..fields.reference import ON_ARRAYS
 from ..fields.registry import Node
 from ..formulas.material import material
 from ..work import Work, chunks

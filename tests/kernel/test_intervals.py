@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fracslice.expr.graph import Evaluator
+from fracslice.expr.graph import ON_ARRAYS, Evaluator
 from fracslice.expr.intervals import ARRAYS, Interval
 from fracslice.expr.loops import enclosures
 from fracslice.fields.box import Box
@@ -15,7 +15,7 @@ from fracslice.fields.cpu import compile_loops, compile_scene
 from fracslice.fields.depth import resolve_depths
 from fracslice.fields.field import Precision
 from fracslice.fields.linker import FIELD, link
-from fracslice.fields.reference import ON_ARRAYS, enclosure
+from fracslice.fields.reference import enclosure
 from fracslice.fields.tree import Enclosures
 from fracslice.formulas import Node, gyroid, mandelbox, mandelbulb, menger, sphere
 from tests.examples import EXAMPLES, OF_FILES, stamped

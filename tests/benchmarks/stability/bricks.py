@@ -9,10 +9,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fracslice.expr.graph import Evaluator
+from fracslice.expr.graph import ON_ARRAYS, Evaluator
 from fracslice.fields.cpu import compile_scene
 from fracslice.fields.linker import FIELD, link
-from fracslice.fields.reference import ON_ARRAYS
 from fracslice.formulas import Node
 from fracslice.volume import Lattice, sample
 from fracslice.volume.bricks import INSIDE, Bricks
