@@ -65,10 +65,10 @@ class Source:
     is_written: bool = False  # whether it is written for a kernel, by code
 
     @classmethod
-    def of(cls, function: Callable[..., Any], kind: str) -> Source:
-        """Source of a function of Python."""
+    def of(cls, function: Callable[..., Any], kind: str, *known: Any) -> Source:
+        """Source of a function of Python; `known`: arguments that are part of its identity."""
         place = f"{function.__code__.co_filename}:{{}}: {kind} {function.__name__}: "
-        names, about = tuple(parameters(function)), identity(function)
+        names, about = tuple(parameters(function)), identity(function, *known)
         return cls(function.__name__, names, about, place, lambda: syntax(function), lambda: scope(function))
 
     def error(self, node: Any, message: str) -> KernelError:
@@ -113,7 +113,7 @@ def formula(function: Callable[..., Any] | Function, fixed: Fixed = ()) -> Funct
     language.
     """
     if isinstance(function, Function):
-        return _read_again(function, fixed) if fixed else function
+        return _read_again(function, fixed, repr(fixed)) if fixed else function
     return _function(FormulaReader, function, fixed, function.__name__, _mark(function, fixed))
 
 
@@ -132,14 +132,14 @@ def _function(
     kind: type[Reader], function: Callable[..., Any], fixed: Fixed, name: str, _: object
 ) -> Function:
     """Function that a reader reads, cached."""
-    about = identity(function, *(value for _, value in fixed))
-    return source_function(kind, replace(Source.of(function, kind.kind), name=name, identity=about), fixed)
+    source = Source.of(function, kind.kind, *(value for _, value in fixed))
+    return source_function(kind, replace(source, name=name), fixed)
 
 
 @lru_cache(maxsize=256)
-def _read_again(function: Function, fixed: Fixed) -> Function:
-    """Function whose text is written, with some arguments fixed."""
-    about = identified(function.source.identity, *(repr(value) for _, value in fixed))
+def _read_again(function: Function, fixed: Fixed, text: str) -> Function:
+    """Function whose text is written, with some arguments fixed; see `_mark`."""
+    about = identified(function.source.identity, text)
     return source_function(FormulaReader, replace(function.source, identity=about), fixed)
 
 
