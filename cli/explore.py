@@ -60,7 +60,7 @@ def explore(given: ExploreOptions) -> None:
     fracslice explore quaternion-julia -o sheet.png --spread 0.5
     fracslice explore sheet/07.xml -o next.png --seed 1
     """
-    from fracslice.scene.overrides import varied
+    from fracslice.scene.layout import varied
 
     target, count = Path(given.output), given.count
     check_targets(given.source, given.output)

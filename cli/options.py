@@ -418,8 +418,7 @@ def write_page(
 
     from fracslice.checks.problems import verdict
     from fracslice.common.files import replacing
-    from fracslice.export.page import page
-    from fracslice.slicing.preview import worst_layers
+    from fracslice.slicing.preview import page, worst_layers
 
     with io.BytesIO() as picture, replacing(path) as file:
         worst_layers(stack, report.worst, picture, work)

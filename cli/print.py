@@ -54,8 +54,7 @@ def print_(given: SlicerOptions) -> int:
     fracslice print my.xml -o my.gcode --profile my.ini --size 8cm --voxel 0.25mm
     """
     from fracslice.common.files import temporary_folder
-    from fracslice.export.sending import printer_address, send
-    from fracslice.export.slicers import SECONDS, SLICERS
+    from fracslice.export.sending import SECONDS, SLICERS, printer_address, send
     from fracslice.jobs.mesh import make_mesh
 
     chosen, output, address = SLICERS[given.slicer], given.output, given.address

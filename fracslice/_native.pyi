@@ -353,7 +353,7 @@ def open_edges(ijk: NDArray[int32], values: NDArray[float32], index: NDArray[int
 def edge_topology(
     triangles: NDArray[int32], counted: NDArray[bool_], threads: int = 0
 ) -> tuple[int, int, int, int, int]:
-    """See `fracslice.mesh.topology.edge_ends`."""
+    """See `fracslice.mesh.spatial.edge_ends`."""
 
 def corners_by_vertex(
     triangles: NDArray[int32], vertices: int, threads: int = 0
@@ -375,7 +375,7 @@ def component_sizes(
     count: int,
     threads: int = 0,
 ) -> tuple[NDArray[float64], NDArray[float64], NDArray[float64], NDArray[int32], NDArray[int64]]:
-    """See `fracslice.mesh.topology.component_sizes`."""
+    """See `fracslice.mesh.spatial.component_sizes`."""
 
 def turned(
     vertices: NDArray[float64], triangles: NDArray[int32], frame: tuple[float, Point, float], threads: int = 0

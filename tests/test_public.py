@@ -19,9 +19,7 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
     "name",
     [
         "fracslice",
-        "fracslice.api.meshing",
-        "fracslice.api.pictures",
-        "fracslice.api.slices",
+        "fracslice.api.calls",
         "fracslice.fields.node",
         "fracslice.mesh.model",
         "fracslice.common.messages",

@@ -2,8 +2,7 @@
 
 from .encode import ENDINGS, check_film, encode, sheet_frames
 from .film import FilmJob, write_frames
-from .flight import with_flight
-from .timeline import Timeline
+from .timeline import Timeline, with_flight
 
 __all__ = [
     "ENDINGS",

@@ -25,8 +25,8 @@ from ..fields.depth import resolve_depths
 from ..fields.devices import choose_device
 from ..fields.registry import Node
 from ..rendering import Renderer, develop, picture
+from ..rendering.accumulator import SampleRange
 from ..rendering.progressive import layers
-from ..rendering.sequence import SampleRange
 from ..rendering.setup import DETAIL, default_lights, footprint, surroundings
 from ..scene import reads, to_xml
 from ..scene.model import Scene

@@ -1,5 +1,7 @@
 """Methods that are compared, the solids that they mesh, and one measurement in its own process:
 ``python -m fracslice.bench.measure``, JSON in, JSON out.
+
+Input: {"workload", "resolution"} and either {"method", "threads"}, or {"mesh"}, the file written by a peer.
 """
 
 from __future__ import annotations

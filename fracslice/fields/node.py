@@ -327,7 +327,7 @@ class Operators:
         >>> sphere(0.5).distance([[0, 0, 0], [2, 0, 0]])
         array([-0.5,  1.5])
         """
-        from ..api.meshing import distance
+        from ..api.calls import distance
 
         return distance(cast("Node", self), points)
 

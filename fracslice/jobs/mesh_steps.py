@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..mesh.checks import Tally, nearest, surface_to_mesh
 from ..mesh.cleaning import SelectedPiece, finished_piece, grid_planes, place_and_round
 from ..mesh.contouring import BLUNT, Piece, SurfaceContours, contour_whole
-from ..mesh.model import Mesh
+from ..mesh.model import Mesh, choose
 from ..mesh.pieces import HEAD, TAIL, Pieces, gather_rows
 from ..mesh.shells import (
     NearBodies,
@@ -30,7 +30,6 @@ from ..mesh.shells import (
     levels,
 )
 from ..mesh.tips import Late, Pointed, PointedPiece, pointed_in, without_tips
-from ..mesh.topology import choose
 from ..records import PIECES
 from ..scene import Print
 from ..store import Arrays
@@ -42,7 +41,7 @@ if TYPE_CHECKING:
     from ..mesh import Mesh
     from ..mesh.checks import MeshReport
     from ..mesh.cleaning import Finished, Frame
-    from ..mesh.topology import Removed
+    from ..mesh.model import Removed
     from ..volume import Plan, SignBricks
     from .surfaces import Surface
 

@@ -20,10 +20,8 @@ from ..fields.devices import for_picture
 from ..fields.registry import Node
 from ..records import RenderJob
 from ..rendering import Pass, Renderer
-from ..rendering.accumulator import COUNT, COVER, GOAL, HostAccumulator
-from ..rendering.crops import BYTES, MARGIN, Crop
-from ..rendering.progressive import layer, layers
-from ..rendering.sequence import SampleRange
+from ..rendering.accumulator import COUNT, COVER, GOAL, HostAccumulator, SampleRange
+from ..rendering.progressive import BYTES, MARGIN, Crop, layer, layers
 from ..rendering.units.pixel import UNKNOWN, squared_error
 from ..scene import Scene
 from ..scene.view import View

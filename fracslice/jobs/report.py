@@ -22,9 +22,9 @@ from ..work import Work
 if TYPE_CHECKING:
     from ..fields.field import Field
     from ..mesh.checks import MeshReport
+    from ..mesh.model import Removed
     from ..mesh.refine import Refined
     from ..mesh.simplify import Simplified
-    from ..mesh.topology import Removed
     from ..volume import Bricks, Plan
     from ..volume.amount import Amount
 

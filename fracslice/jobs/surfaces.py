@@ -51,7 +51,7 @@ def plan_mesh(scene: Scene, what: MeshJob, size: Sizing, clock: Clock) -> Sized:
         root = orient_field(scene.root, what.up, size.stretch, clock.work)
         made = plan(root, what.voxels(size.longest), clock.work)
         if how.bodies is not None:
-            from ..printing.framing import frame_bodies
+            from ..printing.edits import frame_bodies
 
             made = frame_bodies(made, size, how.bodies, clock.work)
     if not how.whole:

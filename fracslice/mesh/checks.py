@@ -96,7 +96,7 @@ def check_mesh(mesh: Mesh, *, threads: int | None = None) -> MeshReport:
     """
     from .._native import connected_components
     from .cleaning import Finished
-    from .topology import component_sizes
+    from .model import component_sizes
 
     if not len(mesh.triangles):
         raise MeshError("the mesh has no triangles")
@@ -165,8 +165,8 @@ class Tally:
 
     def add(self, piece: Finished) -> None:
         """Add a piece."""
+        from .model import edge_ends
         from .spatial import self_intersecting_triangles
-        from .topology import edge_ends
 
         mesh, passed = piece.mesh, piece.passed
         ends = edge_ends(mesh.triangles, piece.counted, self.threads)

@@ -18,9 +18,8 @@ from ..common.messages import format_count, lacking
 from ..errors import MeshError
 from .checks import MeshReport, check_mesh
 from .cleaning import quantise_mesh
-from .model import Mesh
+from .model import Mesh, component_sizes
 from .shells import nesting
-from .topology import component_sizes
 
 LARGEST = 1 << 20
 """Most edges of a hole that is closed: all there are."""

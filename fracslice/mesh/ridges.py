@@ -23,12 +23,11 @@ from ..work import Work
 from .cleaning import quantise, used_vertices
 from .contouring import BLUNT, Piece
 from .fit import OFF, UPRIGHT, Fit
-from .model import Mesh
+from .model import Mesh, component_sizes
 from .pieces import Pieces, rows
 from .refine import Edges, edges_of, on_creases, on_three, split_edges, with_neighbours
 from .spatial import Nearest, self_intersecting_triangles
 from .tips import Cap, heights, replace_by_fans, spans, tips_to_end
-from .topology import component_sizes
 
 APART = 5e-5
 """Distance between vertices, voxels, below which rounding may join them; contouring keeps twice that."""

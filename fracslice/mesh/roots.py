@@ -1,4 +1,16 @@
-"""Roots of a field on many segments at once: loops for lanes of a CPU and threads of a GPU."""
+"""Roots of a field on many segments at once: loops for lanes of a CPU and threads of a GPU.
+
+P holds the parameters of the scene. X, Y and Z hold n points, scene units, or the starts of n segments; then
+DX, DY and DZ hold the vectors to their ends. n is a multiple of WIDTH.
+
+Entries of FRAME: 0: reciprocal of the voxel size. 1: |f| in voxels at which a root is accepted. 2: remaining
+bracket, as a fraction of the segment, at which a root is accepted. 3: step of the finite differences, scene
+units. 4: distance that counts as no clearance, scene units. 5: length of the last step, as a fraction of the
+segment.
+
+A segment is six rows: its start, and the vector to its end; a root is a fraction t of it. Each lane is
+independent: its result does not depend on its neighbours or on the order of the segments.
+"""
 
 from __future__ import annotations
 

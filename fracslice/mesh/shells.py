@@ -21,9 +21,8 @@ from ..errors import MeshError
 from ..fields.depth import WIDE
 from ..records import JOINING, PIECES
 from ..work import ahead
-from .model import Mesh
+from .model import Mesh, Shells
 from .pieces import Pieces, gather_rows, near_plane, rows
-from .topology import Shells
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +188,7 @@ def components(
     Returns int32 (n,).
     """
     from .._native import connected_components
-    from .topology import component_sizes
+    from .model import component_sizes
 
     labels, count = connected_components(mesh.triangles, len(mesh.vertices), threads)
     sizes = component_sizes(mesh.vertices, mesh.triangles, labels, count, threads)

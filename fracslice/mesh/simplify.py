@@ -18,9 +18,8 @@ from ..common.parameters import Number, validate_value
 from ..errors import MeshError
 from ..scene import parse_length
 from ..work import Work, chunks
-from .model import Mesh
+from .model import Mesh, component_sizes
 from .spatial import Nearest, build, self_intersecting_triangles
-from .topology import component_sizes
 
 ROUNDS, PATIENT = 200, 40
 """Maximum rounds of verification and undo, and number of the first rounds in which new collapses may replace
@@ -53,7 +52,7 @@ def simplify(mesh: Mesh, tolerance: float, work: Work | None = None) -> tuple[Me
 
     `mesh` in mm; `tolerance`: maximum distance between both surfaces: mm, for example "0.02mm".
     """
-    from .topology import edge_topology
+    from .model import edge_topology
 
     work = work or Work()
     if isinstance(tolerance, str):

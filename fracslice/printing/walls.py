@@ -1,4 +1,11 @@
-"""Thickness of a sampled solid, width of its gaps, measured from surface to surface; statistics."""
+"""Thickness of a sampled solid, width of its gaps, measured from surface to surface; statistics.
+
+From each crossing of a grid edge a ray follows the normal to the opposite surface, in steps of the distance
+(sphere tracing, Hart 1996). Its length is the thickness of the wall there if the two faces look away from
+each other. So the edge of a cube is not a thin wall, as it would be for inscribed spheres (Hildebrand and
+Rüegsegger 1997), and a plate is as thick at its rim as in its middle. This is the shape diameter function
+(Shapira, Shamir and Cohen-Or 2008) with one ray.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""CUDA tracer: one thread per ray, and the accumulator in GPU memory."""
+"""CUDA tracer: one thread per ray, and the accumulator in GPU memory.
+
+A holds the sums of the picture, CHANNELS per pixel. T holds partial sums, three per thread; thread b handles
+every pixel whose index is b modulo the number of threads, so that the sums are deterministic. `n` is the
+number of pixels, `width` that of the picture, pixels.
+"""
 
 from __future__ import annotations
 
@@ -24,6 +29,7 @@ from .accumulator import (
     TRUSTED,
     HostAccumulator,
     PassPlan,
+    SampleRange,
     grids,
     least_gain,
     next_choice,
@@ -32,7 +38,6 @@ from .accumulator import (
 from .film import shows_background
 from .linking import Frame
 from .packets import BLOCK, SHIFTS, STEPS, WHOLE, loops
-from .sequence import SampleRange
 from .units.pixel import UNKNOWN, encoded, filmic, linear, reinhard, squared_error
 
 

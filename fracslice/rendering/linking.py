@@ -18,9 +18,8 @@ from ..fields.linker import Linked, Linker
 from ..fields.registry import Fixed, Node
 from ..scene.view import Camera, View
 from .glow import Drawn, glowing_bodies, wholly_met
-from .lighting import Lighting
+from .lighting import Lighting, onward
 from .materials import Look, write
-from .scattering import onward
 from .setup import Optics, footprint, ray_bound
 from .units import camera as units
 from .units import glossy, march

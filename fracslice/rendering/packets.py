@@ -31,12 +31,10 @@ from ..expr.machine import constant
 from ..expr.vocabulary import any_of, where
 from ..fields.cpu import load_functions
 from ..work import Work, chunks
-from .accumulator import CHANNELS, COUNT, COVER, GOAL, PassPlan
+from .accumulator import CHANNELS, COUNT, COVER, GOAL, PassPlan, SampleRange
 from .linking import Frame
-from .sequence import SampleRange
 from .units.intrinsics import background, camera_ray, span_box, step_cone, step_ray, surface
-from .units.pixel import brightness, clamped
-from .units.random import centred, sample
+from .units.pixel import brightness, centred, clamped, sample
 
 Row = IntEnum(
     "Row", "ox oy oz dx dy dz start end side path t steps status r g b tr tg tb cover dense px py", start=0

@@ -111,7 +111,7 @@ class Scene:
         SceneError
             If the scene has no such element or attribute, or the value is invalid.
         """
-        from .overrides import apply_settings
+        from .layout import apply_settings
 
         return apply_settings(self, settings)
 

@@ -1,9 +1,8 @@
 """Slicing: from a field to the layers of a printer, without a mesh."""
 
 from ..records import SliceJob
-from .adaptive import adapted, plan_layers
 from .contours import Contours
-from .layers import SLAB, Layer, Slicer
+from .layers import SLAB, Layer, Slicer, adapted, plan_layers
 from .stack import Stack, plan_stack
 
 __all__ = ["SLAB", "Contours", "Layer", "SliceJob", "Slicer", "Stack", "adapted", "plan_layers", "plan_stack"]

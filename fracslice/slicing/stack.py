@@ -121,7 +121,7 @@ def plan_stack(root: Field, job: SliceJob, work: Work | None = None, size: Sizin
     _refuse_coarse(layer, max(pixel), size.side)
     planned = plan(orient_field(root, job.up, size.stretch, work), size.longest / min(pixel), work)
     if job.printing.bodies is not None:
-        from ..printing.framing import frame_bodies
+        from ..printing.edits import frame_bodies
 
         planned = frame_bodies(planned, size, job.printing.bodies, work or Work())
     planned, scale = printable(planned, size, job.printing, work)

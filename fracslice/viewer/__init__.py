@@ -2,8 +2,7 @@
 
 from .canvas import previewed
 from .picture import need_pyvista, picture
-from .screen import need_screen
 from .viewer import fly
-from .window import show
+from .window import need_screen, show
 
 __all__ = ["fly", "need_pyvista", "need_screen", "picture", "previewed", "show"]

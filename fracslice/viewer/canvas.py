@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..rendering import Pass
-from .screen import need_screen
+from .window import need_screen
 
 COLOUR = (0.96, 0.96, 0.96)
 FONT = 15

@@ -15,7 +15,7 @@ from ..scene.model import to_xml
 from ..scene.view import Camera
 from ..work import Work
 from .canvas import Canvas
-from .screen import need_screen
+from .window import need_screen
 
 MOVES = {
     "w": ("forward", 1.0),

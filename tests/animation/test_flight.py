@@ -11,7 +11,7 @@ from fracslice.cli.main import run
 
 from fracslice import read
 from fracslice.animation import Timeline, with_flight
-from fracslice.animation.flight import flight
+from fracslice.animation.timeline import flight
 from fracslice.errors import SceneError
 from fracslice.formulas import mandelbulb, sphere
 from fracslice.scene import scene

@@ -21,7 +21,7 @@ from fracslice.formulas import (
     union,
 )
 from fracslice.scene import Scene, read
-from fracslice.scene.overrides import varied
+from fracslice.scene.layout import varied
 
 pytestmark = pytest.mark.once
 

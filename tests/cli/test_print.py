@@ -146,7 +146,7 @@ def test_a_slicer_ends_with_the_process_that_started_it(cancelled: bool, tmp_pat
     program = f"cd {tmp_path}; sleep 97 & echo $! > new; mv new pid; wait"
     code = f"""if True:
         import threading
-        from fracslice.export.slicers import _run_program
+        from fracslice.export.sending import _run_program
         from fracslice.work import Work
         work = Work(1)
         if {cancelled}:

@@ -17,7 +17,7 @@ from PIL import Image
 from fracslice.jobs import pictures
 from fracslice.rendering import Pass, Renderer, packets
 from fracslice.rendering.accumulator import CHANNELS, COARSE, COUNT, PassPlan
-from fracslice.rendering.crops import BYTES
+from fracslice.rendering.progressive import BYTES
 
 SCENE = """<scene version="1">
   <solid size="80mm"><material colour="0.9 0.3 0.2"><sphere/></material></solid>

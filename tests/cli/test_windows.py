@@ -39,7 +39,7 @@ def test_fly_says_where_it_ended(
 def test_no_mesh_is_made_where_no_window_can_be(
     ball: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("fracslice.viewer.screen.has_screen", lambda: False)
+    monkeypatch.setattr("fracslice.viewer.window.has_screen", lambda: False)
     monkeypatch.setattr("fracslice.jobs.mesh.make_mesh", None)
     assert run(["show", str(ball)]) == 2
     assert "there is no screen" in capsys.readouterr().err

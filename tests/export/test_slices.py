@@ -24,7 +24,7 @@ import pytest
 from PIL import Image
 
 from fracslice.errors import Cancelled, ExportError, FracsliceWarning
-from fracslice.export import layer_formats, png, resuming
+from fracslice.export import images, layer_formats, resuming
 from fracslice.export.layers import FORMATS, slice_format, write_slices
 from fracslice.export.resins import Resin
 from fracslice.export.resuming import Journal, journal, resumable_folder
@@ -61,7 +61,7 @@ def shoelace(points: np.ndarray) -> float:
 
 def test_png_is_what_pillow_reads() -> None:
     image = np.random.default_rng(0).integers(0, 256, (37, 101), np.uint8)
-    data = png.encode(image)
+    data = images.encode(image)
     with Image.open(io.BytesIO(data)) as read:
         assert read.mode == "L"
         assert (np.asarray(read) == image).all()

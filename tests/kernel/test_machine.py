@@ -74,7 +74,7 @@ def test_arrays_become_addresses_in_one_place() -> None:
     result = {
         str(path.relative_to(package)) for path in package.rglob("*.py") if address.search(path.read_text())
     }
-    own = {"viewer/screen.py"}  # names X11's result type
+    own = {"viewer/window.py"}  # names X11's result type
     driver = {"fields/cuda.py", "expr/cuda_driver.py"}  # which returns when it has copied
     assert result == {"expr/machine.py"} | own | driver
 

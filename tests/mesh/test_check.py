@@ -18,9 +18,9 @@ from fracslice.common.triangles import concatenate
 from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
 from fracslice.mesh.checks import check_mesh
+from fracslice.mesh.model import component_sizes, edge_topology
 from fracslice.mesh.shells import nesting
 from fracslice.mesh.spatial import build, self_intersecting_triangles
-from fracslice.mesh.topology import component_sizes, edge_topology
 from tests.examples import stamped
 
 from .shapes import BAD, GOOD, cube, inverted, sphere, torus, with_moved

@@ -14,9 +14,9 @@ from fracslice.mesh import Mesh
 from fracslice.mesh import shells as surveys
 from fracslice.mesh.checks import check_mesh
 from fracslice.mesh.contouring import Piece, contour_pieces
+from fracslice.mesh.model import Removed, Shells, choose
 from fracslice.mesh.pieces import Pieces
 from fracslice.mesh.shells import WholeShells, survey
-from fracslice.mesh.topology import Removed, Shells, choose
 from fracslice.volume import SignBricks
 
 from .shapes import cube, inverted, sphere

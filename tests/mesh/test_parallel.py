@@ -24,9 +24,9 @@ from fracslice._native import (
 from fracslice.common.triangles import concatenate
 from fracslice.mesh import Mesh
 from fracslice.mesh.cleaning import place_and_round, quantise
+from fracslice.mesh.model import component_sizes
 from fracslice.mesh.shells import nesting
 from fracslice.mesh.spatial import self_intersecting_triangles
-from fracslice.mesh.topology import component_sizes
 
 from .shapes import cube, inverted
 

@@ -36,7 +36,7 @@ from fracslice.formulas import (
     union,
 )
 from fracslice.printing import printable
-from fracslice.printing.framing import frame_bodies
+from fracslice.printing.edits import frame_bodies
 from fracslice.printing.samples import Samples, components_of
 from fracslice.printing.walls import Widths, walls
 from fracslice.scene import Print, scene

@@ -10,7 +10,7 @@ import pytest
 from fracslice.formulas import Node, box, difference, mandelbulb, material, plane, sphere, transform, union
 from fracslice.rendering import Renderer, materials
 from fracslice.rendering.glow import glowing_bodies
-from fracslice.rendering.scattering import reflected_shares
+from fracslice.rendering.lighting import reflected_shares
 from fracslice.rendering.units.glossy import glossy, highlight, lost
 from fracslice.rendering.units.pixel import linear
 from fracslice.rendering.units.shade import varied

@@ -7,9 +7,9 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from fracslice.rendering.sequence import DIMENSIONS
-from fracslice.rendering.sequence import points as sequence
-from fracslice.rendering.units.random import centred, sample
+from fracslice.rendering.accumulator import DIMENSIONS
+from fracslice.rendering.accumulator import points as sequence
+from fracslice.rendering.units.pixel import centred, sample
 
 
 def points(pixel: int, count: int, dimensions: int = 2, first: object = sample) -> np.ndarray:

@@ -10,7 +10,7 @@ from PIL import Image
 
 from fracslice.errors import ExportError, RenderError
 from fracslice.mesh import Mesh
-from fracslice.viewer import picture, screen, show, window
+from fracslice.viewer import picture, show, window
 from tests.mesh.shapes import cube, sphere
 
 pytest.importorskip("pyvista")
@@ -64,7 +64,7 @@ def test_a_machine_that_cannot_draw_gets_one_line(tmp_path: Path, monkeypatch: p
 
 def test_a_window_needs_a_screen(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DISPLAY", ":424242")
-    if not screen.has_screen():
+    if not window.has_screen():
         with pytest.raises(RenderError, match="no screen"):
             show(cube())
     assert window.caption(cube()) == "10.0 x 10.0 x 10.0 mm, 12 triangles"

@@ -16,7 +16,8 @@ import pytest
 from fracslice import read
 from fracslice.errors import RenderError
 from fracslice.scene.view import Camera
-from fracslice.viewer import fly, screen, viewer
+from fracslice.viewer import fly, viewer
+from fracslice.viewer.window import has_screen
 from tests.viewer.xserver import AVAILABLE, XServer, xserver
 
 pytestmark = pytest.mark.once
@@ -223,7 +224,7 @@ def test_compilation_and_problems_are_displayed(monkeypatch: pytest.MonkeyPatch)
 
 def test_flying_needs_a_screen(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DISPLAY", ":424242")
-    if not screen.has_screen():
+    if not has_screen():
         with pytest.raises(RenderError, match="no screen"):
             fly("any.xml")
 

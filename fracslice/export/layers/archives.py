@@ -15,9 +15,8 @@ from isal.isal_zlib import crc32
 from ..._slices import Encoding
 from ...errors import ExportError
 from ...version import __version__
-from .. import png
+from ..images import encode_layer, write_png
 from ..layer_formats import FolderFormat, PrintData, PrintFormat
-from ..png import write_png
 from ..slice_run import Encode, SliceRun
 
 MOST_MEMBERS = 65_535
@@ -244,20 +243,18 @@ def _profile(job: PrintData) -> dict[str, object]:
 FORMATS = (
     FolderFormat(
         "png",
-        png.encode_layer,
+        encode_layer,
         lambda run: {"manifest.json": run.describe()},
         encoding=Encoding.PNG,
         endings=("",),
     ),
     Sl1Format(
         "sl1",
-        png.encode_layer,
+        encode_layer,
         _assemble_sl1,
         encoding=Encoding.PNG,
         endings=(".sl1", ".sl1s"),
         also={".sl1": ".sl1s"},
     ),
-    ArchiveFormat(
-        "nanodlp", png.encode_layer, _assemble_nanodlp, encoding=Encoding.PNG, endings=(".nanodlp",)
-    ),
+    ArchiveFormat("nanodlp", encode_layer, _assemble_nanodlp, encoding=Encoding.PNG, endings=(".nanodlp",)),
 )

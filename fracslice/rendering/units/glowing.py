@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from ...expr.vectors import normalised
 from ...expr.vocabulary import absolute, maximum, where
+from .glossy import HALF_TURN, facet_density
 from .march import span
-from .weights import HALF_TURN, facet_density
 
 SENT = 0.5
 """Largest share of the rays that are sent to bodies, where one is above the horizon."""

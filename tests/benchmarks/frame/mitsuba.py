@@ -19,8 +19,8 @@ from scipy.ndimage import maximum_filter, minimum_filter
 
 from fracslice.formulas import Node, box, material, transform
 from fracslice.rendering import Renderer
+from fracslice.rendering.accumulator import SampleRange
 from fracslice.rendering.progressive import layer
-from fracslice.rendering.sequence import SampleRange
 from fracslice.rendering.units.pixel import linear
 from fracslice.scene.view import Camera, Light, Shading, View
 from fracslice.work import Work

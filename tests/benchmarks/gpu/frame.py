@@ -13,11 +13,10 @@ import numpy as np
 
 from fracslice.expr import cuda_driver
 from fracslice.formulas import mandelbulb
-from fracslice.rendering.accumulator import CHANNELS, COUNT, COVER, GOAL, PassPlan, tile_order
+from fracslice.rendering.accumulator import CHANNELS, COUNT, COVER, GOAL, PassPlan, SampleRange, tile_order
 from fracslice.rendering.cuda import CudaTracer
 from fracslice.rendering.linking import Frame, link_frame
 from fracslice.rendering.packets import SHIFTS, STEPS, CpuTracer
-from fracslice.rendering.sequence import SampleRange
 from fracslice.rendering.setup import optics
 from fracslice.scene.view import Camera, Light, Shading, View
 from fracslice.work import Work

@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from fracslice.export import png
+from fracslice.export import images
 from fracslice.export.slice_run import SliceRun
 from fracslice.formulas import julia, mandelbulb, menger, torus
 from fracslice.slicing import Layer, SliceJob, Slicer, plan_stack
@@ -35,7 +35,7 @@ def cost(name: str, pixels: int) -> Figures:
     layers, totals = SliceRun(stack, Screen(stack)), []
 
     def make(layer: Layer) -> tuple[float, float]:
-        png.encode_layer(layers, layer)
+        images.encode_layer(layers, layer)
         return layer.boundary, layer.evaluations
 
     figures = timed(lambda: totals.extend(Slicer(stack).map(make)))

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fracslice.export import png
+from fracslice.export import images
 from fracslice.export.slice_run import SliceRun
 from fracslice.fields.box import Box
 from fracslice.formulas import mandelbulb
@@ -41,7 +41,7 @@ def ours(job: Stack, folder: Path, work: Work) -> Figures:
     layers, totals = SliceRun(job, Screen(job)), []
 
     def make(layer: Layer) -> tuple[float, int, int]:
-        data = png.encode_layer(layers, layer)
+        data = images.encode_layer(layers, layer)
         (folder / f"{layer.index:04d}.png").write_bytes(data)
         return layer.evaluations, layer.boundary, len(data)
 

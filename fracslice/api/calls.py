@@ -1,0 +1,431 @@
+"""The public calls: signed distances, meshes, layers and pictures of shapes and scenes."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, Unpack, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..common.messages import format_count, lacking
+from ..common.parameters import AUTO, AnyLength
+from ..errors import SceneError, SliceError, TooLargeError
+from ..formulas import Node
+from ..jobs.mesh import make_mesh as make_mesh_job
+from ..jobs.pictures import make_picture
+from ..jobs.report import Result
+from ..records import MeshJob, RenderJob
+from ..scene import Print, Scene
+from ..scene.view import Camera, Film, Light, View
+from ..slicing import Contours, Layer, SliceJob, Slicer, Stack, plan_layers
+from ..volume import with_depths
+from ..volume.sizing import sizing
+from ..work import Work, chunks
+from .options import (
+    LayerKeywords,
+    MeshKeywords,
+    RenderKeywords,
+    Source,
+    as_scene,
+    job_of,
+    job_with,
+    keywords,
+    resolve,
+    work_of,
+)
+
+if TYPE_CHECKING:
+    from shapely import MultiPolygon
+
+
+def distance(shape: Node, points: ArrayLike) -> NDArray[np.floating]:
+    """See `Node.distance`."""
+    array = _points(points)
+    kernel = _with_depths(shape).kernel("cpu", "float32" if array.dtype == np.float32 else "float64")
+    flat, values = array.reshape(-1, 3), np.empty(array.size // 3, array.dtype)
+
+    def evaluate(part: slice) -> None:
+        values[part] = kernel.points(*flat[part].T)
+
+    Work().map(evaluate, chunks(len(flat), kernel.batch))
+    return values.reshape(array.shape[:-1])
+
+
+def _points(points: ArrayLike) -> NDArray[np.floating]:
+    """Points as an array of float32 or float64, [..., 3]. Raises `SceneError` for any other shape or type."""
+    try:
+        array = np.asarray(points)
+        array = array if array.dtype == np.float32 else array.astype(np.float64, casting="same_kind")
+    except (TypeError, ValueError):
+        raise SceneError("points: expected numbers, an array [..., 3]") from None
+    if array.ndim == 0 or array.shape[-1] != 3:
+        raise SceneError(f"points: expected an array [..., 3], found one of shape {list(array.shape)}")
+    return array
+
+
+@lru_cache(maxsize=32)
+def _with_depths(shape: Node) -> Node:
+    """The shape with automatic iterations replaced by numbers. Raises `SceneError` if it is unbounded."""
+    known = with_depths(shape)
+    for node in known.solids():
+        if AUTO in (value for value in node.values.values() if isinstance(value, str)):
+            raise node.fail("iterations: expected a number where the shape has no end")
+    return known
+
+
+@keywords(MeshJob, Print)
+def make_mesh(
+    shape: Source,
+    job: MeshJob | None = None,
+    work: Work | None = None,
+    *,
+    path: str | Path | None = None,
+    **options: Unpack[MeshKeywords],
+) -> Result:
+    """Make a printable mesh of a shape.
+
+    Lengths are numbers in mm, or text such as "0.5mm". Keywords set the fields of `MeshJob`, `Print` and
+    `Work`, and override those of the records and of the scene.
+
+    Parameters
+    ----------
+    shape : Node, Scene, str or path
+        A shape such as ``sphere(0.5) - box()``, a scene, a scene file, or the name of a shipped scene or a
+        formula.
+    job : MeshJob, optional
+        Settings of the mesh, as a record.
+    work : Work, optional
+        Threads, progress, cancellation, store and device, as a record.
+    path : str or path, optional
+        The file to write, in the format of its extension. An .stl file may be larger than memory: the mesh
+        is then only in that file, and access to its vertices raises `TooLargeError`.
+    {options}
+    Returns
+    -------
+    Result
+        The mesh in mm and its `report`. An unprintable mesh is returned, too; its report lists the problems.
+
+    Raises
+    ------
+    SceneError
+        For an invalid shape, name or value.
+    VolumeError, MeshError
+        For a field without a surface, or too large a job.
+    ExportError
+        For a file that cannot be written.
+    TypeError
+        For an unknown keyword.
+    Cancelled
+        When `cancel` is set.
+
+    Examples
+    --------
+    >>> from fracslice import box, make_mesh, sphere
+    >>> mesh = make_mesh(box((10, 10, 10)) - sphere(6), resolution=32)
+    >>> mesh.is_watertight, mesh.size.round(3).tolist()
+    (True, [10.0, 10.0, 10.0])
+    >>> mesh.report.problems
+    ()
+    >>> make_mesh("menger-sponge", size="2cm", resolution=27).size.round(3).tolist()
+    [20.0, 20.0, 20.0]
+    """
+    scene = as_scene(shape)
+    given = job or MeshJob()
+    edited = replace(scene, printing=given.edits(scene))
+    return make_mesh_job(scene, job_of(given, edited, options), work_of(options, work), path)
+
+
+S = TypeVar("S", bound=np.generic)
+T_co = TypeVar("T_co", covariant=True)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Layers(Sequence[T_co], Generic[T_co]):
+    """Sequence with one item for each layer, from the bottom up, computed on access.
+
+    Iteration computes layers in parallel, a few ahead. Nothing is cached.
+
+    Attributes
+    ----------
+    stack : Stack
+        Plan of the layers.
+    chosen : range
+        Indices of the layers in the stack.
+    make : callable
+        Converts a `Layer` to an item.
+    work : Work
+        Threads, progress and cancellation.
+    """
+
+    stack: Stack
+    chosen: range
+    make: Callable[[Layer], T_co]
+    work: Work
+
+    def _repr_png_(self) -> bytes | None:
+        """Contact sheet in a notebook; None without layers."""
+        from ..slicing.preview import contact_sheet
+
+        file = io.BytesIO()
+        if len(self):
+            contact_sheet(self.stack, file, self.work, self.chosen)
+        return file.getvalue() or None
+
+    def __len__(self) -> int:
+        return len(self.chosen)
+
+    def __repr__(self) -> str:
+        x, y, z = self.stack.size
+        return (
+            f"<{type(self).__name__}: {format_count(len(self), 'layer')} of {x:.6g} x {y:.6g} x {z:.6g} mm>"
+        )
+
+    @overload
+    def __getitem__(self, index: int) -> T_co: ...
+    @overload
+    def __getitem__(self, index: slice) -> Layers[T_co]: ...
+    def __getitem__(self, index: int | slice) -> T_co | Layers[T_co]:
+        if isinstance(index, slice):
+            return replace(self, chosen=self.chosen[index])
+        return next(iter(replace(self, chosen=range(self.chosen[index], self.chosen[index] + 1))))
+
+    def __iter__(self) -> Iterator[T_co]:
+        if self.chosen.step < 0:
+            return (self[k] for k in range(len(self)))
+        return Slicer(self.stack, self.work).map(self.make, self.chosen)
+
+    @property
+    def tops(self) -> NDArray[np.float64]:
+        """Tops of the layers, mm above the object's lowest point, float64 [n]."""
+        return _frozen(self.stack.tops[list(self.chosen)])
+
+    @property
+    def heights(self) -> NDArray[np.float64]:
+        """Heights of the layers, mm, float64 [n]."""
+        return _frozen(self.stack.heights[list(self.chosen)])
+
+    @property
+    def pixel(self) -> tuple[float, float]:
+        """Width and height of a pixel, mm."""
+        return self.stack.pixel
+
+    @property
+    def size(self) -> tuple[float, float, float]:
+        """The object's size, mm."""
+        return self.stack.size
+
+
+class Slices(Layers[NDArray[np.uint8]]):
+    """Layers as pictures: uint8 [ny, nx], 255 where a pixel is entirely inside; row 0 is the front.
+
+    The object's centre is at the centre of the picture. ``np.stack(slices)`` is the whole volume.
+    """
+
+    @property
+    def polygons(self) -> Layers[MultiPolygon]:
+        """Layers as MultiPolygon objects of shapely, in mm from the centre of the object's box.
+
+        Raises
+        ------
+        SliceError
+            If shapely is not installed.
+        """
+        if reason := lacking("shapely", "polygons need"):
+            raise SliceError(reason)
+        return Layers(self.stack, self.chosen, _polygons, self.work)
+
+    @property
+    def contours(self) -> Layers[Contours]:
+        """Layers as closed polylines, without shapely."""
+        return Layers(self.stack, self.chosen, _contours, self.work)
+
+
+@keywords(SliceJob, Print)
+def slice_layers(
+    shape: Source,
+    layer: AnyLength | Sequence[AnyLength] = "0.05mm",
+    **options: Unpack[LayerKeywords],
+) -> Slices:
+    """Slice a shape into the layers of a print, directly from its field.
+
+    Lengths are numbers in mm, or text such as "0.05mm".
+
+    Parameters
+    ----------
+    shape : Node, Scene, str or path
+        As for `make_mesh`.
+    layer : float or str, or two of them
+        Layer height; or its minimum and maximum, for adaptive layers that are thick where the surface is
+        steep.
+    {options}
+    Returns
+    -------
+    Slices
+        A sequence of arrays, one for each layer, computed on access.
+
+    Raises
+    ------
+    SceneError, SliceError
+        For an invalid shape or value.
+    VolumeError
+        For a field without a surface.
+    TypeError
+        For an unknown keyword.
+    Cancelled
+        When `cancel` is set.
+
+    Examples
+    --------
+    >>> from fracslice import cylinder, slice_layers
+    >>> slices = slice_layers(cylinder(2, 1), layer=0.25, pixel="0.1mm")
+    >>> len(slices), slices[0].dtype.name, slices.tops.tolist()
+    (4, 'uint8', [0.25, 0.5, 0.75, 1.0])
+    >>> round(slices.contours[0].area, 2)
+    12.57
+    """
+    work = work_of(options)
+    scene = as_scene(shape, options.get("size"))
+    job = job_of(SliceJob(layer=layer), scene, options)
+    stack = plan_layers(scene.root, job, work, sizing(scene, job.size, job.scale, work))
+    return Slices(stack, range(len(stack.z)), _coverage, work)
+
+
+def _coverage(layer: Layer) -> NDArray[np.uint8]:
+    return _frozen(layer.coverage)
+
+
+def _polygons(layer: Layer) -> MultiPolygon:
+    return as_polygons(layer.contours)
+
+
+def _contours(layer: Layer) -> Contours:
+    contours = layer.contours
+    for array in (contours.points, contours.starts, contours.parent):
+        _frozen(array)
+    return contours
+
+
+def _frozen(array: NDArray[S]) -> NDArray[S]:
+    array.flags.writeable = False
+    return array
+
+
+def as_polygons(contours: Contours) -> MultiPolygon:
+    """Convert contours to polygons: each outer contour with the holes directly inside it.
+
+    Parameters
+    ----------
+    contours : Contours
+        Contours of a layer.
+
+    Returns
+    -------
+    MultiPolygon
+        In mm from the centre of the object's box.
+    """
+    from shapely import MultiPolygon, Polygon
+
+    depth = [0] * len(contours)
+    holes: list[list[NDArray[np.float64]]] = [[] for _ in depth]
+    for k, parent in enumerate(contours.parent.tolist()):
+        if parent >= 0:
+            depth[k] = depth[parent] + 1
+            holes[parent].append(contours[k])
+    return MultiPolygon([Polygon(contours[k], holes[k]) for k, d in enumerate(depth) if d % 2 == 0])
+
+
+FILM = Film(width=640, height=480, samples=16)
+"""Film of a shape without a scene, for a quick picture."""
+
+
+class Picture(np.ndarray):
+    """A picture, uint8 [height, width, 3], sRGB, that notebooks display."""
+
+    def _repr_png_(self) -> bytes | None:
+        from PIL import Image
+
+        if self.dtype != np.uint8 or self.ndim != 3 or self.shape[2] != 3:
+            return None  # a slice of a picture need not be a picture
+        file = io.BytesIO()
+        Image.fromarray(np.asarray(self)).save(file, "PNG")
+        return file.getvalue()
+
+
+@keywords(RenderJob)
+def render(
+    shape: Source,
+    job: RenderJob | None = None,
+    *,
+    path: str | Path | None = None,
+    camera: Camera | None = None,
+    lights: Sequence[Light] | None = None,
+    **options: Unpack[RenderKeywords],
+) -> Picture:
+    """Render a picture of a shape.
+
+    Keywords set the fields of `RenderJob` and `Work`, and override those of the record. A shape without a
+    scene has 640 x 480 pixels of 16 samples by default.
+
+    Parameters
+    ----------
+    shape : Node, Scene, str or path
+        As for `make_mesh`.
+    job : RenderJob, optional
+        Settings of the picture, as a record.
+    path : str or path, optional
+        The file to write, in the format of its extension: .png, .jpg, .webp, or linear floats as .exr or
+        .tif. A .png, .exr or .tif file may be larger than memory: the picture is then only in that file,
+        and `TooLargeError` says so.
+    camera : Camera, optional
+        The camera, in scene units; by default the scene's, or one that shows the whole shape.
+    lights : sequence of Light, optional
+        The lights; by default the scene's, or a sun and a sky.
+    {options}
+    Returns
+    -------
+    Picture
+        An array, uint8 [height, width, 3], sRGB, that notebooks display.
+
+    Raises
+    ------
+    SceneError, RenderError
+        For an invalid shape, view or value.
+    ExportError
+        For a file that cannot be written.
+    TooLargeError
+        For a picture that does not fit in memory; one with a path is in the file.
+    TypeError
+        For an unknown keyword.
+    Cancelled
+        When `cancel` is set.
+
+    Examples
+    --------
+    >>> from fracslice import box, render, sphere
+    >>> picture = render(box() - sphere(0.6), size=(64, 48), samples=1)
+    >>> picture.shape, picture.dtype.name
+    ((48, 64, 3), 'uint8')
+    """
+    if not isinstance(camera, Camera | None):
+        raise TypeError(f"camera={camera!r}: expected a Camera")
+    if lights is not None and not (
+        isinstance(lights, Sequence) and all(isinstance(lamp, Light) for lamp in lights)
+    ):
+        raise TypeError(f"lights={lights!r}: expected a sequence of Light")
+    what, work = resolve(shape), work_of({**options, "device": None})
+    scene = Scene(what, 1.0, view=View(film=FILM)) if isinstance(what, Node) else what
+    given: dict[str, Any] = {"camera": camera, "lights": None if lights is None else tuple(lights)}
+    view = replace(scene.view, **{name: value for name, value in given.items() if value is not None})
+    picture = job_with(job or RenderJob(), options)
+    device = options.get("device") or "auto"
+    done = make_picture(replace(scene, view=view), picture, work, path, device=device).done
+    if done is None:
+        raise TooLargeError(f"{path}: holds the picture, which does not fit in memory")
+    array = done.shown.view(Picture)
+    array.flags.writeable = False
+    return array
