@@ -53,7 +53,8 @@ def graph(
         if node.formula.name == "model":
             raise node.fail("is made of triangles: expected formulas alone, or a mesh of them")
     linked, made = link(root), _Graph()
-    operations: dict[str, Any] = {name: made.function(name) for name in FUNCTIONS}
+    vocabulary = FUNCTIONS.keys() - {"add", "subtract", "multiply", "divide", "select"}
+    operations: dict[str, Any] = {name: made.function(name) for name in vocabulary}
     operations |= {"where": made.where, "any_of": made.any_of}
     operations |= {"rsqrt": lambda a: 1.0 / made.call("sqrt", a), "ratio": lambda a, b: a / b}
     inputs = [_Symbol(made, made.add(Operation(name))) for name in INPUTS]
