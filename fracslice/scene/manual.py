@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as Tree
 
+from .. import _PACKAGE
 from .. import formulas as formula_package
 from ..common.messages import hint
 from ..common.parameters import (
@@ -158,7 +159,8 @@ def _shipped_formulas() -> list[str]:
 
 def package_stub(modules: Mapping[str, str]) -> str:
     """Text of the stub file of `fracslice`: its public names, and every formula."""
-    exported = {**modules, **dict.fromkeys(_shipped_formulas(), "formulas")}
+    formulas = [name for name in _shipped_formulas() if name != _PACKAGE]
+    exported = {**modules, **dict.fromkeys(formulas, "formulas")}
     lines = sorted(f"from .{module} import {name} as {name}" for name, module in exported.items())
     return "\n".join([_MADE, *lines, ""])
 

@@ -29,7 +29,7 @@ def test_the_stub_files_are_up_to_date(package: ModuleType, text: str) -> None:
 
 
 def test_every_formula_is_a_public_name() -> None:
-    assert {n for n in fracslice.__all__ if n in names()} == set(SHIPPED)
+    assert {n for n in fracslice.__all__ if n in names()} == set(SHIPPED) - {"volume"}  # a package
     assert all(getattr(fracslice, name) is get(name) for name in SHIPPED)
 
 
