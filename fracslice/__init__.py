@@ -90,7 +90,7 @@ _WHERE = {
     "slice_layers": "api.slices",
     "to_xml": "scene",
     "write": "formats",
-    "write_vdb": "api.volumes",
+    "write_vdb": "api.grids",
 }
 
 _PACKAGE = "volume"

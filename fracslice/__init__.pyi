@@ -1,10 +1,10 @@
 # Made from the registry of formulas by `python docs/generate.py`; do not edit.
+from .api.grids import write_vdb as write_vdb
 from .api.meshing import make_mesh as make_mesh
 from .api.pictures import Picture as Picture
 from .api.pictures import render as render
 from .api.slices import Slices as Slices
 from .api.slices import slice_layers as slice_layers
-from .api.volumes import write_vdb as write_vdb
 from .errors import FracsliceError as FracsliceError
 from .formats import write as write
 from .formulas import Node as Node

@@ -56,8 +56,8 @@ class Grid:
     half: bool
     name: str
 
-def grids_of(path: str) -> list[tuple[str, str]]:
-    """Names and types of the grids of a .vdb file. Raises RuntimeError."""
+def grids_of(path: str) -> list[str]:
+    """Names of the grids of a .vdb file. Raises RuntimeError."""
 
 def level_set_of(grid: Grid) -> Grid:
     """The grid near its surface if its values are distances, else its narrow band. Raises ValueError."""

@@ -1394,10 +1394,10 @@ def union(*elements: Node, smooth: float = 0.0) -> Node:
     Node
     """
 
-def volume(file: str, grid: str = '', kind: Optional[Literal['surface', 'density']] = None, iso: float | None = None, size: float | None = None, place: Literal['as is', 'centre', 'bed'] = 'as is', units: Literal['um', 'µm', 'mm', 'cm', 'in', 'm'] = 'mm', sha256: str | None = None) -> Node:
+def volume(file: str, grid: str = '', kind: Literal['as stated', 'surface', 'density'] = 'as stated', iso: float | None = None, size: float | None = None, place: Literal['as is', 'centre', 'bed'] = 'as is', units: Literal['um', 'µm', 'mm', 'cm', 'in', 'm'] = 'mm', sha256: str | None = None) -> Node:
     """A grid of an OpenVDB file (Museth 2013, "VDB: High-Resolution Sparse Volumes with Dynamic Topology").
-    Distances are linear between samples near the surface and go on as distances to where edges of the grid cross
-    it; densities and other numbers are made distances first. L is measured at the samples, with a margin.
+    Near the surface its distances, linear between samples; farther off, distances to where edges of the grid
+    cross the surface. Other numbers become distances first. L is measured at the samples, with a margin.
 
     Parameters
     ----------
@@ -1405,8 +1405,8 @@ def volume(file: str, grid: str = '', kind: Optional[Literal['surface', 'density
         an OpenVDB file, in the folder of the scene
     grid : text in one line, default ''
         name of a grid of the file; by default surface or density, or the only one
-    kind : surface or density
-        signed distances, negative inside, or densities, larger inside; by default as the class of the grid says
+    kind : as stated, surface or density, default 'as stated'
+        signed distances, negative inside, or densities, larger inside; or what the class of the grid says
     iso : a number
         value at the surface; by default 0 of a surface and 0.5 of a density
     size : a number > 0

@@ -13,17 +13,14 @@ from .models import identify_file, placed_box, placement, reading
 if TYPE_CHECKING:
     from ..volume.level_sets import LevelSet
 
-VOLUMES = frozenset({".vdb"})
-"""Extensions of files with grids."""
-
 
 @shape(
     file=File(REQUIRED, "an OpenVDB file, in the folder of the scene", inside=True),
     grid=Label("", "name of a grid of the file; by default surface or density, or the only one"),
     kind=Choice(
-        None,
-        "signed distances, negative inside, or densities, larger inside; by default as the class of the grid says",
-        ("surface", "density"),
+        "as stated",
+        "signed distances, negative inside, or densities, larger inside; or what the class of the grid says",
+        ("as stated", "surface", "density"),
     ),
     iso=Number(None, "value at the surface; by default 0 of a surface and 0.5 of a density"),
     size=Number(None, "the longest side; without it, a scene unit is a millimetre of the grid", above=0),
@@ -37,15 +34,15 @@ VOLUMES = frozenset({".vdb"})
 )
 def volume(x, y, z, origin, scale, inverse, slope, level_set):  # type: ignore[no-untyped-def]
     """A grid of an OpenVDB file (Museth 2013, "VDB: High-Resolution Sparse Volumes with Dynamic Topology").
-    Distances are linear between samples near the surface and go on as distances to where edges of the grid cross
-    it; densities and other numbers are made distances first. L is measured at the samples, with a margin.
+    Near the surface its distances, linear between samples; farther off, distances to where edges of the grid
+    cross the surface. Other numbers become distances first. L is measured at the samples, with a margin.
     """
     ox, oy, oz = origin
     there = solid_distance((x - ox) * inverse, (y - oy) * inverse, (z - oz) * inverse, level_set)
     return scale * slope * there
 
 
-identify_file(volume, "file", VOLUMES, "an OpenVDB file")
+identify_file(volume, "file", {".vdb"}, "an OpenVDB file")
 
 
 @volume.arguments

@@ -255,7 +255,7 @@ class Mesh(Triangles):
             If the mesh encloses no solid, which a .vdb file needs.
         """
         if Path(path).suffix.lower() == ".vdb":
-            from ..api.volumes import write_vdb
+            from ..api.grids import write_vdb
 
             return write_vdb(self, path, metadata=metadata)
         from ..formats import write

@@ -49,12 +49,15 @@ class LevelSet(InMemory):
 
 
 @lru_cache(maxsize=8)
-def level_set(file: str, sha256: str, grid: str, kind: Kind | None, iso: float | None) -> LevelSet:
+def level_set(
+    file: str, sha256: str, grid: str, kind: Kind | Literal["as stated"], iso: float | None
+) -> LevelSet:
     """Level set of a grid of a file with a hash, in units of the file."""
     from .._vdb import LevelSet as Native
 
     found = _chosen(file, grid)
-    what = kind or ("density" if found.kind == FOG or found.name == "density" else "surface")
+    as_named: Kind = "density" if found.kind == FOG or found.name == "density" else "surface"
+    what = as_named if kind == "as stated" else kind
     level = ISO[what] if iso is None else iso
     try:
         native = Native(_around_zero(found, what, level))
@@ -76,7 +79,7 @@ def _chosen(file: str, name: str) -> Grid:
     from .._vdb import Grid, grids_of
 
     try:
-        known = [name for name, _ in grids_of(file)]
+        known = grids_of(file)
         usual = next((usual for usual in KINDS if usual in known), "")
         listed = ", ".join(known) or "none"
         if name and name not in known:
@@ -92,7 +95,7 @@ def from_vdb(
     path: str | os.PathLike[str],
     grid: str = "",
     *,
-    kind: Kind | None = None,
+    kind: Kind | Literal["as stated"] = "as stated",
     iso: float | None = None,
     size: float | None = None,
     place: Literal["as is", "centre", "bed"] = "as is",
@@ -106,8 +109,8 @@ def from_vdb(
         The file.
     grid : str
         Name of a grid; by default surface or density, or the only one.
-    kind : {"surface", "density"}, optional
-        Whether numbers are signed distances, negative inside, or densities; by default as its class says.
+    kind : {"as stated", "surface", "density"}
+        Whether numbers are signed distances, negative inside, or densities; as stated: what its class says.
     iso : float, optional
         Value at the surface; by default 0 of a surface, and 0.5 of a density.
     size : float, optional
@@ -194,7 +197,7 @@ def from_grid(
     level = (0.0 if what == "surface" else (low + high) / 2) if iso is None else iso
     level = validate_value("iso", level, Number(None, ""), VolumeError)
     if not low < level < high:
-        raise VolumeError(f"iso={level:g}: expected a value between the least, {low:g}, and the largest, {high:g}")
+        raise VolumeError(f"iso={level:g}: expected a value between {low:g} and {high:g}, those of the array")
     beyond = level + BEYOND * max(steps) if what == "surface" else low
     folder = Kept(cache_folder() / "volumes").place()
     if folder is None:

@@ -92,7 +92,7 @@ NB_MODULE(_vdb, module) {
         .def_prop_ro("kind", &class_of)
         .def_prop_rw("half", [](const Grid& g) { return g.vdb->saveFloatAsHalf(); },
                      [](Grid& g, bool half) { g.vdb->setSaveFloatAsHalf(half); })
-        .def_prop_rw("name", [](const Grid& g) { return g.vdb->getName(); },
+        .def_prop_rw("name", [](const Grid& g) { return printable(g.vdb->getName()); },
                      [](Grid& g, const std::string& name) { g.vdb->setName(name); });
     module.def("grids_of", &grids_of, "path"_a, released());
     module.def("level_set_of", [](const Grid& g) { return Grid{level_set_of(*g.vdb)}; }, "grid"_a, released());

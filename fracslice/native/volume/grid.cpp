@@ -190,24 +190,41 @@ FloatGrid::Ptr floats_of(const Grids::Ptr& grid) {
     return nullptr;
 }
 
+// OpenVDB itself writes a warning about other versions to standard output.
+void require_known(const std::string& path) {
+    int64_t magic = 0;
+    uint32_t version = 0;
+    std::ifstream file(path, std::ios::binary);
+    file.read(reinterpret_cast<char*>(&magic), sizeof magic).read(reinterpret_cast<char*>(&version), sizeof version);
+    if (!file || magic != openvdb::OPENVDB_MAGIC || version > openvdb::OPENVDB_FILE_VERSION) throw std::runtime_error("unknown");
+}
+
 // What act() makes of an open file. No delayed loading: nothing may depend on the file once this returns.
 template <class Act>
 auto from_file(const std::string& path, const Act& act) {
     try {
+        require_known(path);
         openvdb::io::File file(path);
         file.open(false);
         return act(file);
-    } catch (const std::exception& error) {
-        throw std::runtime_error(path + ": " + error.what());
+    } catch (const std::exception&) {  // OpenVDB's texts are of its own making
+        throw std::runtime_error(path + ": not a whole OpenVDB file: it is cut short, or of another kind");
     }
 }
 
 }  // namespace
 
+std::string printable(std::string name) {
+    for (char& c : name) {
+        if (c < ' ' || c > '~') c = '?';
+    }
+    return name;
+}
+
 FloatGrid::Ptr read_grid(const std::string& path, const std::string& name) {
     const auto found = from_file(path, [&](openvdb::io::File& file) {
         for (auto each = file.beginName(); each != file.endName(); ++each) {
-            if (!name.empty() && each.gridName() != name) continue;
+            if (!name.empty() && printable(each.gridName()) != name) continue;
             if (auto grid = floats_of(file.readGrid(each.gridName()))) return grid;
         }
         return FloatGrid::Ptr();
@@ -216,11 +233,11 @@ FloatGrid::Ptr read_grid(const std::string& path, const std::string& name) {
     return found;
 }
 
-std::vector<std::pair<std::string, std::string>> grids_of(const std::string& path) {
+std::vector<std::string> grids_of(const std::string& path) {
     return from_file(path, [](openvdb::io::File& file) {
-        std::vector<std::pair<std::string, std::string>> found;
+        std::vector<std::string> found;
         for (auto each = file.beginName(); each != file.endName(); ++each) {
-            found.emplace_back(each.gridName(), file.readGridMetadata(each.gridName())->valueType());
+            found.push_back(printable(each.gridName()));
         }
         return found;
     });
@@ -228,10 +245,10 @@ std::vector<std::pair<std::string, std::string>> grids_of(const std::string& pat
 
 namespace {
 
-constexpr openvdb::Index64 kMostSamples = 1 << 27;
+constexpr openvdb::Index64 kMostSamples = 1 << 27, kMostOfTiles = 1 << 24;
 
-void require_few(openvdb::Index64 samples) {
-    if (samples > kMostSamples) throw std::invalid_argument("takes more than " + std::to_string(kMostSamples) + " samples");
+void require_few(openvdb::Index64 samples, openvdb::Index64 most = kMostSamples) {
+    if (samples > most) throw std::invalid_argument("takes more than " + std::to_string(most) + " samples");
 }
 
 openvdb::Vec3d axis_of(const FloatGrid& grid, int k) {
@@ -296,7 +313,8 @@ FloatGrid::Ptr with_cubes(const FloatGrid::Ptr& grid) {
 }
 
 FloatGrid::Ptr less(const FloatGrid& grid, float iso, bool turned) {
-    require_few(grid.activeVoxelCount());
+    const openvdb::Index64 samples = grid.activeVoxelCount();
+    require_few(samples), require_few(samples - grid.tree().activeLeafVoxelCount(), kMostOfTiles);
     auto made = grid.deepCopy();
     made->tree().voxelizeActiveTiles();
     const auto apart = [=](float value) { return turned ? iso - value : value - iso; };

@@ -51,12 +51,15 @@ FloatGrid::Ptr fog(const FloatGrid& grid);
 // Its leaves in the order of their origins.
 std::vector<const FloatGrid::TreeType::LeafNodeType*> sorted_leaves(const FloatGrid::TreeType& tree);
 
+// A name with "?" for what is no printable ASCII.
+std::string printable(std::string name);
+
 // All three throw std::runtime_error with the path, also for a full disk, which OpenVDB does not report.
 void write_grid(const FloatGrid::Ptr& grid, const std::string& path, const Metadata& metadata);
 // The grid of a name, or the first one, of numbers or of a mask, which is 1 and 0.
 FloatGrid::Ptr read_grid(const std::string& path, const std::string& name);
-// Names and types of all grids.
-std::vector<std::pair<std::string, std::string>> grids_of(const std::string& path);
+// Names of all grids.
+std::vector<std::string> grids_of(const std::string& path);
 
 // A field that is not a distance, made one in scene units around the same surface (fast sweeping, Zhao 2004).
 FloatGrid::Ptr redistance(const FloatGrid& grid);
