@@ -7,10 +7,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
 
+from ..common.files import check_target
 from ..common.parameters import AnyLength, Choice, validate_value
 from ..errors import ExportError
-from ..export import application, check_target
 from ..records import MeshJob
+from ..version import APPLICATION
 from ..volume import plan
 from ..volume.level_sets import KINDS, save, solid_grid
 from ..volume.sizing import sizing
@@ -90,5 +91,5 @@ def write_vdb(
     planned = plan(scene.root, job.voxels(sized.longest), work)
     grid = solid_grid(planned, sized.scale(planned.box), kind, work)
     grid.half = half
-    save(grid, target, {"creator": application(), **(metadata or {})})
+    save(grid, target, {"creator": APPLICATION, **(metadata or {})})
     return target

@@ -62,9 +62,8 @@ _POSSIBLE: dict[type, Any] = {
     Vector: _vector,
     Choice: lambda kind: st.sampled_from(kind.choices),
     File: lambda kind: st.sampled_from((BRACKET, GRID)) if kind.inside else st.none(),
-    Label: lambda kind: st.just("surface"),
     Digest: lambda kind: st.none(),
-    Label: lambda kind: st.sampled_from(("LUMEN", "    Digest: lambda kind: st.none(),lt;", "e\u0301")),
+    Label: lambda kind: st.sampled_from(("LUMEN", "surface", "<&lt;", "e\u0301")),
     Axis: lambda kind: st.sampled_from("xyz"),
 }
 

@@ -18,7 +18,7 @@ from fracslice.expr.intervals import ARRAYS, Interval
 from fracslice.fields.reference import enclosure, reference
 from fracslice.formulas import Node, box, cylinder, difference, gyroid, shell, twist, union
 from fracslice.mesh import Mesh
-from fracslice.mesh.reading import read_mesh
+from fracslice.mesh.models import read_mesh
 from fracslice.volume.level_sets import save
 
 from ..mesh import shapes
