@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from fracslice.errors import MeshError, SceneError
-from fracslice.formats import ENDINGS
+from fracslice.formats import ENDINGS, SOLIDS
 
 from .execution import stopped_at_once
 
@@ -45,15 +45,16 @@ def load_scene(source: str, settings: Iterable[str] = ()) -> Scene:
 
 
 def _scene(source: str) -> Scene:
-    """Scene of a file or a name; of a model the scene of that alone, in mm."""
+    """Scene of a file or a name; of a model or a grid the scene of that alone, in mm."""
     from fracslice.scene import read
 
-    if is_model(source):
-        from fracslice.formulas import model
+    if formula := SOLIDS.get(Path(source).suffix.lower()):
+        from fracslice.formulas import get
         from fracslice.scene import scene
 
         try:
-            return scene(model(source, place="as is", units="mm"), unit=1.0, name=Path(source).stem)
+            solid = get(formula)(source, place="as is", units="mm")
+            return scene(solid, unit=1.0, name=Path(source).stem)
         except SceneError as error:
             raise BadInput(f"{source}: {error.__cause__ or error}") from error
     outside = click.get_current_context().params.get("allow_files_outside", False)

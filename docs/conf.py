@@ -17,6 +17,7 @@ SMALL = {
     "build_and_mesh.py": [str(OUTPUT / "bauble.3mf"), "96"],
     "a_family.py": [str(OUTPUT), "48"],
     "fly_around.py": [str(OUTPUT), "4", "360x240"],
+    "from_numpy.py": [str(OUTPUT / "implant.3mf"), "96"],
 }
 """The arguments that examples run with, small enough for a page."""
 

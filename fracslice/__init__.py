@@ -80,7 +80,9 @@ _WHERE = {
     "Slices": "api.calls",
     "Work": "work",
     "__version__": "version",
+    "from_grid": "volume.level_sets",
     "from_trimesh": "mesh.models",
+    "from_vdb": "volume.level_sets",
     "make_mesh": "api.calls",
     "read": "scene",
     "reads": "scene",
@@ -88,14 +90,18 @@ _WHERE = {
     "slice_layers": "api.calls",
     "to_xml": "scene",
     "write": "formats",
+    "write_vdb": "api.grids",
 }
+
+_PACKAGE = "volume"
+"""Formula with the name of a package of ours: here it is `from_vdb`."""
 
 
 def __getattr__(name: str) -> Any:
     """Load a public name on first use, so that importing fracslice loads no other modules."""
     formulas: Any = import_module(".formulas", __name__) if name not in _WHERE else None
     if name == "__all__":
-        return sorted([*_WHERE, *formulas.names()])
+        return sorted({*_WHERE, *formulas.names()} - {_PACKAGE})
     if formulas and name not in formulas.names():
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = formulas.get(name) if formulas else getattr(import_module(f".{_WHERE[name]}", __name__), name)

@@ -1,9 +1,9 @@
-"""OpenVDB grids of samples. Call `fracslice.volume.bricks` instead.
+"""OpenVDB grids of samples. Call `fracslice.volume.bricks` and `fracslice.volume.level_sets` instead.
 
 Arrays are C-contiguous and laid out as in `fracslice.volume.bricks.Bricks`. Long calls release the GIL.
 """
 
-from numpy import float32, int32
+from numpy import float32, float64, int32
 from numpy.typing import NDArray
 
 Point = tuple[float, float, float]
@@ -19,7 +19,11 @@ class Grid:
 
     @staticmethod
     def read(path: str, name: str = "") -> Grid:
-        """Read the named float grid of a .vdb file, or the first one. Raises RuntimeError."""
+        """Read the named grid of a .vdb file, or the first one, of numbers or a mask. Raises RuntimeError."""
+
+    @staticmethod
+    def from_array(values: NDArray[float32], origin: Point, spacing: Point, beyond: float) -> Grid:
+        """Grid of dense samples, [nx, ny, nz], with a value beyond them. Raises ValueError."""
 
     def write(self, path: str, metadata: dict[str, str]) -> None:
         """Write a .vdb file. Raises RuntimeError if it cannot be written completely."""
@@ -33,4 +37,39 @@ class Grid:
     def offset(self, distance: float) -> Grid:
         """Signed distances of the surface, offset outwards by `distance`, scene units. Raises ValueError."""
 
+    def with_cubes(self) -> Grid:
+        """Grid with voxels that are cubes, of the shortest side; itself if they are. Raises ValueError."""
+
+    def less(self, iso: float, turned: bool) -> Grid:
+        """Values minus a number, or turned: that number minus values. Raises ValueError for too many."""
+
+    def narrow_band(self) -> Grid:
+        """Distances within three voxels of where values are 0, negative inside. Raises ValueError."""
+
+    def fog(self) -> Grid:
+        """Densities of a narrow band: 1 inside, 0 outside, and 1/2 at the surface."""
+
+    @property
+    def kind(self) -> str:
+        """Class of the grid, such as "level set" or "fog volume"."""
+
+    half: bool
     name: str
+
+def grids_of(path: str) -> list[str]:
+    """Names of the grids of a .vdb file. Raises RuntimeError."""
+
+def level_set_of(grid: Grid) -> Grid:
+    """The grid near its surface if its values are distances, else its narrow band. Raises ValueError."""
+
+class LevelSet:
+    """See `fracslice.volume.level_sets.LevelSet`. Raises ValueError for a grid without a surface."""
+
+    def __init__(self, grid: Grid) -> None: ...
+    def distances(self, points: NDArray[float64]) -> NDArray[float64]: ...
+    @property
+    def address(self) -> int: ...
+    @property
+    def box(self) -> tuple[Point, Point]: ...
+    @property
+    def steepness(self) -> float: ...

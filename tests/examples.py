@@ -82,6 +82,7 @@ from fracslice.formulas import (
     tree,
     twist,
     union,
+    volume,
     voronoi,
 )
 
@@ -108,6 +109,8 @@ BAR = box(size=(1.6, 0.3, 0.4))
 
 BRACKET = str(Path(__file__).parent / "models" / "bracket.stl")
 """A prism over an L, turned, of 0.576 cubic units and 20 triangles."""
+GRID = str(Path(__file__).parent / "models" / "bracket.vdb")
+"""The same, not turned, as distances at samples 0.1 apart, on its faces and between."""
 WASHER = str(Path(__file__).parent / "models" / "washer.svg")
 """A square of 2 mm with a hole of a diamond of 0.5 square mm, in the middle."""
 
@@ -160,6 +163,7 @@ EXAMPLES: dict[str, Node] = {
     "thread": thread(radius=0.6, pitch=0.3),
     "apollonian": apollonian(level=3),
     "model": model(BRACKET),
+    "volume": volume(GRID),
     "extrude": extrude(WASHER, size=1.4, height=0.6),
     "text": text("o8", FONT, depth=0.4),
     "revolve": revolve(WASHER, size=0.6, offset=0.4),
@@ -236,7 +240,7 @@ EXAMPLES: dict[str, Node] = {
     ),
 }
 
-OF_FILES = {"model", "extrude", "revolve", "text"}
+OF_FILES = {"model", "extrude", "revolve", "text", "volume"}
 """Examples that native code computes, on the CPU alone; each is of a file."""
 
 _TURNED = "return scale * turn(fold(w, 1), (0, 0, 1), 20) + c"
@@ -256,6 +260,7 @@ REPRESENTATIVES = {
     "mirror", "model", "octahedron flake", "perlin noise", "prism", "pseudo kleinian", "quaternion julia 4",
     "repeat overlapping", "revolve", "rounded box", "schwarz_d wall", "shell", "smooth intersection",
     "smooth union", "snowflake", "sphere", "superquadric", "text", "thread", "transform", "tree", "twist x",
+    "volume",
 }  # fmt: skip
 """Examples of which none is built like another; tests that are stamped on all have the others in a night."""
 

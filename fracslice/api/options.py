@@ -16,7 +16,7 @@ from ..common.parameters import REQUIRED, AnyLength, AnyScale, Record, parameter
 from ..errors import SceneError
 from ..fields.devices import choose_device
 from ..fields.node import TriangleMesh
-from ..formats import ENDINGS
+from ..formats import SOLIDS
 from ..formulas import Formula, Node, get
 from ..formulas import names as formula_names
 from ..records import Colour, MeshJob, RenderJob, SliceJob
@@ -241,8 +241,8 @@ def resolve(source: Source) -> Node | Scene:
         how = "; formulas.shape makes a formula of a function" if callable(source) else ""
         raise SceneError(f"{short_repr(source)}: {wanted}{how}")
     path = Path(source)
-    if path.suffix.lower() in ENDINGS:
-        return get("model")(os.fspath(source))
+    if path.suffix.lower() in SOLIDS:
+        return get(SOLIDS[path.suffix.lower()])(os.fspath(source))
     if path.exists() or path.name != os.fspath(source) or path.suffix:
         return read(path)
     name = os.fspath(source)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..common.triangles import Triangles
     from ..work import Work
 
-__all__ = ["ENDINGS", "MeshFormat", "check_format", "mesh_format", "write"]
+__all__ = ["ENDINGS", "SOLIDS", "MeshFormat", "check_format", "mesh_format", "write"]
 
 
 class MeshFormat(NamedTuple):
@@ -35,6 +35,8 @@ class MeshFormat(NamedTuple):
 
 ENDINGS = tuple(f".{module.name.removeprefix('_')}" for module in iter_modules(__path__))
 """Extensions of the formats; the name of a module that begins with a digit has an underscore before."""
+SOLIDS = {**dict.fromkeys(ENDINGS, "model"), ".vdb": "volume"}
+"""Formulas of files that are solids, by their extensions."""
 
 
 def mesh_format(ending: str) -> MeshFormat:

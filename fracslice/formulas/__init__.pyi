@@ -1394,6 +1394,35 @@ def union(*elements: Node, smooth: float = 0.0) -> Node:
     Node
     """
 
+def volume(file: str, grid: str = '', kind: Literal['as stated', 'surface', 'density'] = 'as stated', iso: float | None = None, size: float | None = None, place: Literal['as is', 'centre', 'bed'] = 'as is', units: Literal['um', 'µm', 'mm', 'cm', 'in', 'm'] = 'mm', sha256: str | None = None) -> Node:
+    """A grid of an OpenVDB file (Museth 2013, "VDB: High-Resolution Sparse Volumes with Dynamic Topology").
+    Near the surface its distances, linear between samples; farther off, distances to where edges of the grid
+    cross the surface. Other numbers become distances first. L is measured at the samples, with a margin.
+
+    Parameters
+    ----------
+    file : the name of a file
+        an OpenVDB file, in the folder of the scene
+    grid : text in one line, default ''
+        name of a grid of the file; by default surface or density, or the only one
+    kind : as stated, surface or density, default 'as stated'
+        signed distances, negative inside, or densities, larger inside; or what the class of the grid says
+    iso : a number
+        value at the surface; by default 0 of a surface and 0.5 of a density
+    size : a number > 0
+        the longest side; without it, a scene unit is a millimetre of the grid
+    place : as is, centre or bed, default 'as is'
+        where the file has it, with its box centred at the origin, or there with its lowest point at z = 0
+    units : um, µm, mm, cm, in or m, default 'mm'
+        unit of the file
+    sha256 : the SHA-256 of the file, 64 hexadecimal digits
+        hash of the file, by which a file that has changed is noticed
+
+    Returns
+    -------
+    Node
+    """
+
 def voronoi(kind: Literal['struts', 'walls'] = 'struts', period: float = 1.0, thickness: float = 0.1, irregularity: float = 0.8, seed: int = 0) -> Node:
     """A foam of Voronoi cells, without end; put `bounds` around it (Voronoi 1908; cells by Worley 1996,
     "A cellular texture basis function").

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from ..common.parameters import MILLIMETRES, REQUIRED, Choice, Digest, File, Number, alternatives
-from ..errors import MeshError, SceneError
+from ..errors import MeshError, SceneError, VolumeError
 from ..expr.vocabulary import solid_distance
-from ..fields.box import Box, Triple, three
+from ..fields.box import Box, three
 from ..fields.registry import Formula, Node, shape
 from ..formats import ENDINGS, mesh_format
 
@@ -37,7 +37,7 @@ def reading(node: Node, name: str) -> Iterator[None]:
     """Give errors about the file of a node its place; `name`: parameter of the file."""
     try:
         yield
-    except MeshError as error:
+    except (MeshError, VolumeError) as error:
         raise node.fail(f'{name}="{node[name]}": {error}') from error
 
 
@@ -72,24 +72,34 @@ def model_check(node: Node) -> None:
 
 @model.arguments
 def model_arguments(node: Node) -> dict[str, Any]:
-    origin, scale = _placement(node)
-    return {"origin": origin, "scale": scale, "inverse": 1 / scale, "solid": _solid(node)}
+    solid = _solid(node)
+    return {**placement(node, solid.box), "solid": solid}
 
 
 @model.bounds
 def model_bounds(node: Node) -> Box:
-    box, (origin, scale) = _solid(node).box, _placement(node)
-    corners = [[o + scale * c for o, c in zip(origin, corner, strict=True)] for corner in (box.lo, box.hi)]
-    return Box.around([three(corner) for corner in corners])
+    return placed_box(node, _solid(node).box)
 
 
-def _placement(node: Node) -> tuple[Triple, float]:
-    """Where the origin of the file's coordinates is, and the length of a mm of the file, scene units."""
-    box: Box = _solid(node).box
+def placement(node: Node, box: Box) -> dict[str, Any]:
+    """Where the origin of a file's coordinates is, the length of their unit in scene units, and its inverse.
+
+    `box`: bounds of the solid in the file.
+    """
     scale = MILLIMETRES[node["units"]] if node["size"] is None else node["size"] / max(box.size)
     x, y, z = (-scale * c for c in box.centre)
     places = {"as is": (0.0, 0.0, 0.0), "centre": (x, y, z), "bed": (x, y, -scale * box.lo[2])}
-    return places[node["place"]], scale
+    return {"origin": places[node["place"]], "scale": scale, "inverse": 1 / scale}
+
+
+def placed_box(node: Node, box: Box) -> Box:
+    """Bounds of a solid of a file, in the scene."""
+    placed = placement(node, box)
+    corners = [
+        [o + placed["scale"] * c for o, c in zip(placed["origin"], corner, strict=True)]
+        for corner in (box.lo, box.hi)
+    ]
+    return Box.around([three(corner) for corner in corners])
 
 
 def _solid(node: Node) -> Any:

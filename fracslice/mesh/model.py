@@ -362,7 +362,8 @@ class Mesh(Triangles):
         Parameters
         ----------
         path : str or Path
-            File; the extension selects the format, one of `fracslice.formats.ENDINGS`.
+            File; the extension selects the format, one of `fracslice.formats.ENDINGS`, or .vdb for distances
+            on 256 voxels along the longest side, of a closed mesh (`write_vdb` has others).
         metadata : mapping, optional
             Names and values, as far as the format supports them, for example Title.
 
@@ -375,7 +376,13 @@ class Mesh(Triangles):
         ------
         ExportError
             For an empty mesh, an unknown extension, or a file that cannot be written.
+        MeshError
+            If the mesh encloses no solid, which a .vdb file needs.
         """
+        if Path(path).suffix.lower() == ".vdb":
+            from ..api.grids import write_vdb
+
+            return write_vdb(self, path, metadata=metadata)
         from ..formats import write
 
         return write(self, path, metadata)

@@ -31,7 +31,7 @@ from .cleaning import quantise_mesh
 from .model import Mesh
 from .spatial import build
 
-MOST, MOST_BYTES = 1 << 21, 1 << 26
+MOST, MOST_BYTES = 1 << 21, 1 << 27
 """Most triangles of a solid, and bytes of a file that is no format of meshes."""
 MOST_AROUND = 1 << 13
 """Most triangles around a vertex, as each is compared with each."""
@@ -118,7 +118,7 @@ def file_hash(path: str) -> str:
             most = mesh_format(ending).most if ending in ENDINGS else MOST_BYTES
             if (size := os.fstat(file.fileno()).st_size) > most:
                 large = f"a file of {size / 1e6:.0f} MB: expected at most {most / 1e6:.0f} MB"
-                raise MeshError(f"{large}, of fewer triangles or in a binary format")
+                raise MeshError(f"{large}, of fewer triangles or samples, or in a binary format")
             digest = hashlib.sha256()
             while data := file.read(CHUNK):
                 digest.update(data)

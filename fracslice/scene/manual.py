@@ -158,7 +158,9 @@ def _shipped_formulas() -> list[str]:
 
 def package_stub(modules: Mapping[str, str]) -> str:
     """Text of the stub file of `fracslice`: its public names, and every formula."""
-    exported = {**modules, **dict.fromkeys(_shipped_formulas(), "formulas")}
+    packages = {path.parent.name for path in Path(__file__).parents[1].glob("*/__init__.py")}
+    formulas = [name for name in _shipped_formulas() if name not in packages]
+    exported = {**modules, **dict.fromkeys(formulas, "formulas")}
     lines = sorted(f"from .{module} import {name} as {name}" for name, module in exported.items())
     return "\n".join([_MADE, *lines, ""])
 

@@ -156,7 +156,11 @@ def write_vdb(
     bricks: Bricks, path: str | os.PathLike[str], metadata: Mapping[str, str] | None = None
 ) -> None:
     """Write bricks to a .vdb file with one grid named `NAME`."""
-    grid = to_grid(bricks)
+    write_grid(to_grid(bricks), path, metadata)
+
+
+def write_grid(grid: Grid, path: str | os.PathLike[str], metadata: Mapping[str, str] | None = None) -> None:
+    """Write a grid to a .vdb file."""
     try:
         grid.write(os.fspath(path), dict(metadata or {}))
     except RuntimeError as error:

@@ -47,7 +47,6 @@ def wrong(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copy(folder / "whole.stl", folder / "stl.xml")
     (folder / "empty.xml").touch()
     (folder / "picture.png").write_bytes(picture)
-    (folder / "samples.vdb").write_bytes(b" BDV\0\0\0\0" + bytes(range(256)))
     (folder / "svg.xml").write_text('<svg xmlns="http://www.w3.org/2000/svg"/>')
     (folder / "cut.xml").write_text(BALL[:40])
     with zipfile.ZipFile(folder / "other.3mf", "w") as archive:
@@ -77,7 +76,6 @@ SCENES = {
     **{f"whole{ending}": MODEL for ending in ENDINGS},
     "stl.xml": NO_SCENE,
     "picture.png": NO_SCENE,
-    "samples.vdb": NO_SCENE,
     "other.zip": NO_SCENE,
     "empty.xml": "expected a scene, the file is empty",
     "svg.xml": "<svg> is not a known element; expected <scene>",

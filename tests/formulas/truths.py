@@ -199,6 +199,7 @@ TRUTHS: dict[str, list[Truth]] = {
     "revolve": [Volume(EXAMPLES["revolve"], 2 * pi * 0.7 * 0.6**2 * (1 - 0.5 / 4))],
     "text": [Equal(EXAMPLES["text"].changed(size=2, depth=0.8), f.transform(EXAMPLES["text"], scale=2))],
     "extrude": [Volume(WASHER, 1.4**2 * (1 - 0.5 / 4) * 0.6), Equal(WASHER, HOLED, sign=True)],
+    "volume": [Equal(EXAMPLES["volume"], L_SHAPE, sign=True)],
     "model": [Volume(BRACKET, 0.576), Equal(BRACKET, L_SHAPE, rotation(X, 20) @ rotation(Z, 35), sign=True)],
     "sphere": [Equal(BALL, lambda *p: np.linalg.norm(p, axis=0) - 0.7), Volume(BALL, 4 / 3 * pi * 0.343)],
     "box": [

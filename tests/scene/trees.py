@@ -24,7 +24,7 @@ from fracslice.formulas import Node
 from fracslice.scene import scene
 from fracslice.scene.layout import formulas
 from fracslice.scene.model import computing
-from tests.examples import BRACKET
+from tests.examples import BRACKET, GRID
 
 SHAPES = [f for f in formulas() if f.children[1] == 0]
 OTHERS = [f for f in formulas() if f.children[1] != 0]
@@ -61,9 +61,9 @@ _POSSIBLE: dict[type, Any] = {
     Count: _count,
     Vector: _vector,
     Choice: lambda kind: st.sampled_from(kind.choices),
-    File: lambda kind: st.just(BRACKET) if kind.inside else st.none(),
+    File: lambda kind: st.sampled_from((BRACKET, GRID)) if kind.inside else st.none(),
     Digest: lambda kind: st.none(),
-    Label: lambda kind: st.sampled_from(("LUMEN", "    Digest: lambda kind: st.none(),lt;", "e\u0301")),
+    Label: lambda kind: st.sampled_from(("LUMEN", "surface", "<&lt;", "e\u0301")),
     Axis: lambda kind: st.sampled_from("xyz"),
 }
 

@@ -78,7 +78,7 @@ def test_what_cannot_be_written_or_read_is_said(tmp_path: Path) -> None:
     with pytest.raises(VolumeError, match=r"text\.vdb"):
         read_vdb(tmp_path / "text.vdb")
     write_vdb(ball(), tmp_path / "ball.vdb")
-    with pytest.raises(VolumeError, match="no float grid named other"):
+    with pytest.raises(VolumeError, match="no grid of numbers named other"):
         read_vdb(tmp_path / "ball.vdb", "other")
     whole = (tmp_path / "ball.vdb").read_bytes()
     (tmp_path / "half.vdb").write_bytes(whole[: len(whole) // 2])

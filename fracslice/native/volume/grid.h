@@ -10,6 +10,7 @@
 #include <map>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "../array.h"
 #include "bricks.h"
@@ -33,10 +34,32 @@ BrickArrays bricks_from_grid(const FloatGrid& grid);
 
 // Origin and spacing of the grid's points. Throws std::invalid_argument unless the voxels are axis-aligned cubes.
 std::pair<std::array<double, 3>, double> placement_of(const FloatGrid& grid);
+// True if the axes of the grid are those of space, of either sign and in any order.
+bool along_axes(const FloatGrid& grid);
 
-// Both throw std::runtime_error with the path, also for a full disk, which OpenVDB does not report.
+// A grid of dense samples [size[0], size[1], size[2]], with `beyond` around them.
+FloatGrid::Ptr grid_from_array(const float* values, const std::array<size_t, 3>& size, const std::array<double, 3>& origin,
+                               const std::array<double, 3>& spacing, float beyond);
+// The same with voxels that are cubes, of the shortest side; itself if they are. Throws std::invalid_argument for axes that are
+// not at right angles, or too many samples.
+FloatGrid::Ptr with_cubes(const FloatGrid::Ptr& grid);
+// Values minus a number, or that number minus values, with samples in place of active tiles.
+FloatGrid::Ptr less(const FloatGrid& grid, float iso, bool turned);
+// Of the distances of a narrow band: densities, 1 inside, 0 outside, and 1/2 at the surface, in the middle of a ramp.
+FloatGrid::Ptr fog(const FloatGrid& grid);
+
+// Its leaves in the order of their origins.
+std::vector<const FloatGrid::TreeType::LeafNodeType*> sorted_leaves(const FloatGrid::TreeType& tree);
+
+// A name with "?" for what is no printable ASCII.
+std::string printable(std::string name);
+
+// All three throw std::runtime_error with the path, also for a full disk, which OpenVDB does not report.
 void write_grid(const FloatGrid::Ptr& grid, const std::string& path, const Metadata& metadata);
+// The grid of a name, or the first one, of numbers or of a mask, which is 1 and 0.
 FloatGrid::Ptr read_grid(const std::string& path, const std::string& name);
+// Names of all grids.
+std::vector<std::string> grids_of(const std::string& path);
 
 // A field that is not a distance, made one in scene units around the same surface (fast sweeping, Zhao 2004).
 FloatGrid::Ptr redistance(const FloatGrid& grid);

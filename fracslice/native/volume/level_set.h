@@ -1,0 +1,48 @@
+// A grid around a surface as machine code asks for it: signed distances of the points of a packet.
+#pragma once
+#include "../mesh/distances.h"
+#include "surface_points.h"
+
+namespace fracslice::volume {
+
+// Half the width of the narrow bands that are made here, voxels: that of OpenVDB's own.
+constexpr double kBand = 3;
+
+// A narrow band of distances around the surface where numbers of a grid are 0, negative inside. Throws
+// std::invalid_argument if there is none, or its inside is without closure.
+FloatGrid::Ptr narrow_band(const FloatGrid& grid);
+
+// The grid itself, without what is far from the surface, if its values are distances, negative inside and positive far away:
+// their steepest slope is from 1/2 to 2. Else the narrow band of its surface.
+FloatGrid::Ptr level_set_of(const FloatGrid& grid);
+
+// Values at most `steepness()` times as far apart as points are, divided by that: near the surface they are those of
+// the grid, between samples linear along each axis; beyond, the distance to the nearest point where an edge of the grid
+// crosses the surface.
+class LevelSet {
+  public:
+    static constexpr size_t kAxes = 3;
+
+    // Of `level_set_of` a grid. Throws std::invalid_argument if there is no surface.
+    explicit LevelSet(const FloatGrid& grid);
+    LevelSet(const LevelSet&) = delete;
+    LevelSet& operator=(const LevelSet&) = delete;
+
+    const mesh::Distances* entry() const { return &entry_; }
+    double operator()(const double* p, size_t& found) const;
+    double steepness() const { return steepness_; }
+    // Corners of the box of the inside.
+    std::array<std::array<double, 3>, 2> box() const;
+
+  private:
+    double linear(const openvdb::Vec3d& q) const;
+    double disagreement() const;
+
+    FloatGrid::Ptr grid_;
+    double voxel_, end_, begin_;  // from value `begin_` to `end_`, linear ones become distances to points
+    SurfacePoints points_;
+    double steepness_;
+    mesh::Distances entry_;
+};
+
+}  // namespace fracslice::volume
