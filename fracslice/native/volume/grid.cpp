@@ -1,8 +1,11 @@
-#include "grid.h"
-
+// Bricks <-> OpenVDB: the extension module fracslice._vdb. Its Python face and its documentation are in ../../_vdb.pyi.
+//
+// Python extensions are built with hidden visibility. OpenVDB's templates hold once-flags and type registries that must be
+// the same objects here and in libopenvdb, so its headers need default visibility, or openvdb::initialize() crashes.
 #pragma GCC visibility push(default)
 #include <openvdb/io/Archive.h>
 #include <openvdb/io/File.h>
+#include <openvdb/openvdb.h>
 #include <openvdb/tools/ChangeBackground.h>
 #include <openvdb/tools/Count.h>
 #include <openvdb/tools/FastSweeping.h>
@@ -10,6 +13,9 @@
 #include <openvdb/tools/ValueTransformer.h>
 #pragma GCC visibility pop
 
+#include <nanobind/stl/map.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
@@ -18,7 +24,44 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <map>
 #include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "../array.h"
+#include "brick_arrays.h"
+
+namespace fracslice::volume {
+
+using FloatGrid = openvdb::FloatGrid;
+using Metadata = std::map<std::string, std::string>;
+
+struct BrickArrays {
+    Array<int32_t> ijk;
+    Array<float> values;
+    Array<int32_t> index;
+    std::array<size_t, 3> size;
+    std::array<int32_t, 3> shift;  // grid index of point (0, 0, 0) of the arrays
+};
+
+// A level set: active where sampled; the background is the largest sample; unsampled inside bricks are inactive tiles.
+FloatGrid::Ptr grid_from_bricks(const Bricks& bricks, const std::array<double, 3>& origin, double voxel);
+BrickArrays bricks_from_grid(const FloatGrid& grid);
+
+// Origin and spacing of the grid's points. Throws std::invalid_argument unless the voxels are axis-aligned cubes.
+std::pair<std::array<double, 3>, double> placement_of(const FloatGrid& grid);
+
+// Both throw std::runtime_error with the path, also for a full disk, which OpenVDB does not report.
+void write_grid(const FloatGrid::Ptr& grid, const std::string& path, const Metadata& metadata);
+FloatGrid::Ptr read_grid(const std::string& path, const std::string& name);
+
+// A field that is not a distance, made one in scene units around the same surface (fast sweeping, Zhao 2004).
+FloatGrid::Ptr redistance(const FloatGrid& grid);
+// The surface moved outwards by `distance` scene units; negative: inwards. The grid must hold distances.
+FloatGrid::Ptr offset(const FloatGrid& grid, double distance);
+
+}  // namespace fracslice::volume
 
 namespace fracslice::volume {
 namespace {
@@ -197,3 +240,54 @@ FloatGrid::Ptr offset(const FloatGrid& grid, double distance) {
 }
 
 }  // namespace fracslice::volume
+
+namespace fracslice::volume {
+namespace {
+
+struct Grid {
+    FloatGrid::Ptr vdb;
+};
+
+Grid from_bricks(const IjkArray& ijk, const ValuesArray& values, const IndexArray& index,
+                 const std::array<double, 3>& origin, double voxel) {
+    Bricks bricks = view(ijk, values, index);
+    nb::gil_scoped_release released;
+    return {grid_from_bricks(bricks, origin, voxel)};
+}
+
+nb::tuple to_bricks(const Grid& grid) {
+    BrickArrays out;
+    {
+        nb::gil_scoped_release released;
+        out = bricks_from_grid(*grid.vdb);
+    }
+    auto [origin, voxel] = placement_of(*grid.vdb);
+    for (int k = 0; k < 3; ++k) origin[k] += voxel * out.shift[k];
+    size_t n = out.ijk.rows;
+    auto [x, y, z] = out.size;
+    return nb::make_tuple(origin, voxel, to_numpy(std::move(out.ijk), {n, 3}),
+                          to_numpy(std::move(out.values), {n, kSamples}), to_numpy(std::move(out.index), {x, y, z}));
+}
+
+}  // namespace
+}  // namespace fracslice::volume
+
+NB_MODULE(_vdb, module) {
+    namespace nb = nanobind;
+    using namespace fracslice::volume;
+    using namespace nanobind::literals;
+    nb::set_leak_warnings(false);  // the command exits without a search for garbage
+    using released = nb::call_guard<nb::gil_scoped_release>;
+    openvdb::initialize();
+    nb::class_<Grid>(module, "Grid")
+        .def_static("from_bricks", &from_bricks, "ijk"_a, "values"_a, "index"_a, "origin"_a, "voxel"_a)
+        .def_static("read", [](const std::string& path, const std::string& name) { return Grid{read_grid(path, name)}; },
+                    "path"_a, "name"_a = "", released())
+        .def("write", [](const Grid& g, const std::string& path, const Metadata& metadata) { write_grid(g.vdb, path, metadata); },
+             "path"_a, "metadata"_a, released())
+        .def("to_bricks", &to_bricks)
+        .def("redistance", [](const Grid& g) { return Grid{redistance(*g.vdb)}; }, released())
+        .def("offset", [](const Grid& g, double distance) { return Grid{offset(*g.vdb, distance)}; }, "distance"_a, released())
+        .def_prop_rw("name", [](const Grid& g) { return g.vdb->getName(); },
+                     [](Grid& g, const std::string& name) { g.vdb->setName(name); });
+}
