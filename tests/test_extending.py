@@ -13,9 +13,7 @@ from pathlib import Path
 import pytest
 
 from fracslice.export import layers
-from fracslice.fields.registry import run_file
 from fracslice.mesh.models import read_mesh
-from fracslice.scene import reads
 from tests.export.test_slices import run
 
 FORMULA = '''
@@ -32,6 +30,15 @@ def pearl(x, y, z, radius):
 def pearl_bounds(node):
     return Box.centred(node["radius"])
 '''
+
+MEASURED = """
+from fracslice import reads
+from fracslice.fields.registry import run_file
+
+run_file("pearl.py")
+ball = reads('<scene version="1"><solid size="10mm"><pearl radius="0.5"/></solid></scene>').root
+print(ball.distance([[2.0, 0.0, 0.0]])[0])
+"""
 
 FORMAT = """
 from fracslice.export.layer_formats import FileFormat
@@ -92,9 +99,7 @@ print(picture[5, 8] > picture[10, 8] + 30)
 
 def test_a_formula(tmp_path: Path) -> None:
     (tmp_path / "pearl.py").write_text(FORMULA)
-    run_file(str(tmp_path / "pearl.py"))
-    ball = reads('<scene version="1"><solid size="10mm"><pearl radius="0.5"/></solid></scene>').root
-    assert ball.distance([[2.0, 0.0, 0.0]]) == pytest.approx(1.5)
+    assert float(extended("fracslice.formulas", tmp_path, MEASURED).stdout) == pytest.approx(1.5)
 
 
 def test_a_format_of_layers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

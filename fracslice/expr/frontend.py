@@ -174,6 +174,8 @@ def text_function(
     return source_function(FormulaReader, source, ())
 
 
+_VOCABULARY = vocabulary.ALL | {"int"}
+
 _WORD = re.compile(r"[A-Za-z_]\w*")
 
 
@@ -611,7 +613,7 @@ class FormulaReader(Reader):
         return whole if op == "floordiv" else self.add("sub", a, self.add("mul", b, whole))
 
     def operation(self, node: ast.expr, called: Any) -> str | None:
-        if called is _UNKNOWN and isinstance(node, ast.Name) and node.id in vocabulary.NAMES | {"int"}:
+        if called is _UNKNOWN and isinstance(node, ast.Name) and node.id in _VOCABULARY:
             return node.id
         if called is int or is_intrinsic(called):
             return super().operation(node, called)

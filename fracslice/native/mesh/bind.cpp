@@ -11,10 +11,8 @@
 #include "quantise.h"
 #include "predicates.h"
 #include "selection.h"
-#include "self_intersections.h"
-#include "stl.h"
-#include "thumbnail.h"
 #include "tree.h"
+#include "export.h"
 
 namespace fracslice::mesh {
 namespace {

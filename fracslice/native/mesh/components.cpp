@@ -11,7 +11,7 @@
 #include "../disjoint_sets.h"
 #include "blocks.h"
 #include "predicates.h"
-#include "vec3.h"
+#include "triangles.h"
 
 namespace fracslice::mesh {
 namespace {

@@ -8,7 +8,6 @@
 
 #include "../array.h"
 #include "triangles.h"
-#include "vec3.h"
 
 namespace fracslice::mesh {
 

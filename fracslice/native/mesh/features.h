@@ -10,7 +10,7 @@
 
 #include "../array.h"
 #include "cells.h"
-#include "vec3.h"
+#include "triangles.h"
 
 // Where the planes through a cell's crossings meet.
 namespace fracslice::mesh {

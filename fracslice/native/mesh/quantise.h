@@ -9,7 +9,6 @@
 
 #include "../array.h"
 #include "triangles.h"
-#include "vec3.h"
 
 // Equal corners made one vertex, bit by bit.
 namespace fracslice::mesh {

@@ -1,4 +1,4 @@
-#include "self_intersections.h"
+#include "tree.h"
 
 #include <atomic>
 #include <bit>

@@ -2,9 +2,7 @@
 #include "../disjoint_sets.h"
 #include "../mesh/input.h"
 #include "../volume/brick_arrays.h"
-#include "capsules.h"
 #include "sampled_field.h"
-#include "solid_components.h"
 
 #include <cstring>
 #include <numeric>

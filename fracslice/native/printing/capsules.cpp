@@ -1,4 +1,4 @@
-#include "capsules.h"
+#include "sampled_field.h"
 
 #include <algorithm>
 #include <cmath>

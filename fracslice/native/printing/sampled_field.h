@@ -2,10 +2,12 @@
 #pragma once
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <mutex>
 #include <span>
 #include <vector>
 
+#include "../array.h"
 #include "../volume/bricks.h"
 
 namespace fracslice::printing {
@@ -67,5 +69,36 @@ class SampledField {
     mutable std::once_flag once_;
     mutable std::vector<uint8_t> beside_;  // samples with the opposite sign among the 26 around them
 };
+
+// Components, numbered from 0. Number 0 is the space that extends beyond the samples.
+template <class Index>
+struct SolidComponents {
+    Array<Index> of;             // of the space beyond, of each sample, and of each unsampled brick in the order of the index
+    std::vector<int64_t> sizes;  // samples
+    std::vector<uint8_t> inside;
+};
+
+// Samples are connected along edges of the grid; an unsampled brick is connected as a whole. values: [layout.count, 512].
+template <class Index, class Value>
+SolidComponents<Index> solid_components(const volume::Layout& layout, const Value* values);
+
+// Grid edges between samples of different signs, each counted for its inside component. labels: of samples, each below `count`.
+template <class Index, class Value>
+std::vector<int64_t> crossings_by_component(const volume::Layout& layout, const Value* values, const Index* labels, size_t count);
+
+// Start, direction vector and inverse squared length of an axis, voxels; 0 for a ball.
+using Line = std::array<double, 7>;
+using Place = std::array<double, 3>;
+
+// Bricks of an index of this shape within `reach` voxels of the points.
+std::vector<uint8_t> bricks_near(std::span<const Place> points, double reach, const std::array<int, 3>& shape);
+
+// Least squared distances from samples to capsules within reach; of[m] is the axis of point m, which are at most a voxel apart.
+// squares: [layout.count, 512], to be lowered.
+void lower_squares(std::span<const Line> lines, std::span<const Place> points, std::span<const int32_t> of, double reach,
+                   const volume::Layout& layout, float* squares);
+
+// Grid steps from each sample to the nearest seed, at most 255, by breadth-first search over sampled bricks.
+std::vector<uint8_t> steps_to(const volume::Layout& layout, const bool* seeds);
 
 }  // namespace fracslice::printing

@@ -1,4 +1,4 @@
-#include "solid_components.h"
+#include "sampled_field.h"
 
 #include <array>
 #include <numeric>

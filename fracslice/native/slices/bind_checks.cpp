@@ -1,6 +1,6 @@
 // Functions of fracslice._slices on layers as runs of pixels.
 #include "../numpy.h"
-#include "feature_graph.h"
+#include "layer_runs.h"
 
 #include <cstring>
 #include <stdexcept>

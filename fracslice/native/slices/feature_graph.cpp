@@ -1,4 +1,4 @@
-#include "feature_graph.h"
+#include "layer_runs.h"
 
 #include <algorithm>
 #include <limits>

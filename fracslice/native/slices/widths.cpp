@@ -1,4 +1,4 @@
-#include "widths.h"
+#include "layer_runs.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,8 @@
 // Extreme points of a solid in given directions, by pattern search (Hooke and Jeeves 1961).
 #pragma once
-
 #include <array>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "field_values.h"
@@ -86,5 +86,26 @@ class Side {
     Columns columns_;
     Points points_;  // kept between calls
 };
+
+// Rows of coordinates with any strides, and their placement: scale * p + offset, for a point p in scene units.
+struct PlacedPoints {
+    const double* data;
+    ptrdiff_t row, column;
+    double scale;
+    std::array<double, 3> offset;
+
+    double at(size_t i, size_t axis) const { return (data[ptrdiff_t(i) * row + ptrdiff_t(axis) * column] - offset[axis]) / scale; }
+};
+
+// Steps of finite differences, all of one length: along the axes, against them, and along 20 diagonals.
+struct Differences {
+    const double* steps;  // [26, 3]
+    double length;
+};
+
+// |f| over the steepest difference, at most a voxel. The steps against the axes are taken only where those along them are
+// flat, and the diagonals where both are.
+void surface_error(const FieldValues& field, const PlacedPoints& points, const Differences& differences, double voxel,
+                   std::span<double> errors);
 
 }  // namespace fracslice::volume

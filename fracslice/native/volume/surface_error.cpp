@@ -1,4 +1,4 @@
-#include "surface_error.h"
+#include "extent.h"
 
 #include <tbb/parallel_for.h>
 

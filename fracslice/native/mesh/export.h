@@ -1,6 +1,5 @@
-// Triangles as binary STL holds them.
+// What leaves a mesh: triangles as binary STL holds them, rows of text, and a small picture (`Mesh._repr_png_`).
 #pragma once
-
 #include <cstdint>
 #include <span>
 #include <string>
@@ -22,5 +21,8 @@ void write_stl(const MeshView& mesh, uint8_t* out);
 // read back as the same number. `values`: whole rows. Number: float or int64_t.
 template <class Number>
 std::string text_rows(std::span<const Number> values, const std::vector<std::string>& before, const std::string& end);
+
+// The number of the foremost triangle at the centre of each pixel, -1 where there is none; x and y of the mesh are pixels.
+std::vector<int32_t> foremost(const MeshView& mesh, int height, int width);
 
 }  // namespace fracslice::mesh

@@ -1,8 +1,9 @@
-// The sides of an object, and climbs to its tips, for fracslice._native.
+// The sides of an object, climbs to its tips, and the signs of samples, for fracslice._native.
 #include "../unlocked.h"
 #include "bind_field.h"
+#include "brick_arrays.h"
 #include "extent.h"
-#include "surface_error.h"
+#include "signs.h"
 
 #include <tbb/parallel_for.h>
 
@@ -109,6 +110,21 @@ nb::object measured(nb::object entry, const nb::ndarray<const double, nb::shape<
     return to_numpy(std::move(errors), {n});
 }
 
+nb::object signs(const ValuesArray& values, int threads) {
+    Bricks bricks{{nullptr, values.shape(0), nullptr, {}}, values.data()};
+    std::vector<Signs> result = unlocked(threads, [&] { return signs_of(bricks); });
+    Array<uint8_t> bytes(result.size(), sizeof(Signs));
+    std::copy_n(reinterpret_cast<const uint8_t*>(result.data()), result.size() * sizeof(Signs), bytes.data.get());
+    return to_numpy(std::move(bytes), {result.size(), kSide, kSide});
+}
+
+int64_t count_open_edges(const IjkArray& ijk, const ValuesArray& values, const IndexArray& index) {
+    Bricks bricks = view(ijk, values, index);
+    nb::gil_scoped_release released;
+    check(bricks);
+    return open_edges(bricks, signs_of(bricks));
+}
+
 }  // namespace
 
 void bind_extent(nb::module_& module) {
@@ -126,6 +142,12 @@ void bind_extent(nb::module_& module) {
     module.def("surface_error", &measured, "field"_a, "points"_a, "scale"_a, "offset"_a, "steps"_a, "step"_a, "voxel"_a,
                "threads"_a = 0);
     module.def("climb", &climbed, "field"_a, "starts"_a, "steps"_a, "gain"_a, "first"_a, "exact"_a, "threads"_a = 0);
+}
+
+void bind_signs(nb::module_& module) {
+    using namespace nanobind::literals;
+    module.def("signs", &signs, "values"_a, "threads"_a = 0);
+    module.def("open_edges", &count_open_edges, "ijk"_a, "values"_a, "index"_a);
 }
 
 }  // namespace fracslice::volume
