@@ -9,10 +9,10 @@ from typing import Any
 from numpy import bool_, float32, float64, int8, int16, int32, int64, uint8
 from numpy.typing import NDArray
 
-from .expr.machine import Function
+from .expr.machine import CompiledFunction
 
 Point = tuple[float, float, float]
-Loop = tuple[Function, NDArray[Any], NDArray[Any]] | Callable[..., None]
+Loop = tuple[CompiledFunction, NDArray[Any], NDArray[Any]] | Callable[..., None]
 """A compiled loop, its parameters and its frame, in its precision; or a function of the rows it reads,
 [6, n], the rows it writes, and for an iterative loop the number of steps.
 """
@@ -61,7 +61,7 @@ def marching_cubes(
 def signs(values: NDArray[float32], threads: int = 0) -> NDArray[uint8]:
     """Sign bits uint8 [n, 8, 8] of samples float32 [n, 512]: bit z of byte (x, y) is set if < 0."""
 
-Entry = tuple[Function, NDArray[Any]] | Callable[[NDArray[float64], NDArray[float64]], None]
+Entry = tuple[CompiledFunction, NDArray[Any]] | Callable[[NDArray[float64], NDArray[float64]], None]
 """A field: `Kernel.entry`, machine code and its parameters, or a function of points [3, n] and of values
 [1, n] to be written.
 """

@@ -10,7 +10,7 @@ from enum import Enum
 from numpy import bool_, float32, float64, int32, int64, uint8
 from numpy.typing import NDArray
 
-from .expr.machine import Function
+from .expr.machine import CompiledFunction
 from .slicing.runs import Runs
 
 class BorderError(ValueError):
@@ -85,7 +85,8 @@ class Slab:
     def __init__(
         self,
         memory: Memory,
-        entry: tuple[Function, NDArray[float32]] | Callable[[NDArray[float32], NDArray[float32]], None],
+        entry: tuple[CompiledFunction, NDArray[float32]]
+        | Callable[[NDArray[float32], NDArray[float32]], None],
         bounds: ProbeBounds,
         frame: tuple[float, float, float, float],
         z: list[float],

@@ -21,7 +21,7 @@ from ..mesh.model import Mesh
 
 if TYPE_CHECKING:
     from ..fields.box import Box
-    from ..fields.graph import Operation
+    from ..fields.operations import Operation
 
 LEVEL = 9
 ELEMENTS = {

@@ -26,8 +26,8 @@ from . import vocabulary
 from .functions import fingerprint, identity, is_number, parameters, scope
 from .graph import (
     Block,
+    FlowGraph,
     Function,
-    Graph,
     MismatchError,
     Names,
     Value,
@@ -151,7 +151,7 @@ def source_function(kind: type[Reader], source: Source, fixed: Fixed, **given: A
     known = dict(fixed)
     names = tuple(name for name in source.names if name not in known)
 
-    def read(width: Width) -> Graph:
+    def read(width: Width) -> FlowGraph:
         reader = kind(width, source=source, fixed=known, **given)
         reader.begin(names)
         return reader.read()
@@ -199,7 +199,7 @@ class Reader(Writer):
     def fail(self, node: ast.AST, message: str) -> NoReturn:
         raise self.source.error(node, message)
 
-    def read(self) -> Graph:
+    def read(self) -> FlowGraph:
         """Read the body."""
         self.tree, self.scope = self.source.tree(), self.source.scope()
         self.local = {*(a.arg for a in self.tree.args.args), *stored_names(self.tree)}
@@ -600,7 +600,7 @@ class FormulaReader(Reader):
 
     kind = "formula"
 
-    def read(self) -> Graph:
+    def read(self) -> FlowGraph:
         source = self.source
         self.points = set() if source.is_written else check(source.tree(), source.scope(), source.error)
         return super().read()

@@ -95,7 +95,7 @@ class Block:
 
 
 @dataclass(eq=False, repr=False)
-class Graph:
+class FlowGraph:
     """Body of a function; its first block is the beginning."""
 
     arguments: list[Value]
@@ -121,16 +121,16 @@ class Function:
     name: str
     parameters: tuple[str, ...]
     identity: str  # of everything that it is made of
-    read: Callable[[Width], Graph]
+    read: Callable[[Width], FlowGraph]
     fail: Callable[[Any, str], Exception]  # error about a statement of it
     source: Any = None  # what it is read from
-    _graphs: dict[Width, Graph] = field(default_factory=dict)
+    _graphs: dict[Width, FlowGraph] = field(default_factory=dict)
 
     def __call__(self, *given: Any) -> Any:
         """Evaluate the function on NumPy arrays."""
         return _ON_ARRAYS(self, *given)
 
-    def graph(self, width: Width) -> Graph:
+    def graph(self, width: Width) -> FlowGraph:
         """Return the body for a number of lanes."""
         if width not in self._graphs:
             self._graphs[width] = self.read(width)
@@ -176,7 +176,7 @@ class Writer:
 
     width: Width
     names: Names = field(default_factory=dict)  # values of the names here
-    graph: Graph = field(default_factory=lambda: Graph([]))
+    graph: FlowGraph = field(default_factory=lambda: FlowGraph([]))
     statement: Any = None  # the one that is written
 
     def begin(self, parameters: Sequence[str]) -> None:
@@ -316,7 +316,7 @@ def written(
     `write`: writes the body, and returns the value.
     """
 
-    def read(width: Width) -> Graph:
+    def read(width: Width) -> FlowGraph:
         writer = Writer(width)
         writer.begin(parameters)
         writer.give(write(writer))
@@ -410,14 +410,14 @@ def text(*functions: Function, width: Width = ARRAYS) -> str:
     return "\n\n".join("\n".join(_lines(one, one.graph(width))) for one in reversed(shown))
 
 
-def _called(graph: Graph) -> Iterator[Function]:
+def _called(graph: FlowGraph) -> Iterator[Function]:
     for block in graph.blocks:
         for value in block.body:
             if isinstance(value.data, Function):
                 yield value.data
 
 
-def _lines(function: Function, graph: Graph) -> Iterator[str]:
+def _lines(function: Function, graph: FlowGraph) -> Iterator[str]:
     places = {block: f"b{k}" for k, block in enumerate(graph.blocks)}
     parameters = [v for block in graph.blocks for v in (*block.parameters, *block.body)]
     numbers = {value: f"v{k}" for k, value in enumerate(parameters)}

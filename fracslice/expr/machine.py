@@ -157,7 +157,7 @@ def _layout(sections: list[Section]) -> tuple[dict[int, int], int]:
     return starts, -(-end // WORD.size) * WORD.size
 
 
-class Function:
+class CompiledFunction:
     """Compiled loop, called with arrays and integers. Thread-safe; releases the GIL.
 
     Arrays must be C-contiguous, of the type that the loop's letter says; otherwise a call raises
@@ -194,13 +194,13 @@ class _Pointer:
         return ctypes.c_void_p(array.ctypes.data)
 
 
-def load_object(code: bytes, loops: Sequence[Loop], dtype: np.dtype) -> dict[str, Function]:
+def load_object(code: bytes, loops: Sequence[Loop], dtype: np.dtype) -> dict[str, CompiledFunction]:
     """Load the functions of an object file."""
     try:
         engine: Any = Image(code)
     except UnsupportedError:
         engine = _by_llvm(code)
-    return {loop.name: Function(engine, loop, dtype) for loop in loops}
+    return {loop.name: CompiledFunction(engine, loop, dtype) for loop in loops}
 
 
 def _by_llvm(code: bytes) -> Any:

@@ -17,7 +17,7 @@ from ..expr.frontend import loop_function
 from ..expr.graph import Program
 from ..expr.host import REGISTERS, host, lane_count, toolchain
 from ..expr.loops import Loop, bricks, points
-from ..expr.machine import Function, constant, load_object
+from ..expr.machine import CompiledFunction, constant, load_object
 from .field import Kernel, Loops, Precision
 from .linker import Linked, link
 
@@ -72,7 +72,7 @@ class CpuKernel(Kernel):
         self._offsets = constant(np.indices((8, 8, 8)).reshape(3, 512), self.dtype)
 
     @property
-    def entry(self) -> tuple[Function, np.ndarray]:
+    def entry(self) -> tuple[CompiledFunction, np.ndarray]:
         """Compiled `loops.points` and its parameters."""
         return self._points, self._parameters
 
@@ -124,13 +124,13 @@ def compile_scene(root: Node, precision: Precision = "float32") -> CpuKernel:
 class CompiledLoop:
     """Machine-code implementation of `fields.field.FieldLoop`."""
 
-    function: Function  # compiled loop
+    function: CompiledFunction  # compiled loop
     parameters: np.ndarray  # parameters P of the scene
 
     def __call__(self, frame: np.ndarray, rows: np.ndarray, out: np.ndarray) -> None:
         self.function(self.parameters, frame, *rows, *out, rows.shape[1])
 
-    def native(self, frame: np.ndarray) -> tuple[Function, np.ndarray, np.ndarray]:
+    def native(self, frame: np.ndarray) -> tuple[CompiledFunction, np.ndarray, np.ndarray]:
         """Return the loop for native code; see `FieldLoop.native`."""
         return self.function, self.parameters, frame
 
@@ -148,6 +148,8 @@ def compile_loops(linked: Linked, loops: tuple[Loop, ...], precision: Precision)
     return Loops(width, BATCH, {name: CompiledLoop(f, parameters) for name, f in functions.items()})
 
 
-def load_functions(program: Program, bits: int, width: int, loops: Sequence[Loop]) -> dict[str, Function]:
+def load_functions(
+    program: Program, bits: int, width: int, loops: Sequence[Loop]
+) -> dict[str, CompiledFunction]:
     """Load or compile the functions of loops over the program of a scene, or over none."""
     return load_object(object_code(program, bits, width, loops), loops, np.dtype(f"float{bits}"))

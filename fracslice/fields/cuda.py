@@ -42,7 +42,7 @@ LANES = 1 << 18
 
 @dataclass(frozen=True, eq=False)
 class CudaFunction:
-    """Compiled loop, launched with arrays in GPU memory and numbers; see `machine.Function`."""
+    """Compiled loop, launched with arrays in GPU memory and numbers; see `machine.CompiledFunction`."""
 
     code: ctypes.c_void_p  # loaded function
     kinds: Sequence[tuple[str, np.dtype]]  # letter and type of each argument that is passed

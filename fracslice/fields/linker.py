@@ -25,7 +25,7 @@ from ..common.parameters import AUTO
 from ..errors import KernelError
 from ..expr.frontend import FormulaReader, formula, text_function
 from ..expr.functions import Fixed, InMemory, words
-from ..expr.graph import Function, Graph, Program, Value, Width, Writer, identified, written
+from ..expr.graph import FlowGraph, Function, Program, Value, Width, Writer, identified, written
 from ..expr.language import CHILD
 
 if TYPE_CHECKING:
@@ -402,7 +402,7 @@ def domain_function(kind: type[DomainReader], name: str, given: Arguments, child
     source, known = formula(given.function).source, dict(given.fixed)
     rest = given.read.parameters[4:]
 
-    def read(width: Width) -> Graph:
+    def read(width: Width) -> FlowGraph:
         reader = kind(width, source=source, fixed=known, child=child)
         reader.begin(PART)
         reader.names.update(zip(rest, given.load(reader), strict=True))

@@ -318,7 +318,7 @@ def make_implicit(
     """
     from ..common.files import check_target
     from ..export.implicit import write_implicit
-    from ..fields.graph import graph
+    from ..fields.operations import operations
     from ..volume.sizing import sizing
 
     what, clock = what or MeshJob(), Clock(work or Work())
@@ -331,10 +331,10 @@ def make_implicit(
     (x, y, _), scale = plan.box.centre, made.scale
     place = Placement(scale, (-scale * x, -scale * y, -scale * plan.box.lo[2]))
     box, outer = (Box.around(map(tuple, place.mm(np.array([b.lo, b.hi])))) for b in (plan.box, plan.outer))
-    operations = graph(plan.root.tree, place.scale, place.offset)
+    listed = operations(plan.root.tree, place.scale, place.offset)
     about = metadata(scene)
-    file = write_implicit(operations, outer, plan.voxel * scale, path, about)
-    return Implicit(file, len(operations), plan.root.tree, place, box, plan.notes)
+    file = write_implicit(listed, outer, plan.voxel * scale, path, about)
+    return Implicit(file, len(listed), plan.root.tree, place, box, plan.notes)
 
 
 def _refuse(how: Print) -> None:

@@ -32,7 +32,7 @@ from ..errors import RenderError
 from ..expr.graph import NOTHING
 from ..expr.host import lane_count
 from ..expr.loops import WIDTH, load, loop, store
-from ..expr.machine import Function
+from ..expr.machine import CompiledFunction
 from ..expr.vocabulary import maximum, where
 from ..fields.cpu import load_functions
 from ..scene.view import View
@@ -217,7 +217,7 @@ def tile_order(width: int, height: int) -> np.ndarray:
 
 
 @lru_cache
-def _loops(dtype: np.dtype) -> dict[str, Function]:
+def _loops(dtype: np.dtype) -> dict[str, CompiledFunction]:
     """Compiled loops of a float type."""
     bits = dtype.itemsize * 8
     return load_functions(NOTHING, bits, lane_count(bits), LOOPS)

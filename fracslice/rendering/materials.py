@@ -14,7 +14,7 @@ from typing import Any
 
 from ..expr import functions
 from ..expr.frontend import FormulaReader, formula, source_function
-from ..expr.graph import Function, Graph, Value, Writer, identified
+from ..expr.graph import FlowGraph, Function, Value, Writer, identified
 from ..expr.vocabulary import absolute, atan2, minimum, sqrt, where
 from ..fields.linker import (
     Arguments,
@@ -50,7 +50,7 @@ class TrapReader(FormulaReader):
 
     trap: str = field(kw_only=True)
 
-    def read(self) -> Graph:
+    def read(self) -> FlowGraph:
         start, _, _ = _TRAPS[self.trap]
         self.names["nearest"] = self.add("add", self.add("mul", 0.0, self.names["x"]), start)
         return super().read()
@@ -76,7 +76,7 @@ class TrapReader(FormulaReader):
 class PaintReader(DomainReader):
     """Reads a domain operator with the paint and the tone of its child's lowest evaluation."""
 
-    def read(self) -> Graph:
+    def read(self) -> FlowGraph:
         zero = self.add("mul", 0.0, self.names["x"])
         self.names |= {"lowest": self.add("add", zero, 1e30), "paint": zero, "tone": zero}
         return super().read()

@@ -14,7 +14,7 @@ from fracslice.cli.main import run
 from fracslice.common.parameters import AUTO
 from fracslice.errors import KernelError, MeshError, SceneError
 from fracslice.export.implicit import write_implicit
-from fracslice.fields import graph as graphs
+from fracslice.fields import operations as graphs
 from fracslice.fields.reference import reference
 from fracslice.formulas import Node, mandelbulb, menger, sphere, transform, twist, union
 from fracslice.jobs.mesh import make_implicit
@@ -139,7 +139,7 @@ def test_a_third_of_the_shapes_and_every_operator_are_their_fields(tmp_path: Pat
     points = np.random.default_rng(3).uniform(-1.2, 1.2, (3, 500))
     for root in roots:
         known = root.changed(**{k: 4 for k, v in root.values.items() if isinstance(v, str) and v == AUTO})
-        made = write_implicit(graphs.graph(known), known.bounds.box, 0.1, tmp_path / "one.3mf", {})
+        made = write_implicit(graphs.operations(known), known.bounds.box, 0.1, tmp_path / "one.3mf", {})
         expected = reference(known)(*points) / known.bounds.lipschitz
         off = np.abs(Read(made)(points) - expected) / (1 + np.abs(expected))
         assert off.max() < 1e-9, root.formula.name

@@ -15,7 +15,7 @@ import pytest
 from fracslice.expr import cuda_driver
 from fracslice.expr.graph import Program
 from fracslice.expr.loops import OWN, Loop, element_type, is_array
-from fracslice.expr.machine import Function
+from fracslice.expr.machine import CompiledFunction
 from fracslice.fields import cpu as lanes
 from fracslice.fields import cuda
 from fracslice.fields.field import Precision
@@ -111,7 +111,7 @@ def driven(patch: pytest.MonkeyPatch) -> Iterator[HostDriver]:
 class Threads:
     """Stands in for `cuda.CudaFunction`: all threads, one after the other, with one lane of the CPU each."""
 
-    function: Function
+    function: CompiledFunction
     loop: Loop
     real: np.dtype
 

@@ -42,10 +42,10 @@ class Operation:
     value: float = 0.0  # value of a constant
 
 
-def graph(
+def operations(
     root: Node, scale: float = 1.0, offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
 ) -> list[Operation]:
-    """Return the expression graph of a field.
+    """Return the operations of a field.
 
     `scale`: length of a scene unit.
     """
@@ -54,14 +54,14 @@ def graph(
             raise node.fail("is made of triangles: expected formulas alone, or a mesh of them")
     linked, made = link(root), _Graph()
     vocabulary = FUNCTIONS.keys() - {"add", "subtract", "multiply", "divide", "select"}
-    operations: dict[str, Any] = {name: made.function(name) for name in vocabulary}
-    operations |= {"where": made.where, "any_of": made.any_of}
-    operations |= {"rsqrt": lambda a: 1.0 / made.call("sqrt", a), "ratio": lambda a, b: a / b}
+    domain: dict[str, Any] = {name: made.function(name) for name in vocabulary}
+    domain |= {"where": made.where, "any_of": made.any_of}
+    domain |= {"rsqrt": lambda a: 1.0 / made.call("sqrt", a), "ratio": lambda a, b: a / b}
     inputs = [_Symbol(made, made.add(Operation(name))) for name in INPUTS]
     points = [(p - o) * (1.0 / scale) for p, o in zip(inputs, offset, strict=True)]
     named = linked.program.functions
     try:
-        value = Evaluator(operations, named)(named[FIELD], *points, linked.parameters.tolist())
+        value = Evaluator(domain, named)(named[FIELD], *points, linked.parameters.tolist())
         value = value * (scale / root.bounds.lipschitz)
     except (ArithmeticError, ValueError) as error:
         raise KernelError(f"the formulas have a constant that is not finite: {error}") from None
