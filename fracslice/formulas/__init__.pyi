@@ -1397,7 +1397,7 @@ def union(*elements: Node, smooth: float = 0.0) -> Node:
 def volume(file: str, grid: str = '', kind: Literal['as stated', 'surface', 'density'] = 'as stated', iso: float | None = None, size: float | None = None, place: Literal['as is', 'centre', 'bed'] = 'as is', units: Literal['um', 'µm', 'mm', 'cm', 'in', 'm'] = 'mm', sha256: str | None = None) -> Node:
     """A grid of an OpenVDB file (Museth 2013, "VDB: High-Resolution Sparse Volumes with Dynamic Topology").
     Near the surface its distances, linear between samples; farther off, distances to where edges of the grid
-    cross the surface. Other numbers become distances first. L is measured at the samples, with a margin.
+    cross the surface. Other numbers become distances first. L = 1 is measured at the samples, with a margin.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 def volume(x, y, z, origin, scale, inverse, slope, level_set):  # type: ignore[no-untyped-def]
     """A grid of an OpenVDB file (Museth 2013, "VDB: High-Resolution Sparse Volumes with Dynamic Topology").
     Near the surface its distances, linear between samples; farther off, distances to where edges of the grid
-    cross the surface. Other numbers become distances first. L is measured at the samples, with a margin.
+    cross the surface. Other numbers become distances first. L = 1 is measured at the samples, with a margin.
     """
     ox, oy, oz = origin
     there = solid_distance((x - ox) * inverse, (y - oy) * inverse, (z - oz) * inverse, level_set)

@@ -84,7 +84,7 @@ def noted(result: Result, coarse: Result) -> Result:
     return Result(report, result.place, result.planned, result.whole, result.work)
 
 
-LATER = "cleaning", "checks", "spatial", "tips", "topology"
+LATER = "cleaning", "checks", "spatial", "tips"
 """Modules of meshes that follow contouring."""
 
 
