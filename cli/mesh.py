@@ -99,7 +99,7 @@ def mesh(given: MeshFileOptions) -> int:
 
     check_outputs(given)
     if Path(given.output).suffix.lower() == GRID:
-        names = {"chord", "simplify", "colour", "cluster", "shard", "store"}
+        names = {"chord", "simplify", "faces", "colour", "cluster", "shard", "store"}
         refuse_options(names, "only for meshes, and a .vdb file holds samples")
     if given.implicit:
         refuse_what_needs_triangles(given.output)
@@ -153,7 +153,18 @@ def refuse_what_needs_triangles(output: str) -> None:
     """Raise a usage error for a file other than .3mf, or an option without effect on a formula."""
     if Path(output).suffix.lower() != ".3mf":
         raise click.UsageError(f"{output}: expected a file name that ends in .3mf, for --implicit")
-    names = {"chord", "simplify", "colour", "dust", "report", "picture", "cache", "device", "material"}
+    names = {
+        "chord",
+        "simplify",
+        "faces",
+        "colour",
+        "dust",
+        "report",
+        "picture",
+        "cache",
+        "device",
+        "material",
+    }
     names |= {"price", "proved", "cluster", "shard", "store"}
     refuse_options(names, "only for meshes, and --implicit makes none")
 

@@ -68,7 +68,7 @@ def print_(given: SlicerOptions) -> int:
     chosen.check(given.profiles)  # before the mesh, which may take minutes
     scene = load_scene(given.source, given.settings)
     job = given.mesh_job(scene)
-    if job.simplify is None:
+    if job.simplify is None and job.faces is None:
         job = replace(job, simplify=TOLERANCE)
     with temporary_folder() as folder, given.working() as work:
         model = folder / f"{Path(output).stem}{chosen.model}"
@@ -78,7 +78,11 @@ def print_(given: SlicerOptions) -> int:
             click.echo(f"{given.source}: would not print: {', '.join(report.problems)}")
             return 1
         if not given.quiet:
-            many = f"; expected at most {MOST:,}: a larger --voxel or --simplify" if count > MOST else ""
+            many = (
+                f"; expected at most {MOST:,}: a larger --voxel or --simplify, or --faces"
+                if count > MOST
+                else ""
+            )
             click.echo(f"{count:,} triangles: {chosen.title} takes about {duration(count * SECONDS)}{many}")
         warnings = chosen.slice(model, given.profiles, Path(output), work)
         with keeping(f"{output} is written"):

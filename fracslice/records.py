@@ -231,6 +231,13 @@ class MeshJob(Placed):
     simplify: Given[AnyLength | None, float | None] = attribute(
         Length, None, "triangles are removed within this tolerance, such as 0.02mm"
     )
+    faces: int | None = attribute(
+        Count,
+        None,
+        "triangles are removed until this many are left, within the smallest tolerance for that",
+        least=4,
+        most=1 << 31,
+    )
     dust: float | None = attribute(
         Number,
         None,
@@ -255,6 +262,8 @@ class MeshJob(Placed):
     def __post_init__(self) -> None:
         if self.voxel is not None and self.resolution is not None:
             raise SceneError("voxel and resolution: expected one of them")
+        if self.simplify is not None and self.faces is not None:
+            raise SceneError("simplify and faces: expected one of them")
         validate(self, SceneError)
 
     def edits(self, scene: Scene) -> Print:

@@ -67,6 +67,7 @@ class MeshKeywords(PlacedKeywords, total=False):
     resolution: float | None
     chord: AnyLength | None
     simplify: AnyLength | None
+    faces: int | None
     dust: float | None
     colour: Colour | None
     proved: bool | None

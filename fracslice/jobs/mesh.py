@@ -157,11 +157,13 @@ class _Job:
         with ExitStack() as stack:
             yield lambda: stack.enter_context(temporary_folder(beside))
 
-    def needing_all(self) -> Iterator[tuple[str, float]]:
-        """Names and lengths of changes that need a mesh in one piece."""
+    def needing_all(self) -> Iterator[str]:
+        """Changes that need a mesh in one piece, with their values."""
         for name, length in (("chord", self.what.chord), ("simplify", self.what.simplify)):
             if length is not None:
-                yield name, length
+                yield f"{name} {length:g}mm"
+        if self.what.faces is not None:
+            yield f"faces {self.what.faces}"
 
     def sampled(self) -> tuple[Sized, SignBricks, bool]:
         """Field, its samples, and the choice of bodies that is left to the mesh; true if the field chose.
@@ -222,8 +224,8 @@ class _Job:
         try:
             surfaces.refuse_what_does_not_fit(signs, voxel)
         except TooLargeError as error:
-            for name, length in self.needing_all():
-                raise SceneError(f"{name} {length:g}mm needs the whole mesh: {error}") from None
+            for change in self.needing_all():
+                raise SceneError(f"{change} needs the whole mesh: {error}") from None
             if aside is None:
                 raise TooLargeError(f"{error}, and an .stl file is written piece after piece") from None
             most = surfaces.BRICKS
@@ -388,12 +390,17 @@ class Writing:
         from ..mesh.tips import tips_last
 
         finished, simplified, mesh = finish.each(self.clock), None, None
-        if self.what.simplify is not None:
-            from ..mesh.simplify import simplify
+        tolerance, count = self.what.simplify, self.what.faces
+        if tolerance is not None or count is not None:
+            from ..mesh.simplify import simplify, simplify_to
 
             ((piece, near),) = finished
             with self.clock("simplifying"):
-                mesh, simplified = simplify(piece.mesh, self.what.simplify, self.clock.work)
+                mesh, simplified = (
+                    simplify_to(piece.mesh, count, self.clock.work)
+                    if tolerance is None
+                    else simplify(piece.mesh, tolerance, self.clock.work)
+                )
             finished = iter([(Finished.whole(mesh), near)])
         meshes = ahead(finish.passing(finished, checks, self.clock))
         if several := len(finish.pieces) > 1:

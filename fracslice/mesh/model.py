@@ -19,6 +19,7 @@ from .._native import edge_topology as _edge_topology
 from .._native import foremost
 from ..common.arrays import from_linear, to_linear
 from ..common.messages import format_count, lacking
+from ..common.parameters import AnyLength
 from ..common.triangles import Triangles
 from ..errors import MeshError
 
@@ -386,6 +387,43 @@ class Mesh(Triangles):
         from ..formats import write
 
         return write(self, path, metadata)
+
+    def simplify(self, tolerance: AnyLength | None = None, *, faces: int | None = None) -> Mesh:
+        """Copy with fewer triangles: within a tolerance, or as many as asked for.
+
+        Its vertices are some of this mesh's. It is closed, an oriented manifold, and does not cut itself. The
+        surfaces are proved to be within the tolerance of each other; for a number of triangles that is the
+        smallest of a series in steps of 25 %. A crumb within the tolerance of a body may end up inside it.
+
+        Parameters
+        ----------
+        tolerance : float or str, optional
+            Maximum distance between the surfaces, mm, or text with a unit.
+        faces : int, optional
+            Most triangles that are left, in place of a tolerance.
+
+        Returns
+        -------
+        Mesh
+            Without colours and scalars.
+
+        Raises
+        ------
+        MeshError
+            If this mesh is not a closed, oriented manifold, or cannot be simplified so far.
+
+        Examples
+        --------
+        >>> from fracslice import make_mesh, sphere
+        >>> ball = make_mesh(sphere(10), resolution=32)
+        >>> len(ball.simplify(faces=500).faces)
+        500
+        """
+        from .simplify import simplify, simplify_to
+
+        if (tolerance is None) == (faces is None):
+            raise MeshError("expected a tolerance or a number of faces, and not both")
+        return (simplify_to(self, faces) if tolerance is None else simplify(self, tolerance))[0]
 
     def to_pyvista(self) -> Any:
         """Copy of the mesh as a `pyvista.PolyData`.

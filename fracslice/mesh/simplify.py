@@ -1,4 +1,4 @@
-"""Mesh simplification within a proved tolerance, by half-edge collapses that are verified.
+"""Mesh simplification within a proved tolerance or to a count, by half-edge collapses that are verified.
 
 Klein, Liebich and Strasser, "Mesh Reduction with Error Control", 1996: each original vertex is assigned to a
 triangle near it, and a collapse is refused if it would leave one of them farther off than the tolerance.
@@ -7,18 +7,20 @@ Adjacency is a corner table (Rossignac, 2001) with a history.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .._native import Reduction, connected_components
-from ..common.parameters import Number, validate_value
+from ..common.parameters import AnyLength, Count, Number, validate_value
 from ..errors import MeshError
 from ..scene import parse_length
 from ..work import Work, chunks
-from .model import Mesh, component_sizes
+from .model import Mesh, component_sizes, edge_topology
 from .spatial import Nearest, build, self_intersecting_triangles
 
 ROUNDS, PATIENT = 200, 40
@@ -43,7 +45,7 @@ class Simplified:
     back_mm: float
 
 
-def simplify(mesh: Mesh, tolerance: float, work: Work | None = None) -> tuple[Mesh, Simplified]:
+def simplify(mesh: Mesh, tolerance: AnyLength, work: Work | None = None) -> tuple[Mesh, Simplified]:
     """Simplify a mesh within a tolerance.
 
     The vertices of the result are vertices of the original, and so stay on the surface and on sharp edges.
@@ -52,19 +54,63 @@ def simplify(mesh: Mesh, tolerance: float, work: Work | None = None) -> tuple[Me
 
     `mesh` in mm; `tolerance`: maximum distance between both surfaces: mm, for example "0.02mm".
     """
-    from .model import edge_topology
-
     work = work or Work()
-    if isinstance(tolerance, str):
-        tolerance = parse_length(tolerance, "tolerance")
-    tolerance = validate_value("tolerance", tolerance, Number(None, "a length", above=0), MeshError)
+    length = parse_length(tolerance, "tolerance") if isinstance(tolerance, str) else tolerance
+    length = validate_value("tolerance", length, Number(None, "a length", above=0), MeshError)
+    _require_manifold(mesh)
+    collapse = Collapse(mesh, AIM * length)
+    done = _verified(mesh, collapse, length, work, partial(collapse.run, work))
+    if done is None:
+        raise MeshError(f"the mesh cannot be simplified within {length:g} mm without crossing itself")
+    return done
+
+
+def simplify_to(mesh: Mesh, count: int | None, work: Work | None = None) -> tuple[Mesh, Simplified]:
+    """Simplify a mesh to at most a number of triangles, verified as by `simplify`.
+
+    The tolerance grows by steps of a quarter, and stays at the first one that leaves no more triangles.
+
+    `mesh` in mm; `count`: most triangles of the result.
+    """
+    work = work or Work()
+    count = validate_value("faces", count, Count(None, "", FEWEST, 1 << 31), MeshError)
+    _require_manifold(mesh)
+    if len(mesh.triangles) <= count:
+        return mesh, Simplified(0.0, len(mesh.triangles), 0.0, 0.0)
+    longest = COARSEST * float(mesh.size.max())
+    collapse = Collapse(mesh, AIM * longest)
+    for step in range(STEPS + 1):
+        share = GROWTH ** (step - STEPS)
+        work.progress("simplifying", step / STEPS)
+        if (left := collapse.reach(count, share, work)) > count:
+            continue
+        done = _verified(mesh, collapse, share * longest, work, partial(collapse.reach, count, share, work))
+        if done is not None and len(done[0].triangles) <= count:
+            return done
+    fewest = f"; {left:,} are left" if left > count else ""
+    raise MeshError(f"the mesh cannot be simplified to {count:,} triangles without crossing itself{fewest}")
+
+
+FEWEST = 4
+"""Triangles of the smallest closed mesh."""
+COARSEST, GROWTH, STEPS = 0.25, 1.25, 50
+"""Last tolerance that is tried for a count, longest sides; factor from one to the next; their number."""
+
+
+def _require_manifold(mesh: Mesh) -> None:
     _, *defects = edge_topology(mesh.triangles, len(mesh.vertices))
     if any(defects) or not len(mesh.triangles):
         raise MeshError("only a closed, oriented manifold can be simplified")
-    collapse, examination = Collapse(mesh, AIM * tolerance), Examination(mesh, tolerance, work)
+
+
+def _verified(
+    mesh: Mesh, collapse: Collapse, tolerance: float, work: Work, again: Callable[[], object]
+) -> tuple[Mesh, Simplified] | None:
+    """Simplified mesh without faults; None if faults remain. `again` collapses what has come back."""
+    examination = Examination(mesh, tolerance, work)
     for number in range(ROUNDS):
         if number < PATIENT:
-            collapse.run(work)
+            again()
         work.progress("simplifying", 1 - (1 - FIRST) * 0.6**number)
         result = collapse.state()
         faulty = examination.faults(result)
@@ -72,7 +118,7 @@ def simplify(mesh: Mesh, tolerance: float, work: Work | None = None) -> tuple[Me
             done = Simplified(tolerance, len(mesh.triangles), *examination.distances(result))
             return Mesh(mesh.vertices, result.triangles).selected(~result.gone), done
         collapse.undo(faulty)
-    raise MeshError(f"the mesh cannot be simplified within {tolerance:g} mm without crossing itself")
+    return None
 
 
 STAGES = (1e-3, 0.25, 0.5, 0.75, 1.0)
@@ -114,6 +160,7 @@ class Collapse:
     def __init__(self, mesh: Mesh, tolerance: float) -> None:
         self._mesh, self._native = mesh, Reduction(mesh.vertices, mesh.triangles, tolerance)
         self._stages: tuple[float, ...] = STAGES
+        self._fresh = np.zeros(len(mesh.triangles), bool)
 
     def run(self, work: Work) -> None:
         """Collapse all edges that the tolerance allows, at first and after each `undo`."""
@@ -125,9 +172,28 @@ class Collapse:
                 pass
         self._stages = STAGES[-1:]
 
+    def reach(self, count: int, share: float, work: Work) -> int:
+        """Collapse edges that a share of the tolerance allows until a number of triangles is left, at most.
+
+        Returns the number that is left.
+        """
+        self._native.renew()
+        state = self.state()
+        self._fresh, left, before = state.fresh, int((~state.gone).sum()), -1
+        while count < left != before:
+            before, first = left, 0
+            while left > count and first < len(self._mesh.vertices):
+                work.check()
+                last = min(first + min(CHUNK, (left - count + 1) // 2), len(self._mesh.vertices))
+                left -= 2 * self._native.sweep(first, last, share)  # a vertex and two triangles at most
+                first = last
+        return left
+
     def state(self) -> Collapsed:
         """Current state."""
-        return Collapsed(*self._native.state())
+        state, fresh = Collapsed(*self._native.state()), self._fresh
+        self._fresh = np.zeros_like(fresh)
+        return state._replace(fresh=state.fresh | fresh)
 
     def _sweep(self, share: float, work: Work) -> int:
         """Sweep over all vertices at a fraction of the tolerance; returns the number of collapses."""
@@ -247,8 +313,9 @@ class _Shells:
         self.outside = self._volumes(mesh) >= 0
 
     def turned(self, mesh: Mesh) -> NDArray[np.bool_]:
-        """Triangles of shells that are inside out: crumbs that fewer triangles cannot represent."""
-        result: NDArray[np.bool_] = (self.outside != (self._volumes(mesh) >= 0))[
+        """Triangles of shells that are inside out or flat: crumbs that fewer triangles cannot represent."""
+        volumes = self._volumes(mesh)
+        result: NDArray[np.bool_] = np.where(self.outside, volumes <= 0, volumes >= 0)[
             self.of[mesh.triangles[:, 0]]
         ]
         return result

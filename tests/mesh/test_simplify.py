@@ -7,14 +7,15 @@ import threading
 import numpy as np
 import pytest
 
-from fracslice.errors import Cancelled, MeshError
+from fracslice import make_mesh
+from fracslice.errors import Cancelled, MeshError, SceneError
 from fracslice.formulas import box, cylinder, difference, mandelbulb, menger, transform, union
 from fracslice.mesh import Mesh
 from fracslice.mesh.checks import check_mesh
 from fracslice.mesh.cleaning import quantise_mesh
 from fracslice.mesh.contouring import contour
 from fracslice.mesh.model import edge_topology
-from fracslice.mesh.simplify import Collapse, simplify
+from fracslice.mesh.simplify import Collapse, simplify, simplify_to
 from fracslice.mesh.spatial import Nearest, self_intersecting_triangles
 from fracslice.volume import plan, sample_scene
 from fracslice.work import Work
@@ -201,3 +202,41 @@ def test_a_mesh_with_a_hole_is_refused_and_work_can_be_cancelled():
     stop.set()
     with pytest.raises(Cancelled):
         simplify(shapes.sphere(), 0.1, Work(cancel=stop))
+
+
+@pytest.mark.parametrize("count", [4000, 1000, 500])
+@pytest.mark.parametrize("shape", ["ball", "holes", "fractal"])
+def test_a_count_is_reached_within_the_least_tolerance(shape: str, count: int) -> None:
+    plate = box(size=(2, 2, 0.5)) - (cylinder(0.2, 2) + (0.5, 0, 0)) - (cylinder(0.3, 2) + (-0.4, 0, 0))
+    ball = transform(box(round=0.3), rotate=(1, 2, 3, 40))
+    mesh = fine({"ball": ball, "holes": plate, "fractal": mandelbulb(iterations=3)}[shape], 48)
+    few, done = simplify_to(mesh, count)
+    report = check_mesh(few)
+    assert count - 2 <= len(few.triangles) <= count and report.watertight and report.manifold
+    assert not (report.self_intersections or report.misoriented_edges)
+    assert 0 < max(done.bound_mm, done.back_mm) <= done.tolerance_mm
+    assert done.from_triangles == len(mesh.triangles)
+    if shape != "holes":  # whose plates lose most of theirs at once
+        by_tolerance, _ = simplify(mesh, done.tolerance_mm / 2)
+        assert len(by_tolerance.triangles) > count, "half the tolerance would not do"
+    assert few.volume == pytest.approx(mesh.volume, rel=4 * done.tolerance_mm / mesh.size.min())
+
+
+def test_what_has_few_triangles_stays_and_what_cannot_be_is_said() -> None:
+    cube = shapes.cube()
+    assert simplify_to(cube, 12)[0] is cube and len(cube.simplify(faces=100).triangles) == 12
+    with pytest.raises(MeshError, match="to 6 triangles without crossing itself; 20 are left"):
+        shapes.torus(10, 3).simplify(faces=6)
+    for wrong in ({}, {"faces": 10, "tolerance": 1}, {"faces": 3}, {"faces": 10.5}, {"tolerance": -1}):
+        with pytest.raises((MeshError, SceneError), match="expected") as error:
+            cube.simplify(**wrong)
+        assert "\n" not in str(error.value)
+
+
+def test_a_job_has_a_count_of_triangles(tmp_path) -> None:
+    made = make_mesh(mandelbulb(iterations=3), size=20, resolution=48, faces=1000, path=tmp_path / "a.stl")
+    assert len(made.faces) == 1000 and not made.report.problems
+    assert made.report.simplified.from_triangles > 10_000
+    assert (tmp_path / "a.stl").stat().st_size == 84 + 50 * 1000
+    with pytest.raises(SceneError, match="simplify and faces: expected one of them"):
+        make_mesh(box(), faces=100, simplify=0.1)
