@@ -266,7 +266,7 @@ def test_a_mistake_is_one_line_with_its_place() -> None:
         return w * w + c
 
     with pytest.raises(
-        KernelError, match=r"test_orbits.py:\d+: step wrong: 'return w \* w + c' .*: expected a "
+        KernelError, match=r"test_orbits.py:\d+: step wrong: 'return w \* w \+ c' .*: expected a "
     ):
         wrong(iterations=2)
 
