@@ -59,7 +59,7 @@ ACROSS = 256
 layers of it in which --fix compares what it tries.
 """
 
-MOST_SECONDS = 60.0
+MOST_SECONDS = 50.0
 """CPU seconds of all examinations with --fix that are in no finer layers than those of `ACROSS`."""
 
 
@@ -175,9 +175,10 @@ def of_mesh(given: CheckOptions, work: Work) -> Checked:
     report = made.report
     size = sizing(scene, given.size, given.scale, work)
     layered = in_layers(given, size.longest)
-    how = given.printing(scene.printing)
     faults = problems_of("mesh", MeshEvidence(report.mesh, report.problems, made.whole))
-    layers, lines, problems = of_layers(scene, size, how, layered, work, faults)
+    how = given.printing(scene.printing)
+    whole = Variant(scene.root, size, how, given.up, scene, faults)
+    layers, lines, problems = of_layers(whole, layered, work)
     return report.as_dict() | {"layers": layers}, [summary(given.source, report), *lines], problems
 
 
@@ -194,16 +195,15 @@ def of_scene(given: CheckOptions, work: Work) -> Checked:
 
     scene = load_scene(given.source, given.settings)
     size = sizing(scene, given.size, given.scale, work)
-    return of_layers(scene, size, given.printing(scene.printing), given, work)
+    return of_layers(Variant(scene.root, size, given.printing(scene.printing), given.up, scene), given, work)
 
 
 def of_model(given: CheckOptions, work: Work) -> Checked:
     """Check the mesh of a model and, if it encloses a volume, its layers."""
     from fracslice.checks import problems_of
     from fracslice.checks.defects import MeshEvidence
-    from fracslice.checks.problems import Problem
     from fracslice.common.parameters import LONGEST
-    from fracslice.errors import EmptyError, MeshError
+    from fracslice.errors import MeshError
     from fracslice.mesh.checks import check_mesh
     from fracslice.mesh.models import MeshField
     from fracslice.records import SAME, UP
@@ -231,13 +231,8 @@ def of_model(given: CheckOptions, work: Work) -> Checked:
     factor = size / side  # the mesh is compensated already: a size that is advised is before that
     sides = Sizing(side, 1 / factor, (factor,) * 3)
     field = MeshField(replace(mesh, vertices=mesh.vertices - mesh.bounds.mean(0)))
-    try:
-        layers, lines, problems = of_layers(field, sides, given.printing(Print()), layered, work, faults)
-    except EmptyError:
-        pixel = max(layered.slice_job(Print()).pixels)
-        finest = f"layer of {layered.layer[0]:.3g} mm has a pixel of {pixel:.3g} mm"
-        problems = [*faults, Problem("lost", f"no {finest} inside: all of it is thinner")]
-        return numbers, [line, verdict(problems)], problems
+    made = Variant(field, sides, given.printing(Print()), UP, faults=faults)
+    layers, lines, problems = of_layers(made, layered, work)
     return numbers | {"layers": layers}, [line, *lines], problems
 
 
@@ -261,9 +256,11 @@ def longest(mesh: Mesh) -> float:
 class Variant:
     """An object with other settings, and the options that change them."""
 
+    root: Field
     size: Sizing
     how: Print
     up: Triple
+    scene: Scene | None = None  # that it was read from; None for a model
     faults: Sequence[Problem] = ()  # problems of its mesh
     flags: tuple[str, ...] = ()
 
@@ -310,27 +307,17 @@ class Attempt:
         return mends(self.problems, other.problems)
 
 
-def of_layers(
-    of: Scene | Field,
-    size: Sizing,
-    how: Print,
-    given: CheckOptions,
-    work: Work,
-    faults: Sequence[Problem] = (),
-) -> Checked:
-    """Check the layers of an object; with --fix, try what mends its problems and keep what helps.
-
-    `faults`: problems of its mesh.
-    """
+def of_layers(made: Variant, given: CheckOptions, work: Work) -> Checked:
+    """Check the layers of an object; with --fix, try what mends its problems and keep what helps."""
     check_targets(given.source, given.picture, given.html, given.fixed)
-    first = examine_layers(of, Variant(size, how, given.up, faults), given, work)
-    best, refused = mended_object(of, first, given, work) if given.fix and first.problems else (first, [])
+    first = examine_layers(made, given, work)
+    best, refused = mended_object(first, given, work) if given.fix and first.problems else (first, [])
     if best.shown and given.picture:
         draw(*best.shown, given.picture, work)
     if best.shown and given.html:
         write_page(*best.shown, [figures_of(best.shown[1])], given.source, given.html, work)
     if given.fixed:
-        write_mesh(cast("Scene", of), best.variant, given, work)
+        write_mesh(best.variant, given, work)
     lines = [f"{given.source}: {first.text}"]
     if not refused and best is first:
         return first.numbers, lines, first.problems
@@ -340,9 +327,7 @@ def of_layers(
     return {"before": first.numbers, "flags": flags, "after": best.numbers}, lines, best.problems
 
 
-def mended_object(
-    of: Scene | Field, first: Attempt, given: CheckOptions, work: Work
-) -> tuple[Attempt, list[str]]:
+def mended_object(first: Attempt, given: CheckOptions, work: Work) -> tuple[Attempt, list[str]]:
     """The best of the object and its mended variants, and a line on each that was left out.
 
     All settings that the problems name are tried at once, then one by one; then other directions up. They
@@ -350,7 +335,6 @@ def mended_object(
     """
     from fracslice.checks.problems import mend_settings
     from fracslice.errors import Cancelled
-    from fracslice.scene import Scene
 
     lines = list[str]()
     finest = first.variant.size.longest / ACROSS
@@ -364,7 +348,7 @@ def mended_object(
         work.progress(f"trying {text}", 0.0)
         try:
             limited.check()
-            return examine_layers(of, variant, given, limited, finest)
+            return examine_layers(variant, given, limited, finest)
         except Cancelled:
             work.check()
             lines.append(
@@ -386,34 +370,32 @@ def mended_object(
                 break
         elif now and (len(choice) == 1 or len(choices) == 1):
             lines.append(f"with {' '.join(options_of(choice))}: no better, left out")
-    if isinstance(of, Scene) and any("--up" in problem.advice for problem in best.problems):
+    if best.variant.scene and any("--up" in problem.advice for problem in best.problems):
         turns = [tried(best.variant.turned(up)) for up in AXES if up != best.variant.up]
         helpful = [turned for turned in turns if turned and turned.mends(best)]
         best = min([best, *helpful], key=lambda attempt: attempt.severity)
     if best is base:
         return first, lines
-    found = examine_layers(of, best.variant, given, work) if coarse else best
+    found = examine_layers(best.variant, given, work) if coarse else best
     if found.mends(first):
         return found, lines
     return first, [*lines, f"with {' '.join(best.variant.flags)}: no better, left out"]
 
 
-def write_mesh(scene: Scene, variant: Variant, given: CheckOptions, work: Work) -> None:
+def write_mesh(variant: Variant, given: CheckOptions, work: Work) -> None:
     """Write the mesh of a variant of a scene."""
     from fracslice.jobs.mesh import make_mesh
 
+    scene = cast("Scene", variant.scene)
     size = variant.size.side if variant.size.unit is None else None
     job = replace(given.mesh_job(scene), size=size, printing=variant.how, up=variant.up)
     make_mesh(scene, job, work, given.fixed)
 
 
-def examine_layers(
-    of: Scene | Field, variant: Variant, given: CheckOptions, work: Work, finest: float = 0.0
-) -> Attempt:
+def examine_layers(variant: Variant, given: CheckOptions, work: Work, finest: float = 0.0) -> Attempt:
     """Check the layers of a variant of an object, in layers and pixels of at least `finest` mm."""
     from fracslice.checks.fitting import misfit
     from fracslice.checks.layer_checks import check_layers
-    from fracslice.scene import Scene
     from fracslice.slicing import adapted, plan_stack
 
     begun, machine, size = time.process_time(), given.machine, variant.size
@@ -424,13 +406,13 @@ def examine_layers(
         pixel = tuple(max(step, finest) for step in job.pixels)
         job = replace(job, layer=layer, pixel=pixel, printer=None)
     most = job.layer[1]
-    stack = plan_stack(of.root if isinstance(of, Scene) else of, job, work, size)
+    stack = plan_stack(variant.root, job, work, size)
     if machine and (unfit := misfit(stack, machine)):
         numbers = {"size": stack.size, "fits": False, "problems": [str(unfit)]}
         spent = time.process_time() - begun
         return Attempt(variant, numbers, f"would not print: {unfit}", [unfit], None, spent)
-    if work.cluster and isinstance(of, Scene):
-        stack, report = shared_check(of, job, given, work)
+    if work.cluster and variant.scene:
+        stack, report = shared_check(variant.scene, job, given, work)
     else:
         stack = stack if most is None else adapted(stack, most, work)
         report = check_layers(stack, given.limits, machine, work)

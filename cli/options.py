@@ -29,6 +29,7 @@ from fracslice.common.parameters import (
     Pixels,
     Record,
     Vector,
+    parse_length,
     picture_size,
 )
 from fracslice.errors import ClusterError, SceneError, VolumeError
@@ -171,13 +172,6 @@ def checked(kind: Parameter, _: click.Context, __: click.Parameter, value: Any) 
         raise click.BadParameter(f"{kind.text(value)}: expected {error}") from None
 
 
-def read_length(text: str) -> float:
-    """Parse a length into mm."""
-    from fracslice.scene import parse_length
-
-    return parse_length(text)
-
-
 def read_seconds(text: str) -> float:
     """Parse a time of an animation."""
     from fracslice.scene.animation import Seconds
@@ -194,7 +188,7 @@ def read_interval(text: str) -> float:
 
 
 NUMBER, AMOUNT, POSITIVE = Finite(), Signed(">="), Signed(">")
-LENGTH, SECONDS = Parsed(read_length, "LENGTH"), Parsed(read_seconds, "TIME")
+LENGTH, SECONDS = Parsed(parse_length, "LENGTH"), Parsed(read_seconds, "TIME")
 INTERVAL = Parsed(read_interval, "TIME")
 
 

@@ -475,6 +475,16 @@ def self_intersecting_triangles(
     threads: int = 0,
     among: NDArray[bool_] | None = None,
 ) -> NDArray[bool_]: ...
+def thin_walls(
+    vertices: NDArray[float64],
+    triangles: NDArray[int32],
+    order: NDArray[int64],
+    low: NDArray[float64],
+    high: NDArray[float64],
+    count: int,
+    limit: float,
+    threads: int = 0,
+) -> NDArray[float64]: ...
 
 class Reduction:
     """See `fracslice.mesh.simplify.Collapse`. Refers to the arrays during its lifetime."""
@@ -505,12 +515,8 @@ class MeshField:
         low: NDArray[float64],
         high: NDArray[float64],
     ) -> None: ...
-    def points(
-        self, x: NDArray[float64], y: NDArray[float64], z: NDArray[float64], measured: bool
-    ) -> NDArray[float64]: ...
-    def bricks(
-        self, corners: NDArray[int32], origin: Point, voxel: float, measured: bool
-    ) -> NDArray[float32]: ...
+    def points(self, x: NDArray[float64], y: NDArray[float64], z: NDArray[float64]) -> NDArray[float64]: ...
+    def bricks(self, corners: NDArray[int32], origin: Point, voxel: float) -> NDArray[float32]: ...
 
 class Nearest:
     """See `fracslice.mesh.spatial.Nearest`. Refers to the arrays during its lifetime."""

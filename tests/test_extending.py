@@ -181,9 +181,10 @@ def _many(layers):
         yield Problem("rings", f"{most:g} outlines in a layer", first, at, (("hollow", "none"),))
 
 
-def _heavy(solid):
-    if sum(solid.bodies) > 50:
-        yield Problem("heavy", f"{sum(solid.bodies):.0f} mm3 of material", advice="--hollow 1mm")
+def _long(solid):
+    length = solid.scale * max(solid.size)
+    if length > 10:
+        yield Problem("long", f"{length:.0f} mm are long", advice="--size 8mm")
 
 
 def _few(mesh):
@@ -193,7 +194,7 @@ def _few(mesh):
 
 CHECKS = (
     Check("rings", "layers", _many, measure=_rings, of_resin=True),
-    Check("heavy", "solid", _heavy, weight=3),
+    Check("long", "solid", _long, weight=3),
     Check("few", "mesh", _few),
 )
 """
@@ -220,14 +221,14 @@ def test_a_check_of_a_mesh_a_solid_and_layers(tmp_path: Path) -> None:
     words = extended("fracslice.checks", tmp_path, CHECKED).stdout
     resin, filament, numbers = re.split(r"^(?=four.stl: .*layers|{)", words, flags=re.MULTILINE)[-3:]
     found = [problem["kind"] for problem in json.loads(numbers)["layers"]["problems"]]
-    assert found == ["few", "rings", "heavy"]
+    assert found == ["few", "rings", "long"]
     for line in (
         "48 triangles are few",
         "4 outlines in a layer: layer 0",
-        "79 mm3 of material; --hollow 1mm",
+        "11 mm are long; --size 8mm",
     ):
         assert line in resin and line in (tmp_path / "four.html").read_text()
-    assert "outlines" not in filament and "79 mm3 of material; --hollow 1mm" in filament
+    assert "outlines" not in filament and "11 mm are long; --size 8mm" in filament
 
 
 def extended(package: str, folder: Path, code: str) -> subprocess.CompletedProcess[str]:

@@ -38,7 +38,10 @@ def _fit(of: LayersEvidence) -> Iterator[Problem]:
 def _lost(of: LayersEvidence) -> Iterator[Problem]:
     slicer = Slicer(of.stack, of.work)
     slicer.areas.update(enumerate(of.report.areas))
-    for text in layers_amount(slicer, of.work).problems:
+    problems = layers_amount(slicer, of.work).problems
+    if not (problems or of.report.bodies or of.report.specks):
+        problems = ("no layer has a pixel that is half inside: all of it is thinner",)
+    for text in problems:
         yield Problem("lost", text)
 
 

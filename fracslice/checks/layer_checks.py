@@ -191,7 +191,7 @@ class _Collector:
             solid=self.solid,
         )
         evidence = LayersEvidence(stack, report, self.printer, self.limits, self.work, measured)
-        problems = [*problems_of("layers", evidence), *self.solid.unlayered]
+        problems = [*problems_of("layers", evidence), *self.solid.problems]
         fits = all(problem.kind != "fit" for problem in problems) if self.printer else None
         return replace(report, fits=fits, problems=problems)
 

@@ -10,32 +10,23 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from ..common.messages import format_count, significant
-from ..scene import Print
+from ..records import Print
 from ..slicing.feature_graph import Feature
 from . import Check
 from .layer_checks import LayersEvidence, PrintReport
 from .problems import SUPPORTS, Problem
-from .solid_checks import SolidEvidence, may_close
+from .solid_checks import may_close
 
 FILL = (("cavities", "fill"),)
 """Print setting that fills cavities."""
-
-
-def _sealed(count: int) -> str:
-    return format_count(count, "sealed cavity", "sealed cavities")
-
-
-def _cavities_of_solid(of: SolidEvidence) -> Iterator[Problem]:
-    if of.cavities:
-        text = f"{_sealed(len(of.cavities))} of {significant(sum(of.cavities))} mm3"
-        yield Problem("cavities", text, mend=FILL)
 
 
 def _cavities(of: LayersEvidence) -> Iterator[Problem]:
     cavities = of.report.cavities
     if cavities:
         count, volume = len(cavities), sum(c.volume for c in cavities)
-        text = f"{_sealed(count)} with {significant(volume)} mm3 of resin"
+        sealed = format_count(count, "sealed cavity", "sealed cavities")
+        text = f"{sealed} with {significant(volume)} mm3 of resin"
         yield Problem("cavities", text, mend=FILL, count=count, resin=volume, **of.where(cavities[0]))
 
 
@@ -73,7 +64,6 @@ def _narrow_drains(of: LayersEvidence) -> Iterator[Problem]:
 
 
 CHECKS = (
-    Check("cavities", "solid", _cavities_of_solid, rank=40, weight=10, of_resin=True),
     Check("cavities", "layers", _cavities, rank=40, weight=10, of_resin=True),
     Check("cups", "layers", _hollows("cups", "suction cup", lambda r: r.cups), 41, weight=10, of_resin=True),
     Check(

@@ -1,4 +1,4 @@
-"""Printability checks on a sampled solid, in time linear in its surface."""
+"""Walls, gaps, floors and holes of a sampled solid, in time linear in its surface."""
 
 from __future__ import annotations
 
@@ -9,22 +9,18 @@ from typing import Any
 import numpy as np
 
 from ..common.messages import format_count, place, significant
-from ..fields.box import Triple
+from ..fields.box import Box, Triple
 from ..fields.field import Field
-from ..formulas import Box
-from ..printing.samples import Samples, components_of
-from ..printing.thin_features import narrow_holes, resolve_connectivity, sampled_object, thin_features
+from ..printing.samples import Samples
+from ..printing.thin_features import narrow_holes, sampled_object, thin_features
 from ..printing.walls import BINS, Measure, Walls, Widths, project_faces, walls_of, widths_of
 from ..volume import Bricks, Drain
 from ..work import Work
-from . import checks_of, problems_of
+from . import problems_of
 from .problems import Limits, Problem
 
 COARSE, FINE = 96, 192
 """Minimum and maximum number of samples along the longest side."""
-
-SPECK = 27
-"""Volume in samples; smaller components are indistinguishable from noise."""
 
 ACROSS = 4
 """Samples across the thinnest allowed wall, as far as `FINE` permits."""
@@ -42,8 +38,6 @@ class SolidReport:
     """Report on a solid, measured on samples and, for thin features, on the field."""
 
     voxel: float  # sample spacing, mm; lengths are accurate to one voxel
-    bodies: list[float]  # volumes without specks, mm^3, the largest first
-    cavities: list[float]
     walls: Widths | None  # thicknesses up to 2 mm, or up to the larger limit if that is more
     gaps: Widths | None
     floors: Widths | None
@@ -51,13 +45,7 @@ class SolidReport:
     thin_floors: float
     unseen: str  # walls that a mesh or layers may lose; empty if there are none
     holes: str  # holes of the shape that may close; empty if there are none
-    problems: list[Problem]  # the problems
-
-    @property
-    def unlayered(self) -> list[Problem]:
-        """Problems that layers do not reveal, such as thin walls and floors."""
-        kinds = {check.kind for check in checks_of("layers")}
-        return [problem for problem in self.problems if problem.kind not in kinds]
+    problems: list[Problem]  # thin walls and floors, which layers do not reveal
 
     def as_dict(self) -> dict[str, Any]:
         """The report as plain JSON types."""
@@ -66,7 +54,7 @@ class SolidReport:
 
 @dataclass(frozen=True, eq=False)
 class SolidEvidence:
-    """What is known of a sampled solid. Places and widths of walls in scene units, volumes in mm3."""
+    """What is known of a sampled solid. Places and widths of walls in scene units."""
 
     root: Field  # the field, its samples, and mm per scene unit
     bricks: Bricks
@@ -74,8 +62,6 @@ class SolidEvidence:
     limits: Limits
     middle: np.ndarray  # point from which places are measured
     size: Triple  # sides of the object
-    bodies: list[float]  # volumes, the largest first
-    cavities: list[float]
     walls: Walls  # measured across the solid, along z, and across what is empty
     floors: Walls
     gaps: Walls
@@ -93,64 +79,27 @@ def check_object(
     origin: Triple | None = None,
     drains: Sequence[Drain] = (),
 ) -> SolidReport:
-    """Check an object given by its field.
+    """Check the walls, floors, gaps and holes of an object given by its field.
 
-    `outer` in scene units; `scale`: mm per scene unit.
-    """
-    limits, work = limits or Limits(), work or Work()
-    longest = max(outer.size)
-    wanted = ACROSS * longest * scale / max(min(limits.wall, limits.floor), 1e-6)
-    samples = min(max(wanted, COARSE), FINE)
-    bricks = sampled_object(root, outer, longest, samples, work)
-    return check_solid(root, bricks, scale, limits, work, finest, origin, drains)
-
-
-def check_solid(
-    root: Field,
-    bricks: Bricks,
-    scale: float,
-    limits: Limits | None = None,
-    work: Work | None = None,
-    finest: float | None = None,
-    origin: Triple | None = None,
-    drains: Sequence[Drain] = (),
-) -> SolidReport:
-    """Check a sampled solid: bodies, sealed cavities, thin walls and thin floors.
-
-    `scale`: mm per scene unit; `finest`: width in mm below which a mesh or layers may lose walls; `origin`
-    in scene units.
+    `outer`, `origin` in scene units; `scale`: mm per scene unit; `finest`: width in mm below which a mesh or
+    layers may lose walls.
     """
     limits, work = limits or Limits(), work or Work()
     work.progress("checking the solid", 0.0)
-    most = max(float(BINS[-1]), limits.wall, limits.floor) / scale
+    longest = max(outer.size)
+    wanted = ACROSS * longest * scale / max(min(limits.wall, limits.floor), 1e-6)
+    bricks = sampled_object(root, outer, longest, min(max(wanted, COARSE), FINE), work)
     solid = Samples(bricks)
     work.check()
-    thin, tight = thin_features(root, solid, work)
-
-    kinds = walls_of(solid, most, work, [Measure(), Measure(gaps=True), Measure(direction=UP)])
-    solid_walls, gaps, upright = (
-        project_faces(root, features.lasting(kind, bricks.voxel), bricks.voxel, work)
-        for kind, features in zip(kinds, (thin, tight, thin), strict=True)
-    )
-    thick = thin.beside(solid_walls, most)
-    between = tight.beside(gaps, most)
-    floors = thin.beside(upright, most, UP)
+    thick, between, floors = _measured(root, solid, max(BINS[-1], limits.wall, limits.floor) / scale, work)
+    work.progress("checking the solid", 0.9)
     bare, narrow = (
         _off_rims(_under(measured, limit, scale), drains, 2 * limit / scale)
         for measured, limit in ((floors, limits.floor), (thick, limits.wall))
     )
-    speck = max(limits.speck, SPECK * (bricks.voxel * scale) ** 3) / scale**3
-    result = _volumes(bricks, speck)
-    missed = thin.walls + tight.walls
-    fine = resolve_connectivity(
-        root, bricks, limits.thin / scale**2, len(result[0]) > 1, work, missed, signs=True
-    )
-    if fine is not bricks:
-        result = _volumes(fine, speck)
-    bodies, cavities = ([v * scale**3 for v in volumes] for volumes in result)
     middle = np.array(origin or (*solid.bounds.box.centre[:2], bricks.origin[2]))
     evidence = SolidEvidence(
-        *(root, bricks, scale, limits, middle, solid.bounds.box.size, bodies, cavities),
+        *(root, bricks, scale, limits, middle, solid.bounds.box.size),
         *(thick, floors, between, narrow, bare),
     )
     unseen = _unseen(thick, finest or bricks.voxel * scale, limits.thin, scale, middle)
@@ -160,8 +109,6 @@ def check_solid(
     holes = narrow_holes(root, solid, tunnels, limits.hole / scale, work)
     return SolidReport(
         voxel=bricks.voxel * scale,
-        bodies=bodies,
-        cavities=cavities,
         walls=_widths(thick, scale),
         gaps=_widths(between, scale),
         floors=_widths(floors, scale),
@@ -171,6 +118,20 @@ def check_solid(
         holes=_closing(holes, limits.hole, scale, middle),
         problems=problems_of("solid", evidence),
     )
+
+
+def _measured(root: Field, solid: Samples, most: float, work: Work) -> tuple[Walls, Walls, Walls]:
+    """Walls, gaps and floors thinner than `most` scene units."""
+    work.progress("checking the solid", 0.1)
+    thin, tight = thin_features(root, solid, work)
+    work.progress("checking the solid", 0.6)
+    voxel = solid.bricks.voxel
+    least, narrowest = (features.least(voxel) for features in (thin, tight))
+    kinds = Measure(False, least), Measure(True, narrowest), Measure(False, least, UP)
+    thick, between, upright = (
+        project_faces(root, found, voxel, work) for found in walls_of(solid, most, work, kinds)
+    )
+    return thin.beside(thick, most), tight.beside(between, most), thin.beside(upright, most, UP)
 
 
 def _widths(walls: Walls, scale: float) -> Widths | None:
@@ -207,16 +168,6 @@ def _closing(holes: Walls, limit: float, scale: float, middle: np.ndarray) -> st
 def may_close(count: int, noun: str, width: float, limit: float) -> str:
     """Say that some holes of a width are narrower than a limit, mm."""
     return f"{format_count(count, noun)} of {width:.2g} mm, narrower than {limit:g} mm, may close"
-
-
-def _volumes(bricks: Bricks, speck: float) -> tuple[list[float], list[float]]:
-    """Volumes of bodies and of cavities of at least `speck`, the largest first, cubed scene units."""
-    components = components_of(bricks)
-    sizes = [
-        bricks.voxel**3 * components.count[numbers] for numbers in (components.bodies, components.cavities)
-    ]
-    bodies, cavities = ([v for v in size.tolist() if v >= speck] for size in sizes)
-    return bodies, cavities
 
 
 def _under(walls: Walls, limit: float, scale: float) -> Walls:

@@ -9,35 +9,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
 
 from ..common.messages import format_count, significant
 from ..slicing.feature_graph import Neck
 from . import Check
 from .layer_checks import LayersEvidence
 from .problems import SUPPORTS, Problem, flat_base
-from .solid_checks import SolidEvidence
 
 BRIDGE = (("bridge", "1mm"),)
 """Print setting that joins bodies."""
-
-
-def _loose(count: int, **where: Any) -> Problem:
-    """Problem of bodies that nothing holds."""
-    text = format_count(count, "loose body", "loose bodies")
-    return Problem("bodies", text, mend=BRIDGE, advice="--keep largest", count=count, **where)
-
-
-def _bodies_of_solid(of: SolidEvidence) -> Iterator[Problem]:
-    if len(of.bodies) > 1:
-        yield _loose(len(of.bodies))
 
 
 def _bodies(of: LayersEvidence) -> Iterator[Problem]:
     bodies = of.report.bodies
     lowest = min((body.layers[0] for body in bodies), default=0)  # several on the plate are as many parts
     if hanging := [body for body in bodies if body.layers[0] > lowest]:
-        yield _loose(len(hanging), **of.where(hanging[0]))
+        text, where = format_count(len(hanging), "loose body", "loose bodies"), of.where(hanging[0])
+        yield Problem("bodies", text, mend=BRIDGE, advice="--keep largest", count=len(hanging), **where)
 
 
 def _islands(of: LayersEvidence) -> Iterator[Problem]:
@@ -75,7 +63,6 @@ def _narrow_neck(neck: Neck, of: LayersEvidence) -> Problem:
 
 
 CHECKS = (
-    Check("bodies", "solid", _bodies_of_solid, rank=20, weight=100),
     Check("bodies", "layers", _bodies, rank=20, weight=100),
     Check("islands", "layers", _islands, rank=30),
     Check("overhangs", "layers", _overhangs, rank=31),

@@ -35,6 +35,12 @@ class Bounds:
     boxless: tuple[str, ...] = ()  # names of the formulas in the field that state no box
     measured: tuple[str, ...] = ()  # names of the formulas in the field whose L is measured, not proved
 
+    def slope_less(self, distance: float) -> float:
+        """Lipschitz bound of the field less a constant, scene units."""
+        n = self.steepening
+        # The stretch along circles of latitude ends within 1/n, in narrow rings within 3/n^2.
+        return self.lipschitz * (2 + n / 4 + n * n / 128 if self.exterior_only and distance > 0 else 1.0)
+
 
 class Kernel(Protocol):
     """Evaluator of a field; many threads may call it at once.
@@ -156,6 +162,11 @@ class Field(Protocol):
         """Box that is proved to enclose all points where the field is negative."""
         return self.bounds.box
 
+    @property
+    def tips(self) -> np.ndarray | None:
+        """Outermost points along -x, -y, -z, x, y and z, where they are known exactly, float64 [3, 6]."""
+        return None
+
     def conservative(self) -> Field:
         """Conservative field, for skipping empty space.
 
@@ -186,16 +197,6 @@ class Field(Protocol):
         KernelError
             If the field cannot be compiled.
         """
-
-    def sign_kernel(self) -> Kernel:
-        """Kernel of a field with the same signs, which can be faster.
-
-        Returns
-        -------
-        Kernel
-            Only the signs of its values mean anything.
-        """
-        return self.kernel()
 
     def cells(self, precision: Precision = "float32") -> Cells | None:
         """Proofs that the field has one sign on cells.

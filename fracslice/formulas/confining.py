@@ -7,7 +7,6 @@ import math
 from ..common.parameters import REQUIRED, Number, Vector
 from ..expr.vocabulary import absolute, any_of, floor, maximum, minimum
 from ..fields.box import Box
-from ..fields.field import Bounds
 from ..fields.registry import Fixed, Node, always_keeps_sign, domain_operator
 
 # An operator that confines its child returns ``maximum(d, minimum(child, 2 m - d))``, where d is the signed
@@ -89,17 +88,7 @@ def offset_bounds(node: Node) -> Box:
 
 @offset.slope
 def offset_slope(node: Node) -> float:
-    return max(1.0, moved_slope(node.children[0].bounds, node["distance"]))
-
-
-def moved_slope(inner: Bounds, distance: float) -> float:
-    """Lipschitz bound of a field minus a constant.
-
-    `distance` in scene units.
-    """
-    n = inner.steepening
-    # The stretch along circles of latitude ends within 1/n, in narrow rings within 3/n^2.
-    return inner.lipschitz * (2 + n / 4 + n * n / 128 if inner.exterior_only and distance > 0 else 1.0)
+    return max(1.0, node.children[0].bounds.slope_less(node["distance"]))
 
 
 @offset.identity

@@ -236,6 +236,7 @@ class _Job:
         """Finished mesh and report, and the refinement of the samples that does not lose the object."""
         from ..fields.depth import shallower
         from ..mesh.shells import touching_note
+        from ..printing.thickness import thickness_note
         from ..volume.amount import lost_size, mesh_amount
         from .mesh_steps import choose_bodies
 
@@ -245,15 +246,18 @@ class _Job:
             surface, done = surfaces.refine_surface(surface, what.chord / scale, clock)
             refined = done.scaled(scale)
         with clock("finishing"):
-            finish, chosen = choose_bodies(surface, sized.left, what.dust_limit, scale, executor)
-        whole = what.edits(self.scene).bodies is None
+            how = what.edits(self.scene)
+            finish, chosen = choose_bodies(
+                surface, sized.left, what.dust_limit, scale, how.thickness, executor
+            )
+        whole = how.bodies is None
         measure = partial(mesh_amount, planned, chosen.volume, scale, whole, clock.work)
         with in_background(measure, clock.work.threads) as measured:
             made = Writing(self.scene, what, clock, self.path).made(surface, finish, executor)
             written = nullcontext() if self.path is None else keeping(f"{self.path} is written")
             with written, clock("checking"):
                 complete = measured()
-        fell = f"{thin}; expected a smaller voxel, or a thickness of {2 * scale * planned.voxel:.2g} mm"
+        fell = f"{thin}; expected a smaller voxel, or a thickness of {3 * scale * planned.voxel:.2g} mm"
         mesh = finish.report(made.checks.tally, chosen.misplaced)
         low, high = mesh.bbox_mm
         sides = [scale * side for side in planned.box.size], np.subtract(high, low).tolist(), chosen.size
@@ -281,6 +285,7 @@ class _Job:
             simplified=made.simplified,
             notes=(
                 *planned.notes,
+                *thickness_note(made.checks.thin, how, planned.voxel * scale),
                 *shorter,
                 *([fell] if thin and not near else ()),
                 *(refined.notes if refined else ()),

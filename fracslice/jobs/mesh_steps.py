@@ -29,7 +29,9 @@ from ..mesh.shells import (
     joined_components,
     levels,
 )
+from ..mesh.spatial import build
 from ..mesh.tips import Late, Pointed, PointedPiece, pointed_in, without_tips
+from ..printing.thickness import MeshSurface, ThinWalls, thin_walls
 from ..records import PIECES
 from ..scene import Print
 from ..store import Arrays
@@ -366,11 +368,13 @@ def choose_bodies(
     how: Print,
     dust: Callable[[float, float], float],
     scale: float,
+    thickness: float,
     executor: Executor,
 ) -> tuple[Finish, Chosen]:
     """Choose the bodies of a surface and place them.
 
-    `dust`: limit, mm3, of the volume and of the largest crumb; `scale`: mm per scene unit.
+    `dust`: limit, mm3, of the volume and of the largest crumb; `scale`: mm per scene unit; `thickness`: below
+    which walls are looked for, mm.
     """
     planned, pieces, shells, unit = surface.planned, surface.pieces, surface.shells, scale**3
     searched = shells.searched(how.cavities == "fill")
@@ -392,7 +396,7 @@ def choose_bodies(
     )
     place = Placement(scale, (-scale * x, -scale * y, -scale * lowest))
     of = Sampled(planned, surface.signs)
-    return Finish(of, shells, stays, place, surface.tips, pieces), chosen
+    return Finish(of, shells, stays, place, surface.tips, thickness, pieces), chosen
 
 
 @dataclass
@@ -407,6 +411,7 @@ class Checks:
     errors: list[NDArray[np.float64]] = field(default_factory=list)
     rows: list[int] = field(default_factory=list)  # triangles of each piece that are at no tip
     late: list[Late] = field(default_factory=list)  # the others
+    thin: list[ThinWalls] = field(default_factory=list)  # walls below the thickness, of each piece
 
     @property
     def near_bodies(self) -> int:
@@ -417,7 +422,7 @@ class Checks:
         """Add the sums over other pieces."""
         self.tally.include(other.tally)
         self.contact += other.contact
-        for name in ("near", "errors", "rows", "late"):
+        for name in ("near", "errors", "rows", "late", "thin"):
             getattr(self, name).extend(getattr(other, name))
 
 
@@ -430,6 +435,7 @@ class Finish(MeshStep[Checks]):
     stays: NDArray[np.bool_]  # shells that stay
     place: Placement
     added: NDArray[np.float64]  # vertices that were added at tips, scene units
+    thickness: float  # thickness below which walls are looked for, mm; 0 for none
     pieces: Pieces
 
     @cached_property
@@ -495,7 +501,15 @@ class Finish(MeshStep[Checks]):
             tally.add(made)
             points = made.points[:: stride(len(self.of.signs))]
             errors = off_surface(planned, self.place, points, work)
-            return Checks(tally, contact(), [near], [errors])
+            return Checks(tally, contact(), [near], [errors], thin=self._thin_walls(made, work))
+
+    def _thin_walls(self, made: Finished, work: Work) -> list[ThinWalls]:
+        """Walls of a finished piece that are too thin, if any are looked for."""
+        if not (self.thickness and made.done):
+            return []
+        mesh, tree = made.mesh, build(made.mesh, work.threads, halved=True)
+        surface = MeshSurface(mesh.vertices, mesh.triangles, *tree)
+        return [thin_walls(surface, made.done, self.thickness, work.threads)]
 
     def each(self, clock: Clock) -> Iterator[tuple[Finished, NDArray[np.int64]]]:
         """Finish the pieces in this process, with their near bodies. Those held in memory are released."""
@@ -528,14 +542,16 @@ class Finish(MeshStep[Checks]):
     def about(self) -> Arrays:
         """See `MeshStep.about`."""
         place = np.array([self.place.scale, *self.place.offset])
-        return {"stays": self.stays, "place": place, "added": self.added, **vars(self.shells)}
+        own = {"stays": self.stays, "place": place, "added": self.added}
+        return own | {"thickness": np.array(self.thickness)} | vars(self.shells)
 
     @classmethod
     def read(cls, about: Arrays, pieces: Pieces, sampled: Callable[[], Sampled]) -> Self:
         """See `MeshStep.read`."""
         scale, x, y, z = about["place"].tolist()
         place = Placement(scale, (x, y, z))
-        return cls(sampled(), read_shells(about), about["stays"], place, about["added"], pieces)
+        shells, thickness = read_shells(about), float(about["thickness"])
+        return cls(sampled(), shells, about["stays"], place, about["added"], thickness, pieces)
 
     @staticmethod
     def pack(result: Checks) -> Arrays:
@@ -543,7 +559,8 @@ class Finish(MeshStep[Checks]):
         (near,), (errors,), (rows,), (late,) = result.near, result.errors, result.rows, result.late
         own = {"contact": np.array(result.contact), "near": near, "errors": errors, "rows": np.array(rows)}
         tally = {f"tally-{name}": np.array(value) for name, value in vars(result.tally).items()}
-        return own | late._asdict() | tally
+        thin = {f"thin-{name}": rows for walls in result.thin for name, rows in vars(walls).items()}
+        return own | late._asdict() | tally | thin
 
     @staticmethod
     def unpack(arrays: Arrays) -> Checks:
@@ -551,7 +568,9 @@ class Finish(MeshStep[Checks]):
         tally = Tally(**{name: arrays[f"tally-{name}"].tolist() for name in vars(Tally())})
         late = Late(arrays["tips"], arrays["corners"])
         near, errors, rows = [arrays["near"]], [arrays["errors"]], [int(arrays["rows"])]
-        return Checks(tally, float(arrays["contact"]), near, errors, rows, [late])
+        names = [f"thin-{name}" for name in ThinWalls.__dataclass_fields__ if "thin-width" in arrays]
+        thin = [ThinWalls(*(arrays[name] for name in names))] if names else []
+        return Checks(tally, float(arrays["contact"]), near, errors, rows, [late], thin)
 
 
 MOST_ERRORS = 1 << 20

@@ -74,7 +74,7 @@ def apply_edits(made: Plan, scene: Scene, what: MeshJob, size: Sizing, clock: Cl
 
     how = what.edits(scene)
     with clock("changing"):
-        changed, scale = printable(made, size, how, clock.work)
+        changed, scale = printable(made, size, how, clock.work, measured=False)
     # Walls thinner than a voxel are crumbs in the mesh: choose bodies in the field where it can tell.
     keep = how.keep if made.root.bounds.exterior_only else "all"
     # Keep cavities: the hollow is one.

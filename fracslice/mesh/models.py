@@ -221,6 +221,12 @@ class MeshField(ArrayField):
         low, high = self.mesh.vertices.min(0).tolist(), self.mesh.vertices.max(0).tolist()
         return Bounds(Box(tuple(low), tuple(high)), 1.0, False)
 
+    @property
+    def tips(self) -> np.ndarray:
+        """`Field.tips`."""
+        vertices = self.mesh.vertices
+        return np.ascontiguousarray(vertices[np.concatenate([vertices.argmin(0), vertices.argmax(0)])].T)
+
     @cached_property
     def key(self) -> str:
         """`Field.key`."""
@@ -230,14 +236,10 @@ class MeshField(ArrayField):
         """`Field.kernel`, always on the CPU."""
         return _MeshKernel(self, np.dtype(precision))
 
-    def sign_kernel(self) -> Kernel:
-        """`Field.sign_kernel`: the winding number alone, without distances."""
-        return _MeshKernel(self, np.dtype("float32"), False)
-
     @cached_property
     def native(self) -> _native.MeshField:
         """Evaluator of the field."""
-        return _native.MeshField(self.mesh.vertices, self.mesh.triangles, *build(self.mesh))
+        return _native.MeshField(self.mesh.vertices, self.mesh.triangles, *build(self.mesh, halved=True))
 
 
 class _MeshKernel(Kernel):
@@ -245,13 +247,13 @@ class _MeshKernel(Kernel):
 
     batch = 1 << 14
 
-    def __init__(self, field: MeshField, dtype: np.dtype, measured: bool = True) -> None:
-        self._native, self.dtype, self._measured = field.native, dtype, measured
+    def __init__(self, field: MeshField, dtype: np.dtype) -> None:
+        self._native, self.dtype = field.native, dtype
 
     def points(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
         """`Kernel.points`."""
         u, v, w = (np.asarray(a, np.float64).reshape(-1) for a in (x, y, z))
-        values = self._native.points(u, v, w, self._measured)
+        values = self._native.points(u, v, w)
         return values.reshape(np.shape(x)).astype(self.dtype, copy=False)
 
     def bricks(
@@ -259,6 +261,6 @@ class _MeshKernel(Kernel):
     ) -> None:
         """`Kernel.bricks`."""
         if out.dtype == np.float32:
-            out[:] = self._native.bricks(corners, origin, voxel, self._measured)
+            out[:] = self._native.bricks(corners, origin, voxel)
         else:
             super().bricks(corners, origin, voxel, out)

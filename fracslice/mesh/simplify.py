@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._native import Reduction, connected_components
-from ..common.parameters import AnyLength, Count, Number, validate_value
+from ..common.parameters import AnyLength, Count, Number, parse_length, validate_value
 from ..errors import MeshError
-from ..scene import parse_length
 from ..work import Work, chunks
 from .model import Mesh, component_sizes, edge_topology
 from .spatial import Nearest, build, self_intersecting_triangles

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..scene import Print
+from ..records import Print
 from ..work import Work
 
 if TYPE_CHECKING:
@@ -14,7 +14,9 @@ if TYPE_CHECKING:
 __all__ = ["printable"]
 
 
-def printable(planned: Plan, size: Sizing, how: Print, work: Work | None = None) -> tuple[Plan, float]:
+def printable(
+    planned: Plan, size: Sizing, how: Print, work: Work | None = None, *, measured: bool = True
+) -> tuple[Plan, float]:
     """Make a planned scene printable.
 
     Samples with the voxel of `planned` lie at the same points before and after.
@@ -29,6 +31,8 @@ def printable(planned: Plan, size: Sizing, how: Print, work: Work | None = None)
         Changes to make.
     work : Work, optional
         Threads, progress and cancellation.
+    measured : bool
+        Whether a note names the walls that stay thinner than the thickness. A mesh measures its triangles.
 
     Returns
     -------
@@ -49,4 +53,4 @@ def printable(planned: Plan, size: Sizing, how: Print, work: Work | None = None)
         return planned, scale
     from .preparation import apply_print_edits  # most objects are printed as they are
 
-    return apply_print_edits(planned, size, how, scale, work or Work()), scale
+    return apply_print_edits(planned, size, how, scale, work or Work(), measured), scale

@@ -76,10 +76,6 @@ class EditedField(ArrayField):
         """`Field.kernel`, always on the CPU."""
         return _Composite(self.root.kernel("cpu", precision), self.does, self.shape.kernel("cpu", precision))
 
-    def sign_kernel(self) -> Kernel:
-        """`Field.sign_kernel`."""
-        return _Composite(self.root.sign_kernel(), self.does, self.shape.sign_kernel())
-
 
 @dataclass(frozen=True, eq=False)
 class _CompositeCells:

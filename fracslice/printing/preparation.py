@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..common.messages import format_count, place
 from ..errors import VolumeError
 from ..fields.field import Field
 from ..formulas import Box, box, plane, transform
@@ -25,6 +24,7 @@ from ..volume.bricks import values_at
 from ..volume.sizing import Sizing
 from ..work import Work
 from .edits import edited_field
+from .thickness import SLACK, ThinWalls
 
 if TYPE_CHECKING:
     from .samples import Samples, SolidComponents
@@ -57,12 +57,16 @@ class Preparation:
     work: Work
     scale: float
     """mm per scene unit."""
+    measured: bool = False
+    """Whether walls that stay too thin are looked for."""
     known: SolidComponents | None = None
     """Components, once computed."""
     meshed: Bricks | None = None
     """Samples of the object as the mesh has them, once taken."""
     thin: Walls | None = None
     """Walls that thickening left thinner than the minimum thickness, if anything was thickened."""
+    spot: float = 0.0
+    """Distance of the samples that they were measured on, mm."""
 
     @property
     def size(self) -> float:
@@ -172,25 +176,30 @@ ROUNDS = 8
 ACROSS = 1.5
 """Least number of samples of the mesh across the minimum thickness by which thinner walls are found."""
 
-SLACK = 0.01
-"""Part of the minimum thickness by which a wall may be thinner."""
 
-
-def apply_print_edits(planned: Plan, size: Sizing, how: Print, scale: float, work: Work) -> Plan:
+def apply_print_edits(
+    planned: Plan, size: Sizing, how: Print, scale: float, work: Work, measured: bool
+) -> Plan:
     """Make the changes of a `Print`; see `fracslice.printing.printable`."""
     for name in ("bridge", "gap", "thickness", "hollow", "drain", "base", "raft"):
         if (length := getattr(how, name)) > size.longest and (name != "drain" or how.hollow):
             raise VolumeError(
                 f"{name} {length:g} mm: expected at most the object's size, {size.longest:g} mm"
             )
-    job = _Edits(planned, size, how, work, scale)
+    job = _Edits(planned, size, how, work, scale, measured)
     for stage, change in job.changes():
         job.work.check()
         job.work.progress(stage, 0.0)
         job.put(change())
         job.work.progress(stage, 1.0)
     made = standing(job.planned, how, job.scale, job.work)
-    return replace(made, notes=(*made.notes, *thickness_note(job.thin, how.thickness, made.box, scale)))
+    if not measured or job.thin is None:
+        return made
+    thin, low = job.thin, made.box.lo[2]
+    thin = thin.chosen(thin.middle[:, 2] > low)  # not cut off
+    middle = scale * (thin.middle - (*made.box.centre[:2], low))
+    note = ThinWalls(scale * thin.width, scale**2 * thin.area, middle).note(how.thickness, job.spot)
+    return replace(made, notes=(*made.notes, *note))
 
 
 class _Edits(Preparation):
@@ -222,8 +231,8 @@ class _Edits(Preparation):
             yield "joining fragments", self.rejoined
             if how.thickness and self.known and self.known.solid.voxel < self.planned.voxel:
                 yield "filling pores", self.unsealed
-            if self.thin is not None and self.meshed:
-                yield "measuring the thickness", self.measured
+            if self.measured and self.thin is not None and self.meshed:
+                yield "measuring the thickness", self.measure_thickness
         if how.hollow:
             yield "hollowing", self.hollowed
 
@@ -301,7 +310,7 @@ class _Edits(Preparation):
         self.meshed = self.known.solid
         return filled
 
-    def measured(self) -> Field:
+    def measure_thickness(self) -> Field:
         """Find the walls that are still too thin on the samples of the mesh, if these resolve them."""
         bricks = self.meshed
         if bricks and ACROSS * bricks.voxel < self.how.thickness / self.scale:
@@ -367,6 +376,7 @@ class _Edits(Preparation):
         """Walls of the current object thinner than the minimum, on samples of it; with `added`, in the bricks
         of these alone.
         """
+        self.spot = made.voxel * self.scale
         from .samples import Samples, rows_of
         from .walls import project_faces, walls
 
@@ -403,30 +413,3 @@ def _space_points(points: np.ndarray, voxel: float) -> np.ndarray:
     cells -= cells.min(0)
     _, first = np.unique(np.ravel_multi_index(tuple(cells.T), tuple(cells.max(0) + 1)), return_index=True)
     return np.asarray(first)
-
-
-def thickness_note(thin: Walls | None, least: float, box: Box, scale: float) -> tuple[str, ...]:
-    """A note on walls that are thinner than `least` mm, measured from the middle of the lower face of `box`.
-
-    `box` in scene units; `scale`: mm per scene unit.
-    """
-    if thin is None:
-        return ()
-    middle = np.array((*box.centre[:2], box.lo[2]))
-    left = thin.chosen(thin.middle[:, 2] > box.lo[2])  # not cut off
-    if not len(left.width):
-        return ()
-    count, first = _count_places(left.middle, least / scale), int(left.width.argmin())
-    at = place((scale * (left.middle[first] - middle)).tolist())
-    thinner = f"{format_count(count, 'place')} thinner than the thickness of {least:g} mm"
-    return (f"{thinner}; the thinnest, {left.width[first] * scale:.2g} mm, at {at} mm",)
-
-
-def _count_places(points: np.ndarray, near: float) -> int:
-    """Number of clusters of points, of which each has another within `near`."""
-    from scipy.spatial import KDTree
-
-    from .._native import graph_components
-
-    pairs = KDTree(points).query_pairs(near, output_type="ndarray")
-    return graph_components(len(points), *pairs.T)[1]

@@ -21,11 +21,10 @@ from ..errors import VolumeError
 from ..fields.box import Box
 from ..fields.field import Bounds, Device, Field, Kernel, Precision
 from ..fields.tree import ArrayField
-from ..formulas.confining import moved_slope
-from ..volume import Bricks, Lattice, sample, sample_signs
+from ..volume import Bricks, Lattice, sample
 from ..volume.bricks import BRICK, values_at
 from ..work import Work
-from .samples import Samples, sign_samples
+from .samples import Samples
 from .walls import AT_ONCE, AWAY, OPPOSITE, Direction, Walls, edge_crossings, in_blocks, slopes, walls
 
 ROUNDS = 400
@@ -94,7 +93,7 @@ class OffsetField(ArrayField):
     def bounds(self) -> Bounds:
         """Bounds as of the formula `offset`. A flatter field's inside can extend farther from its box."""
         own = self.root.bounds
-        return replace(own, box=own.box.grown(self.by), lipschitz=moved_slope(own, self.by))
+        return replace(own, box=own.box.grown(self.by), lipschitz=own.slope_less(self.by))
 
     @property
     def key(self) -> str:
@@ -164,9 +163,9 @@ class ThinFeatures:
     # and `walls` has only those that the samples miss
     replaces: float
 
-    def lasting(self, sampled: Walls, voxel: float) -> Walls:
-        """Walls measured on samples that `beside` may keep once their faces are projected."""
-        return sampled.chosen(sampled.width >= self.replaces - 2.01 * AWAY * voxel)
+    def least(self, voxel: float) -> float:
+        """Least width on samples of a wall that `beside` may keep once its faces are projected."""
+        return self.replaces - 2.01 * AWAY * voxel
 
     def beside(self, sampled: Walls, limit: float, direction: Direction | None = None) -> Walls:
         """Combine with walls measured on samples.
@@ -225,6 +224,7 @@ class _Look:
         """
         result, rays = self.from_within(), self.inwards
         while len(rays.start):
+            rays = self.near(rays)
             gap = self.stretch(rays, rays.leave, 1.0)
             gap = self.missed(gap, gap.enter)
             gap = self.missed(gap, gap.leave)
@@ -245,6 +245,12 @@ class _Look:
         limit = np.full(len(rays.start), self.most)
         back = self.first(replace(rays, directions=-rays.directions), 0 * limit, limit, -1.0)
         return self.facing(rays.chosen(rays.enter + back > limit))
+
+    def near(self, rays: Rays) -> Rays:
+        """Rays that may meet something within `most` of where they leave: halfway, others are as far off."""
+        half = self.most / 2
+        f = self.field(rays.points(rays.leave + STEP * self.voxel + half))
+        return rays.chosen(f < half * self.root.bounds.lipschitz)
 
     def stretch(self, rays: Rays, begin: np.ndarray, sign: float) -> Rays:
         """Rays along which the field times `sign`, positive from `begin` on, turns negative within `most`.
@@ -447,35 +453,23 @@ def sampled_object(root: Field, outer: Box, longest: float, samples: float, work
     raise failure
 
 
-def resolve_connectivity(
-    root: Field,
-    bricks: Bricks,
-    least: float,
-    loose: bool,
-    work: Work,
-    thin: Walls | None = None,
-    signs: bool = False,
-) -> Bricks:
+def resolve_connectivity(root: Field, bricks: Bricks, least: float, loose: bool, work: Work) -> Bricks:
     """Resample an object finer if its samples may miss walls or gaps: two samples across the thinnest.
 
     A plate thicker than sqrt 3 samples is not pierced, whatever its tilt (Andres, Acharya and Sibata 1997,
     "Discrete analytical hyperplanes"). A fractal has walls of every thickness; it is resampled only if it
     appears disconnected.
 
-    `least`: squared scene units; `signs`: whether the signs of finer samples suffice, see `sign_samples`.
+    `least`: squared scene units.
     """
     times = AGAIN if loose else 1.0
     if not root.bounds.exterior_only:
-        if thin is None:
-            walls, gaps = thin_features(root, Samples(bricks), work)
-            thin = walls.walls + gaps.walls
-        times = _times(bricks, thin, least, MOST * root.kernel().batch / Kernel.batch)
+        walls, gaps = thin_features(root, Samples(bricks), work)
+        times = _times(bricks, walls.walls + gaps.walls, least, MOST * root.kernel().batch / Kernel.batch)
     if times <= 1:
         return bricks
     lattice = Lattice.around(Samples(bricks).bounds.box, bricks.voxel / times)
     kernel = root.kernel()
-    if signs:
-        return sign_samples(sample_signs(root.sign_kernel(), root.bounds, lattice, work, kernel))
     return sample(kernel, root.bounds, lattice, work, kernel)
 
 

@@ -108,6 +108,7 @@ class Measure:
     """How walls are measured."""
 
     gaps: bool = False  # measure gaps instead of walls
+    least: float = 0.0  # leave out what is narrower, scene units
     # measure along this unit vector instead of the normal, through faces that look along it or against it
     direction: Direction | None = None
 
@@ -142,7 +143,7 @@ def _measure_walls(
         upright = np.copysign(1, (directions * how.direction).sum(1))
         directions = upright[:, None] * np.array(how.direction)
     width = solid.native.through(points, directions, limit, towards)
-    thin = (width < limit) & (np.abs((normals * directions).sum(1)) > -OPPOSITE)
+    thin = (how.least <= width) & (width < limit) & (np.abs((normals * directions).sum(1)) > -OPPOSITE)
     points, normals, directions, width = points[thin], normals[thin], directions[thin], width[thin]
     ends = points + width[:, None] * directions
     exact = solid.kernel("cpu", "float64")

@@ -156,6 +156,12 @@ def traps(root: Node, trap: str = NEAREST) -> dict[int, str]:
     return dict(below) if root.children else {id(root): trap}
 
 
+def _of_one(node: Node) -> bool:
+    """True for a union, an intersection or a difference of a single element."""
+    formula = node.formula
+    return formula.kind == "csg" and formula.children[1] is None and len(node.children) == 1
+
+
 @dataclass
 class TraceDialect(FieldDialect):
     """Dialect whose functions return (f, paint, tone)."""
@@ -167,8 +173,8 @@ class TraceDialect(FieldDialect):
     prefix: str = "T"  # prefix of the function names
 
     def kept(self, node: Node) -> Node:
-        """Skip identity nodes, except materials; see `Dialect.kept`."""
-        while node.is_identity and node.formula.name != material.name:
+        """Skip identity nodes, except materials, and operators of one element; see `Dialect.kept`."""
+        while _of_one(node) or (node.is_identity and node.formula.name != material.name):
             node = node.children[0]
         return node
 

@@ -11,9 +11,9 @@ import numpy as np
 
 from ..common.messages import decimal
 from ..fields.algebra import length
-from ..fields.box import Triple, possible_cells
+from ..fields.box import Box, Triple, possible_cells
 from ..fields.field import Bounds, Field, Kernel
-from ..formulas import Box, Node
+from ..fields.node import Node
 from ..records import DUST
 from ..work import Work, chunks
 from . import Lattice, Plan

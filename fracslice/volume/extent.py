@@ -12,7 +12,7 @@ from .._native import climb as climbed
 from ..errors import EmptyError, VolumeError
 from ..fields.box import Box, possible_cells
 from ..fields.field import Field, Kernel
-from ..formulas import Node
+from ..fields.node import Node
 from ..work import Work
 from .bricks import values_at
 
@@ -154,6 +154,9 @@ def _measured(root: Field, work: Work | None) -> Extent:
         state = "".join(f", or state the box of {n} with @{n}.bounds" for n in root.bounds.boxless[:1])
         message = f"has no end along {along}; put <bounds> around it{state}"
         raise _endless(root.tree).fail(message) if root.tree else VolumeError(f"the field {message}")
+    if (tips := root.tips) is not None:
+        outer = _box(np.diagonal(tips.reshape(3, 2, 3), axis1=0, axis2=2))
+        return Extent(outer, outer.grown(EXACT * max(outer.size)), tips)
     search = _Search(root, work or Work())
     for _ in range(TURNS):
         result = search.extent(box)

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SliceError
-from ..fields.algebra import affine, length
+from ..fields.algebra import length, rotation
 from ..fields.box import Box, Triple
 from ..fields.field import Field
-from ..formulas import sphere, transform
 from ..records import SAME, UP
-from ..scene import Scene
 from ..work import Work
 from . import Plan, with_depths
 from .extent import extent, reached
+
+if TYPE_CHECKING:
+    from ..scene import Scene
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,8 @@ def orient_field(root: Field, up: Triple, stretch: Triple = SAME, work: Work | N
         return root
     if root.tree is None:
         raise SliceError("up: expected a scene of formulas")
+    from ..formulas import transform
+
     made = with_depths(root.tree, work)
     if turn[3]:
         made = transform(made, rotate=turn)
@@ -92,8 +96,7 @@ def orientation(up: Triple, factors: Triple = SAME) -> NDArray[np.float64]:
 
     `up`: direction. Returns float64 (3, 3).
     """
-    linear, _ = affine(transform(sphere(), rotate=_turn(up)).values)
-    matrix: NDArray[np.float64] = (linear * np.array(factors)[:, None]).T
+    matrix: NDArray[np.float64] = (rotation(_turn(up)) * np.array(factors)[:, None]).T
     return matrix
 
 

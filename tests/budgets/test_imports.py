@@ -67,10 +67,21 @@ UNUSED = {
         "fracslice._vdb",
         "fracslice.mesh",
     ),
-    "check": ("scipy", "numba", "trimesh", "email", "ssl", "numpy.ma", "PIL", "fracslice._vdb"),
+    "check": (
+        "scipy",
+        "numba",
+        "trimesh",
+        "email",
+        "ssl",
+        "numpy.ma",
+        "PIL",
+        "fracslice._vdb",
+        "fracslice.scene",
+        "fracslice.formulas",
+    ),
 }
 """Packages that take long to import, by the job that has no use for them."""
-MOST = {"help": 160, "mesh": 413, "slice": 465, "render": 420, "check": 430}
+MOST = {"help": 160, "mesh": 413, "slice": 465, "render": 420, "check": 365}
 """Modules that are imported; of a mesh, six more or less: of powers two, of isal five."""
 
 

@@ -57,7 +57,7 @@ def test_check_says_whether_it_would_print(
     assert run(["check", pair, *layers, *flags]) == status
     report = json.loads(capfd.readouterr().out)
     assert bool(report["problems"]) == bool(status)
-    assert len(report["solid"]["bodies"]) == (2 if "--bridge" in flags else 1)
+    assert len(report["bodies"]) == (2 if "--bridge" in flags else 1)
 
 
 def test_a_wrong_length_is_bad_input(pair: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

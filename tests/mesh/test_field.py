@@ -6,15 +6,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from fracslice.fields.field import Field
 from fracslice.formulas import box, sphere
 from fracslice.mesh import Mesh
 from fracslice.mesh.models import MeshField
 from fracslice.mesh.spatial import Nearest
-from fracslice.printing.edits import Does, edited_field
 from fracslice.volume import plan
-
-DOES: tuple[Does, ...] = ("cut", "add", "keep")
 
 
 def field_of(*parts: trimesh.Trimesh) -> MeshField:
@@ -80,18 +76,6 @@ def test_bricks_have_the_least_of_the_distances_of_all_triangles(away: float) ->
     assert (np.abs(values.ravel()[::97]) == np.min(ones, axis=0)).all()
 
 
-def test_signs_need_no_distances() -> None:
-    ball, post = field_of(trimesh.creation.icosphere(3, 5.0)), field_of(trimesh.creation.box((3, 4, 14)))
-    points = np.random.default_rng(0).uniform(-8, 8, (3, 2000))
-    fields: list[Field] = [ball, *(edited_field(ball, does, post) for does in DOES)]
-    fields.append(edited_field(ball, "cut", sphere(radius=4.0)))
-    exact = [field.kernel().points(*points) < 0 for field in fields]
-    for field, inside in zip(fields, exact, strict=True):
-        signs = field.sign_kernel().points(*points)
-        assert inside.sum() > 0 and ((signs < 0) == inside).all()
-        assert (np.abs(signs) == 1).all() or field is fields[-1]
-
-
 def test_points_above_each_other_share_the_crossings_of_their_line() -> None:
     plates = [trimesh.creation.box((10, 10, 1)) for _ in range(20)]
     for k, plate in enumerate(plates):
@@ -116,7 +100,7 @@ def test_bricks_have_the_values_of_their_points() -> None:
     field = field_of(trimesh.creation.box((20, 0.05, 20)), moved(trimesh.creation.icosphere(2, 3.0), 4, 1, 0))
     corners = np.array([(-8, -8, 0), (0, -8, 8), (40, 0, -16), (-96, 0, 96)], np.int32)
     origin, inner = (0.03, -0.01, 0.02), np.indices((8, 8, 8)).reshape(3, 512)
-    for kernel in (field.kernel(), field.sign_kernel(), field.kernel("cpu", "float64")):
+    for kernel in (field.kernel(), field.kernel("cpu", "float64")):
         out = np.empty((len(corners), 512), kernel.dtype)
         kernel.bricks(corners, origin, 0.1, out)
         grid = [origin[k] + 0.1 * (corners[:, k, None] + inner[k]) for k in range(3)]

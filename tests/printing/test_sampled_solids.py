@@ -281,12 +281,12 @@ def test_no_point_is_deep_where_samples_say_so(half: float, deep: bool) -> None:
 
 
 def test_walls_that_projection_cannot_widen_enough_are_left_out() -> None:
-    """What `lasting` drops, `beside` would drop with the projected faces."""
+    """What is narrower than `least` on samples, `beside` would drop with the projected faces."""
     root, work = union(shell(sphere(), thickness=0.05), shell(sphere(radius=0.6), thickness=0.2)), Work()
     solid = sampled(root, 50)
     thin, _ = thin_features(root, Samples(solid), work)
-    (found,) = walls_of(Samples(solid), 1.0, work, [Measure()])
-    lasting = thin.lasting(found, solid.voxel)
+    kinds = Measure(), Measure(least=thin.least(solid.voxel))
+    found, lasting = walls_of(Samples(solid), 1.0, work, kinds)
     both = [thin.beside(project_faces(root, w, solid.voxel, work), 1.0) for w in (found, lasting)]
     assert 0 < len(lasting.width) < len(found.width)
     np.testing.assert_array_equal(both[0].width, both[1].width)

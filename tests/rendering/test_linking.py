@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 
+import numpy as np
 import pytest
 
 from fracslice import render
 from fracslice.expr.graph import text
 from fracslice.fields.linker import link
 from fracslice.fields.registry import Node
-from fracslice.formulas import mandelbulb, material, sphere, union
+from fracslice.formulas import difference, intersection, mandelbulb, material, sphere, union
 from fracslice.formulas.material import TRAPS
 from fracslice.rendering.linking import Frame, link_frame
 from fracslice.rendering.setup import optics
@@ -100,3 +102,11 @@ def test_traps_colour_pictures_differently_and_leave_the_shape(trap: str) -> Non
     assert (pictures[0] == pictures[1]).all() == (trap == "point")
     assert (pictures[1] == pictures[2]).all()
     assert link(plain).program == link(seen).program
+
+
+@pytest.mark.parametrize("operator", [union, intersection, difference])
+def test_an_operator_of_one_material_looks_like_that_material(operator: Callable[..., Node]) -> None:
+    red = material(sphere(), colour=(1, 0, 0))
+    alone, within = (render(root, size=(16, 12), samples=1) for root in (red, operator(red)))
+    np.testing.assert_array_equal(within, alone)
+    assert (alone[..., 0] > 2.0 * alone[..., 1]).any()

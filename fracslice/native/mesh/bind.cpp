@@ -11,6 +11,7 @@
 #include "quantise.h"
 #include "predicates.h"
 #include "selection.h"
+#include "thin_walls.h"
 #include "tree.h"
 #include "export.h"
 
@@ -191,6 +192,15 @@ nb::object bind_crossings(const Rows<double>& vertices, const Rows<int32_t>& tri
     return to_numpy(std::move(marks), {triangles.shape(0)});
 }
 
+nb::object bind_thin_walls(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<int64_t>& order,
+                           const Rows<double>& low, const Rows<double>& high, size_t count, double limit, int threads) {
+    return to_numpy<double>(unlocked(threads, [&] {
+        MeshView mesh = mesh_of(vertices, triangles);
+        if (count > mesh.count || !(limit > 0)) throw std::invalid_argument("expected at most all triangles, and a limit above zero");
+        return thin_walls(mesh, tree_of(mesh, order, low, high), count, limit);
+    }));
+}
+
 nb::tuple bind_nesting(const Rows<double>& vertices, const Rows<int32_t>& triangles, const Vector<int32_t>& labels,
                        const Vector<double>& sizes, const Vector<int64_t>& first, int threads) {
     size_t shells = sizes.size();
@@ -242,6 +252,8 @@ void bind_mesh(nb::module_& module) {
     module.def("tree", &bind_tree, "vertices"_a, "triangles"_a, "threads"_a = 0, "halved"_a = false);
     module.def("self_intersecting_triangles", &bind_crossings, "vertices"_a, "triangles"_a, "order"_a, "low"_a, "high"_a,
                "threads"_a = 0, "among"_a = nb::none());
+    module.def("thin_walls", &bind_thin_walls, "vertices"_a, "triangles"_a, "order"_a, "low"_a, "high"_a, "count"_a, "limit"_a,
+               "threads"_a = 0);
     module.def("nesting", &bind_nesting, "vertices"_a, "triangles"_a, "labels"_a, "sizes"_a, "first"_a, "threads"_a = 0);
     module.def("foremost", &bind_foremost, "vertices"_a, "triangles"_a, "shape"_a);
     module.def("side_of_line", &side_of_line, "ax"_a, "ay"_a, "bx"_a, "by"_a, "cx"_a, "cy"_a);

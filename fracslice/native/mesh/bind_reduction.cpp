@@ -109,7 +109,7 @@ class BoundMeshField {
                             [](const MeshView& mesh, const TreeView& tree) { return MeshField(mesh, tree); })) {}
 
     // Calls come from many threads: each takes one.
-    nb::object points(const Strided& x, const Strided& y, const Strided& z, bool measured) const {
+    nb::object points(const Strided& x, const Strided& y, const Strided& z) const {
         const size_t count = x.shape(0);
         if (y.shape(0) != count || z.shape(0) != count) throw std::invalid_argument("coordinates differ in length");
         Array<double> points(count, 3), values(count, 1);
@@ -121,15 +121,15 @@ class BoundMeshField {
                 for (size_t i = 0; i < count; ++i) points.data[3 * i + k] = from[ptrdiff_t(i) * row->stride(0)];
                 ++k;
             }
-            field_.points({points.data.get(), 3 * count}, measured, values.data.get());
+            field_.points({points.data.get(), 3 * count}, values.data.get());
         }
         return to_numpy(std::move(values), {count});
     }
-    nb::object bricks(const Rows<int32_t>& corners, const std::array<double, 3>& origin, double voxel, bool measured) const {
+    nb::object bricks(const Rows<int32_t>& corners, const std::array<double, 3>& origin, double voxel) const {
         Array<float> values(corners.shape(0), 512);
         {
             nb::gil_scoped_release released;
-            field_.bricks(span_of(corners), origin, voxel, measured, values.data.get());
+            field_.bricks(span_of(corners), origin, voxel, values.data.get());
         }
         return to_numpy(std::move(values), {corners.shape(0), 512});
     }
@@ -209,8 +209,8 @@ void bind_reduction(nb::module_& module) {
     nb::class_<BoundMeshField>(module, "MeshField")
         .def(nb::init<const Rows<double>&, const Rows<int32_t>&, const Vector<int64_t>&, const Rows<double>&, const Rows<double>&>(),
              "vertices"_a, "triangles"_a, "order"_a, "low"_a, "high"_a)
-        .def("points", &BoundMeshField::points, "x"_a, "y"_a, "z"_a, "measured"_a)
-        .def("bricks", &BoundMeshField::bricks, "corners"_a, "origin"_a, "voxel"_a, "measured"_a);
+        .def("points", &BoundMeshField::points, "x"_a, "y"_a, "z"_a)
+        .def("bricks", &BoundMeshField::bricks, "corners"_a, "origin"_a, "voxel"_a);
     nb::class_<BoundSolid>(module, "Solid")
         .def(nb::init<const Rows<double>&, const Rows<int32_t>&, const Vector<int64_t>&, const Rows<double>&, const Rows<double>&>(),
              "vertices"_a, "triangles"_a, "order"_a, "low"_a, "high"_a)

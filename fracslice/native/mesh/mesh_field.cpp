@@ -88,34 +88,32 @@ void Winding::cross(double x, double y, std::vector<Crossing>& crossings) const 
     }
 }
 
-void MeshField::points(std::span<const double> points, bool measured, double* values) const {
+void MeshField::points(std::span<const double> points, double* values) const {
     std::vector<double> known;
     std::vector<size_t> which;
     auto is_finite = [](const double* p) { return std::isfinite(p[0] + p[1] + p[2]); };
     size_t first = 0;
     while (first < points.size() && is_finite(&points[first])) first += 3;
-    if (first == points.size()) return finite_points(points, measured, values);
+    if (first == points.size()) return finite_points(points, values);
     for (size_t i = 0; i < points.size() / 3; ++i) {
         const double* p = &points[3 * i];
         values[i] = std::numeric_limits<double>::quiet_NaN();
         if (is_finite(p)) known.insert(known.end(), p, p + 3), which.push_back(i);
     }
     std::vector<double> found(which.size());
-    finite_points(known, measured, found.data());
+    finite_points(known, found.data());
     for (size_t i = 0; i < which.size(); ++i) values[which[i]] = found[i];
 }
 
-void MeshField::finite_points(std::span<const double> points, bool measured, double* values) const {
+void MeshField::finite_points(std::span<const double> points, double* values) const {
     const size_t count = points.size() / 3;
     auto inside = std::make_unique<bool[]>(count);
     winding_.inside(points, inside.get());
-    std::fill_n(values, count, 1.0);
-    if (measured) nearest_.near(points, values);
+    nearest_.near(points, values);
     for (size_t i = 0; i < count; ++i) values[i] = inside[i] ? -values[i] : values[i];
 }
 
-void MeshField::bricks(std::span<const int32_t> corners, const std::array<double, 3>& origin, double voxel, bool measured,
-                       float* values) const {
+void MeshField::bricks(std::span<const int32_t> corners, const std::array<double, 3>& origin, double voxel, float* values) const {
     std::array<double, 3 * 512> grid;
     std::array<double, 512> result;
     for (size_t brick = 0; brick < corners.size() / 3; ++brick) {
@@ -124,7 +122,7 @@ void MeshField::bricks(std::span<const int32_t> corners, const std::array<double
             const int at[3] = {s >> 6, s >> 3 & 7, s & 7};
             for (size_t k = 0; k < 3; ++k) grid[3 * size_t(s) + k] = origin[k] + voxel * (corner[k] + at[k]);
         }
-        points(grid, measured, result.data());
+        points(grid, result.data());
         std::copy(result.begin(), result.end(), values + 512 * brick);
     }
 }

@@ -37,13 +37,13 @@ class MeshField {
     // A mesh and its tree outlive this.
     MeshField(const MeshView& mesh, const TreeView& tree) : nearest_(mesh, tree, false), winding_(mesh) {}
 
-    // Values at points [n, 3]; NaN where one is not finite. Only signs mean anything if they are not measured.
-    void points(std::span<const double> points, bool measured, double* values) const;
+    // Values at points [n, 3]; NaN where one is not finite.
+    void points(std::span<const double> points, double* values) const;
     // The same on bricks of 8 x 8 x 8 grid points, from their first ones: [n, 3] to [n, 512], offset x*64 + y*8 + z.
-    void bricks(std::span<const int32_t> corners, const std::array<double, 3>& origin, double voxel, bool measured, float* values) const;
+    void bricks(std::span<const int32_t> corners, const std::array<double, 3>& origin, double voxel, float* values) const;
 
   private:
-    void finite_points(std::span<const double> points, bool measured, double* values) const;
+    void finite_points(std::span<const double> points, double* values) const;
 
     Nearest nearest_;
     Winding winding_;
