@@ -4,6 +4,7 @@ from .api.calls import Slices as Slices
 from .api.calls import make_mesh as make_mesh
 from .api.calls import render as render
 from .api.calls import slice_layers as slice_layers
+from .api.calls import sweep as sweep
 from .api.grids import write_vdb as write_vdb
 from .errors import FracsliceError as FracsliceError
 from .formats import write as write
@@ -90,6 +91,7 @@ from .scene import to_xml as to_xml
 from .scene.view import Camera as Camera
 from .scene.view import Light as Light
 from .version import __version__ as __version__
+from .volume.level_sets import from_function as from_function
 from .volume.level_sets import from_grid as from_grid
 from .volume.level_sets import from_vdb as from_vdb
 from .work import Work as Work

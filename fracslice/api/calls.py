@@ -3,27 +3,32 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeVar, Unpack, overload
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, Unpack, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..common.arrays import of_library, on_host
+from ..common.files import replacing
 from ..common.messages import format_count, lacking
-from ..common.parameters import AUTO, AnyLength
-from ..errors import SceneError, SliceError, TooLargeError
+from ..common.parameters import AUTO, AnyLength, items
+from ..errors import ExportError, FracsliceError, SceneError, SliceError, TooLargeError
 from ..formulas import Node
 from ..jobs.mesh import make_mesh as make_mesh_job
 from ..jobs.pictures import make_picture
 from ..jobs.report import Result
 from ..records import MeshJob, RenderJob
 from ..scene import Print, Scene
+from ..scene.model import element_to_xml
 from ..scene.view import Camera, Film, Light, View
 from ..slicing import Contours, Layer, SliceJob, Slicer, Stack, plan_layers
 from ..volume import with_depths
+from ..volume.level_sets import from_grid
 from ..volume.sizing import sizing
 from ..work import Work, chunks
 from .options import (
@@ -43,9 +48,38 @@ if TYPE_CHECKING:
     from shapely import MultiPolygon
 
 
-def distance(shape: Node, points: ArrayLike) -> NDArray[np.floating]:
+STEP = 1e-6
+"""Half the length of central differences, longest sides of a shape."""
+
+
+def gradient(shape: Node, *points: ArrayLike) -> Any:
+    """See `Node.gradient`."""
+    return of_library(_gradient(shape, _points(*points)), points[0])
+
+
+def normals(shape: Node, *points: ArrayLike) -> Any:
+    """See `Node.normals`."""
+    found = _gradient(shape, _points(*points))
+    length = np.linalg.norm(found, axis=-1, keepdims=True)
+    return of_library(np.divide(found, length, out=np.zeros_like(found), where=length > 0), points[0])
+
+
+def _gradient(shape: Node, array: NDArray[np.floating]) -> NDArray[np.float64]:
+    box, array = shape.bounds.box, array.astype(np.float64)
+    step = STEP * (max(box.size) if box.finite and max(box.size) > 0 else 1.0)
+    moved = array[..., None, :] + step * np.concatenate([np.eye(3), -np.eye(3)])
+    values = _distance(shape, moved)
+    difference: NDArray[np.float64] = (values[..., :3] - values[..., 3:]) / (2 * step)
+    return difference
+
+
+def distance(shape: Node, *points: ArrayLike) -> Any:
     """See `Node.distance`."""
-    array = _points(points)
+    return of_library(_distance(shape, _points(*points)), points[0])
+
+
+def _distance(shape: Node, array: NDArray[np.floating]) -> NDArray[np.floating]:
+    """The field at points [..., 3]."""
     kernel = _with_depths(shape).kernel("cpu", "float32" if array.dtype == np.float32 else "float64")
     flat, values = array.reshape(-1, 3), np.empty(array.size // 3, array.dtype)
 
@@ -56,13 +90,21 @@ def distance(shape: Node, points: ArrayLike) -> NDArray[np.floating]:
     return values.reshape(array.shape[:-1])
 
 
-def _points(points: ArrayLike) -> NDArray[np.floating]:
-    """Points as an array of float32 or float64, [..., 3]. Raises `SceneError` for any other shape or type."""
+def _points(*points: ArrayLike) -> NDArray[np.floating]:
+    """Points, or coordinates along each axis, as an array of float32 or float64, [..., 3].
+
+    Raises `SceneError` for any other shape or type.
+    """
+    if len(points) not in (1, 3):
+        raise SceneError(f"expected points, or x, y and z; found {len(points)} values")
     try:
-        array = np.asarray(points)
+        arrays = [on_host(given) for given in points]
+        array = arrays[0] if len(arrays) == 1 else np.stack(np.broadcast_arrays(*arrays), -1)
         array = array if array.dtype == np.float32 else array.astype(np.float64, casting="same_kind")
+    except BufferError as error:
+        raise SceneError(f"points: {error}") from None
     except (TypeError, ValueError):
-        raise SceneError("points: expected numbers, an array [..., 3]") from None
+        raise SceneError("points: expected numbers, an array [..., 3], or x, y and z") from None
     if array.ndim == 0 or array.shape[-1] != 3:
         raise SceneError(f"points: expected an array [..., 3], found one of shape {list(array.shape)}")
     return array
@@ -85,6 +127,8 @@ def make_mesh(
     work: Work | None = None,
     *,
     path: str | Path | None = None,
+    spacing: float | Sequence[float] | None = None,
+    iso: float | None = None,
     **options: Unpack[MeshKeywords],
 ) -> Result:
     """Make a printable mesh of a shape.
@@ -94,9 +138,9 @@ def make_mesh(
 
     Parameters
     ----------
-    shape : Node, Scene, str or path
+    shape : Node, Scene, str, path, mesh, array or callable
         A shape such as ``sphere(0.5) - box()``, a scene, a scene file, or the name of a shipped scene or a
-        formula.
+        formula; a mesh; numbers or samples of a grid, as for `from_grid`; a function, as for `from_function`.
     job : MeshJob, optional
         Settings of the mesh, as a record.
     work : Work, optional
@@ -104,6 +148,8 @@ def make_mesh(
     path : str or path, optional
         The file to write, in the format of its extension. An .stl file may be larger than memory: the mesh
         is then only in that file, and access to its vertices raises `TooLargeError`.
+    spacing, iso : optional
+        Of an array: distance between its numbers, and value at the surface.
     {options}
     Returns
     -------
@@ -134,6 +180,8 @@ def make_mesh(
     >>> make_mesh("menger-sponge", size="2cm", resolution=27).size.round(3).tolist()
     [20.0, 20.0, 20.0]
     """
+    if spacing is not None or iso is not None:
+        shape = from_grid(cast("ArrayLike", shape), 1.0 if spacing is None else spacing, iso=iso)
     scene = as_scene(shape)
     given = job or MeshJob()
     edited = replace(scene, printing=given.edits(scene))
@@ -339,21 +387,124 @@ def as_polygons(contours: Contours) -> MultiPolygon:
     return MultiPolygon([Polygon(contours[k], holes[k]) for k, d in enumerate(depth) if d % 2 == 0])
 
 
+def sweep(
+    scene: Source,
+    values: Mapping[str, Iterable[Any]],
+    job: MeshJob | None = None,
+    work: Work | None = None,
+    **options: Unpack[MeshKeywords],
+) -> Iterator[Result]:
+    """Make meshes of a scene with one value after another.
+
+    Parameters
+    ----------
+    scene : Node, Scene, str or path
+        As for `make_mesh`.
+    values : mapping of str to iterable
+        Values by name, as for `Scene.with_values`: ``{"mandelbulb.power": range(2, 9)}``. Of several names,
+        all combinations are made; the last name changes fastest.
+    job : MeshJob, optional
+        Settings of the meshes, as a record.
+    work : Work, optional
+        Threads, progress, cancellation, store and device, as a record.
+    **options
+        Keywords of `make_mesh`.
+
+    Returns
+    -------
+    iterator of Result
+        A mesh for each combination, made when it is asked for.
+
+    Raises
+    ------
+    SceneError
+        For an unknown name, or as `make_mesh`.
+
+    Examples
+    --------
+    >>> from fracslice import menger, sweep
+    >>> [len(mesh.faces) > 0 for mesh in sweep(menger(), {"menger.level": [0, 1]}, size=10, resolution=9)]
+    [True, True]
+    """
+    whole = as_scene(scene)
+    chosen = [
+        whole.with_values([f"{name}={_text(value)}" for name, value in zip(values, some, strict=True)])
+        for some in product(*values.values())
+    ]
+    return (make_mesh(one, job, work, **options) for one in chosen)
+
+
+def _text(value: Any) -> str:
+    """A value as a scene file has it: several numbers with spaces between."""
+    return " ".join(map(str, items(value)))
+
+
 FILM = Film(width=640, height=480, samples=16)
 """Film of a shape without a scene, for a quick picture."""
+
+
+FORMATS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG", ".webp": "WEBP"}
+"""Pillow's names of the formats of pictures."""
 
 
 class Picture(np.ndarray):
     """A picture, uint8 [height, width, 3], sRGB, that notebooks display."""
 
+    def save(self, path: str | Path) -> Path:
+        """Write the picture to a file, atomically.
+
+        Parameters
+        ----------
+        path : str or path
+            The file, in the format of its extension: .png, .jpg or .webp.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        ExportError
+            For another extension, an array that is no picture, or a file that cannot be written.
+        """
+        ending = Path(path).suffix.lower()
+        if ending not in FORMATS:
+            raise ExportError(f"{path}: unknown kind of file; known are {', '.join(FORMATS)}")
+        data = self._encoded(FORMATS[ending])
+        if data is None:
+            raise ExportError(
+                f"{path}: expected uint8 [height, width, 3], found {self.dtype} {list(self.shape)}"
+            )
+        with replacing(path) as file:
+            file.write(data)
+        return Path(path)
+
     def _repr_png_(self) -> bytes | None:
+        return self._encoded("PNG")
+
+    def _encoded(self, form: str) -> bytes | None:
         from PIL import Image
 
         if self.dtype != np.uint8 or self.ndim != 3 or self.shape[2] != 3:
             return None  # a slice of a picture need not be a picture
         file = io.BytesIO()
-        Image.fromarray(np.asarray(self)).save(file, "PNG")
+        Image.fromarray(np.asarray(self)).save(file, form, quality=95)
         return file.getvalue()
+
+
+def page(shape: Node) -> str:
+    """A shape as HTML: a picture of it where it has one, and its elements."""
+    from base64 import b64encode
+    from html import escape
+
+    elements = f"<pre>{escape(element_to_xml(shape))}</pre>"
+    try:
+        picture = render(shape, size=(320, 240), samples=4)
+    except FracsliceError as error:
+        return f"{elements}<p>{escape(str(error))}</p>"
+    data = b64encode(picture._repr_png_() or b"").decode()
+    return f'<img src="data:image/png;base64,{data}" width="320" height="240"/>{elements}'
 
 
 @keywords(RenderJob)

@@ -9,8 +9,11 @@ from dataclasses import replace
 from functools import wraps
 from inspect import Parameter, cleandoc, signature
 from pathlib import Path
-from typing import Any, Literal, ParamSpec, TypeAlias, TypedDict, TypeVar, get_type_hints
+from typing import Any, Literal, ParamSpec, TypeAlias, TypedDict, TypeVar, cast, get_type_hints
 
+from numpy.typing import NDArray
+
+from ..common.cache import warn
 from ..common.messages import hint
 from ..common.parameters import REQUIRED, AnyLength, AnyScale, Record, parameter_lines, short_repr
 from ..errors import SceneError
@@ -21,6 +24,8 @@ from ..formulas import Formula, Node, get
 from ..formulas import names as formula_names
 from ..records import Colour, MeshJob, RenderJob, SliceJob
 from ..scene import Print, Scene, library, read, scene
+from ..volume.bricks import Bricks
+from ..volume.level_sets import from_bricks, from_function, from_grid
 from ..work import Work
 
 P = ParamSpec("P")
@@ -213,7 +218,9 @@ def _option_lines(records: Iterable[type[Record]], known: Container[str]) -> Ite
     yield ""
 
 
-Source: TypeAlias = Node | Scene | TriangleMesh | str | os.PathLike[str]
+Source: TypeAlias = (
+    Node | Scene | TriangleMesh | Bricks | Callable[..., Any] | NDArray[Any] | str | os.PathLike[str]
+)
 
 
 def resolve(source: Source) -> Node | Scene:
@@ -222,7 +229,8 @@ def resolve(source: Source) -> Node | Scene:
     Parameters
     ----------
     source : Node, Scene, mesh, path or name
-        A shape, a scene, a mesh, a scene file, a model file, or the name of a shipped scene or formula.
+        A shape, a scene, a mesh, a scene file, a model file, or the name of a shipped scene or formula; an
+        array or samples of a grid; a function of x, y and z, which is sampled, with a warning that says so.
 
     Raises
     ------
@@ -237,10 +245,16 @@ def resolve(source: Source) -> Node | Scene:
         return from_trimesh(source)
     if isinstance(source, Formula):
         raise SceneError(f"{source.name}: expected a shape, {source.name}(...), found the formula itself")
+    if isinstance(source, Bricks):
+        return from_bricks(source)
+    if hasattr(source, "__array__") or hasattr(source, "__dlpack__"):
+        return from_grid(cast("NDArray[Any]", source))
+    if callable(source):
+        warn("a function is sampled on a grid; fracslice.formulas.shape makes an exact formula of one")
+        return from_function(source)
     if not isinstance(source, (str, os.PathLike)):
         wanted = "expected a shape such as sphere(), a scene, a file or a name"
-        how = "; formulas.shape makes a formula of a function" if callable(source) else ""
-        raise SceneError(f"{short_repr(source)}: {wanted}{how}")
+        raise SceneError(f"{short_repr(source)}: {wanted}")
     path = Path(source)
     if path.suffix.lower() in SOLIDS:
         return get(SOLIDS[path.suffix.lower()])(os.fspath(source))

@@ -1,8 +1,9 @@
-"""Arrays: quantiles, records of arrays of equal length, and the transfer function of sRGB."""
+"""Arrays: quantiles, records of arrays of equal length, the transfer function of sRGB, other libraries."""
 
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
 from typing import Any, Self
 
@@ -59,3 +60,21 @@ def to_linear(shown: NDArray[Any]) -> NDArray[Any]:
 def from_linear(light: NDArray[Any]) -> NDArray[Any]:
     """Convert linear light to display values."""
     return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+
+
+def on_host(given: Any) -> np.ndarray:
+    """Array of NumPy or of another library, by DLPack, without a copy. Raises BufferError for a GPU's."""
+    if isinstance(given, np.ndarray) or not hasattr(given, "__dlpack__"):
+        return np.asarray(given)
+    try:
+        return np.from_dlpack(given)
+    except (BufferError, RuntimeError, TypeError):
+        raise BufferError("expected an array in the memory of the CPU, of numbers that NumPy has") from None
+
+
+def of_library(values: np.ndarray, given: Any) -> Any:
+    """Values as an array of the library of another one, such as PyTorch, where it takes them by DLPack."""
+    if isinstance(given, np.ndarray) or not hasattr(given, "__dlpack__"):
+        return values
+    library = sys.modules[type(given).__module__.partition(".")[0]]
+    return library.from_dlpack(values) if hasattr(library, "from_dlpack") else values

@@ -27,7 +27,6 @@ from .box import Axis, Box, direction, three
 from .field import Bounds, Cells, Device, Field, Kernel, Loops, Precision
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
     from .registry import Formula
@@ -299,7 +298,11 @@ class Operators:
         """
         return _make_node("material", self, **appearance)
 
-    def distance(self, points: ArrayLike) -> NDArray[np.floating]:
+    def __call__(self, *points: ArrayLike) -> Any:
+        """`distance` of points."""
+        return self.distance(*points)
+
+    def distance(self, *points: ArrayLike) -> Any:
         """Signed distance field of the shape at points, negative inside.
 
         The field is exact for primitives. For other shapes it is a bound: outside, the distance to the
@@ -307,13 +310,15 @@ class Operators:
 
         Parameters
         ----------
-        points : array of float32 or float64, [..., 3]
+        *points : array of float32 or float64, [..., 3], or three arrays
             Coordinates in scene units: those of the shape itself, before a mesh is scaled to its size in mm.
+            Points, or x, y and z, which are broadcast; of NumPy, or of a library with DLPack, on the CPU.
 
         Returns
         -------
         ndarray [...]
-            Values in the precision of the points; float64 for other numeric types.
+            Values in the precision of the points; float64 for other numeric types. For an array of another
+            library, one of that.
 
         Raises
         ------
@@ -326,10 +331,69 @@ class Operators:
         >>> from fracslice import sphere
         >>> sphere(0.5).distance([[0, 0, 0], [2, 0, 0]])
         array([-0.5,  1.5])
+        >>> sphere(0.5)(0, 0, [1, 2])
+        array([0.5, 1.5])
         """
         from ..api.calls import distance
 
-        return distance(cast("Node", self), points)
+        return distance(cast("Node", self), *points)
+
+    def gradient(self, *points: ArrayLike) -> Any:
+        """Gradient of the field at points, by central differences in float64.
+
+        Parameters
+        ----------
+        *points : array [..., 3], or three arrays
+            As for `distance`.
+
+        Returns
+        -------
+        ndarray [..., 3]
+            In the direction in which the field rises most: outwards. Its length is about 1 where the field is
+            a distance.
+
+        Raises
+        ------
+        SceneError
+            As `distance`.
+        """
+        from ..api.calls import gradient
+
+        return gradient(cast("Node", self), *points)
+
+    def normals(self, *points: ArrayLike) -> Any:
+        """Outward unit vectors of the field at points: the normals, on the surface.
+
+        Parameters
+        ----------
+        *points : array [..., 3], or three arrays
+            As for `distance`.
+
+        Returns
+        -------
+        ndarray [..., 3]
+            Zero where the field is flat.
+
+        Raises
+        ------
+        SceneError
+            As `distance`.
+
+        Examples
+        --------
+        >>> from fracslice import sphere
+        >>> sphere(0.5).normals([0, 0, 0.5]).round(6) + 0.0
+        array([0., 0., 1.])
+        """
+        from ..api.calls import normals
+
+        return normals(cast("Node", self), *points)
+
+    def _repr_html_(self) -> str:
+        """Picture and elements, for a notebook."""
+        from ..api.calls import page
+
+        return page(cast("Node", self))
 
 
 def _shape(given: Any) -> Node | None:

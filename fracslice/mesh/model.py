@@ -357,6 +357,29 @@ class Mesh(Triangles):
 
         return thumbnail(self) if len(self.triangles) else None
 
+    @staticmethod
+    def load(path: str | Path) -> Mesh:
+        """Read a mesh file.
+
+        Parameters
+        ----------
+        path : str or path
+            File; the extension selects the format, one of `fracslice.formats.ENDINGS`.
+
+        Returns
+        -------
+        Mesh
+            Its triangles, mm, with equal vertices joined, nothing repaired.
+
+        Raises
+        ------
+        MeshError
+            For a file that cannot be read.
+        """
+        from .models import read_mesh
+
+        return read_mesh(path)
+
     def export(self, path: str | Path, metadata: Mapping[str, str] | None = None) -> Path:
         """Write the mesh to a file atomically.
 

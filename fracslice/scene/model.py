@@ -224,6 +224,11 @@ def _unnamed(node: Node) -> Node:
     return replace(node, values=values, children=tuple(map(_unnamed, node.children)))
 
 
+def element_to_xml(node: Node) -> str:
+    """Return a shape as the XML elements of a scene file, indented by two spaces per level."""
+    return "\n".join(_element(node, ""))
+
+
 def part_to_xml(part: Part | Print) -> str:
     """Return a record of a scene as an XML element."""
     section = SECTIONS[part.element]

@@ -19,7 +19,8 @@ from ..common.messages import hint
 from ..common.parameters import REQUIRED, File, Number, Parameter, Vector, printable
 from ..errors import SceneError
 from ..fields.definitions import Defined, Definition, formula
-from ..fields.registry import DEEPEST, TOO_DEEP
+from ..fields.registry import DEEPEST, TOO_DEEP, get
+from ..formats import SOLIDS
 from ..formulas import Node
 from ..records import Part, Print
 from .animation import Animation, Track
@@ -53,7 +54,7 @@ BEFORE = b"\0\xff\xfe\xef\xbb\xbf \t\r\n"
 
 
 def read(path: str | os.PathLike[str], *, files_outside: bool = False) -> Scene:
-    """Read a scene file.
+    """Read a scene file, or a model or grid as the scene of that alone, in mm.
 
     Parameters
     ----------
@@ -73,6 +74,8 @@ def read(path: str | os.PathLike[str], *, files_outside: bool = False) -> Scene:
         If the file is unreadable or invalid: "file:line: <element> message".
     """
     source = os.fspath(path)
+    if formula := SOLIDS.get(Path(source).suffix.lower()):
+        return scene(get(formula)(source), unit=1.0, name=printable(Path(source).stem))
     try:
         with open_regular(source) as file:
             data = file.read(LARGEST_FILE + 1)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -12,14 +13,15 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..common.arrays import on_host
 from ..common.cache import Kept, cache_folder, key
 from ..common.files import replacing, temporary_folder
-from ..common.parameters import Choice, Number, Vector, validate_value
+from ..common.parameters import Choice, Count, Number, Vector, short_repr, validate_value
 from ..errors import VolumeError
 from ..expr.functions import InMemory
 from ..fields.box import Box
 from ..fields.registry import Node, get
-from .bricks import to_grid, write_grid
+from .bricks import Bricks, to_grid, write_grid
 from .sampler import sample_scene
 
 if TYPE_CHECKING:
@@ -187,7 +189,7 @@ def from_grid(
     >>> ball.bounds.box.size
     (8.0, 8.0, 8.0)
     """
-    from .._vdb import Grid, level_set_of
+    from .._vdb import Grid
 
     values = _numbers(array)
     steps = tuple(np.broadcast_to(validate_value("spacing", spacing, _SPACING, VolumeError), 3).tolist())
@@ -199,17 +201,137 @@ def from_grid(
     if not low < level < high:
         raise VolumeError(f"iso={level:g}: expected a value between {low:g} and {high:g}, those of the array")
     beyond = level + BEYOND * max(steps) if what == "surface" else low
+
+    def made() -> Grid:
+        return _around_zero(Grid.from_array(values, start, steps, beyond), what, level)
+
+    return _kept(key(values, steps, start, what, level), made, size, place)
+
+
+def _kept(name: str, make: Callable[[], Grid], size: float | None, place: str) -> Node:
+    """Shape of a grid in the cache, which is made if it is not there."""
+    from .._vdb import level_set_of
+
     folder = Kept(cache_folder() / "volumes").place()
     if folder is None:
         raise VolumeError(f"{cache_folder()}: expected a folder that others cannot write in, for the samples")
-    path = folder / f"{key(values, steps, start, what, level)}.vdb"
+    path = folder / f"{name}.vdb"
     if not path.exists():
         try:
-            grid = Grid.from_array(values, start, steps, beyond)
-            save(level_set_of(_around_zero(grid, what, level)), path)
+            save(level_set_of(make()), path)
         except ValueError as error:
             raise VolumeError(f"the array {error}") from None
     return get("volume")(str(path), size=size, place=place)
+
+
+SIDE, FIRST, COARSE, LARGEST = 192, 1.0, 33, 2.0**20
+"""Samples of a function along its longest side; half the first cube that is searched for its inside, samples
+of a cube along each side, and half of the largest one.
+"""
+MARGIN = 3
+"""Samples around what a function has inside."""
+
+Function = Callable[[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], ArrayLike]
+
+
+def from_function(
+    function: Function,
+    bounds: tuple[Sequence[float], Sequence[float]] | None = None,
+    *,
+    samples: int = SIDE,
+) -> Node:
+    """Make a shape of a function of NumPy, by its samples on a grid.
+
+    A formula (`fracslice.formulas.shape`) is not sampled: it is compiled, and exact.
+
+    Parameters
+    ----------
+    function : callable
+        Function of arrays x, y and z, float64 of one shape, that returns numbers of that shape: negative
+        inside. They need not be distances.
+    bounds : two triples, optional
+        Opposite corners of a box around the solid, scene units. By default it is searched for around the
+        origin, in cubes that double from a side of 2.
+    samples : int
+        Samples along the longest side of the box.
+
+    Returns
+    -------
+    Node
+
+    Raises
+    ------
+    VolumeError
+        If the function returns anything else, or has no inside, or one without end.
+
+    Examples
+    --------
+    >>> from fracslice import from_function
+    >>> egg = from_function(lambda x, y, z: x**2 + y**2 + (0.7 * z) ** 2 - 1, samples=64)
+    >>> [round(side, 2) for side in egg.bounds.box.size]
+    [2.0, 2.0, 2.86]
+    """
+    count = validate_value("samples", samples, Count(None, "", 8, 512), VolumeError)
+    low, high = _searched(function) if bounds is None else _corners(bounds)
+    step = float((high - low).max()) / (count - 1)
+    start = low - MARGIN * step
+    sides = [np.arange(math.ceil(size / step) + 1 + 2 * MARGIN) for size in (high - low).tolist()]
+    values = _sampled(
+        function, [first + step * side for first, side in zip(start.tolist(), sides, strict=True)]
+    )
+    return from_grid(values, step, kind="surface", origin=start.tolist())
+
+
+def _corners(bounds: object) -> NDArray[np.float64]:
+    """Opposite corners of a box, [2, 3]."""
+    try:
+        corners = np.array(bounds, np.float64).reshape(2, 3)
+    except (TypeError, ValueError):
+        corners = np.full((2, 3), np.nan)
+    if not (np.isfinite(corners).all() and (corners[0] < corners[1]).all()):
+        raise VolumeError("bounds: expected two corners of a box, such as ((-1, -1, -1), (1, 1, 1))")
+    return corners
+
+
+def _searched(function: Function) -> NDArray[np.float64]:
+    """Corners of a box around the inside of a function."""
+    half = FIRST
+    while half <= LARGEST:
+        side = np.linspace(-half, half, COARSE)
+        inside = _sampled(function, [side] * 3) < 0
+        edge = any(np.take(inside, end, axis).any() for axis in range(3) for end in (0, -1))
+        if inside.any() and not edge:
+            step, at = side[1] - side[0], np.argwhere(inside)
+            return np.stack([side[at.min(0)] - step, side[at.max(0)] + step])
+        half *= 2
+    raise VolumeError("the function has no inside near the origin, or one without end; expected bounds")
+
+
+def _sampled(function: Function, axes: Sequence[NDArray[np.float64]]) -> NDArray[np.float32]:
+    """Values of a function on a grid, a few planes at once."""
+    shape = tuple(map(len, axes))
+    values = np.empty(shape, np.float32)
+    planes = max(1, POINTS // (shape[1] * shape[2]))
+    for first in range(0, shape[0], planes):
+        points = np.meshgrid(axes[0][first : first + planes], *axes[1:], indexing="ij")
+        try:
+            found = np.asarray(function(*points), np.float64)
+        except (TypeError, ValueError) as error:
+            raise VolumeError(f"the function takes no arrays of x, y and z: {short_repr(error)}") from None
+        if found.shape not in (points[0].shape, ()) or np.isnan(found).any():
+            raise VolumeError("the function: expected a number for each point, in an array of the shape of x")
+        values[first : first + planes] = np.clip(found, -FARTHEST, FARTHEST)
+    return values
+
+
+POINTS, FARTHEST = 1 << 20, 1e30
+"""Points that a function is asked for at once, and largest value that is kept."""
+
+
+def from_bricks(bricks: Bricks) -> Node:
+    """Make a shape of the samples of a mesh; see `from_grid`."""
+    values = key(bricks.origin, bricks.voxel, bricks.ijk, bricks.values, bricks.index)
+    return _kept(values, lambda: to_grid(bricks), None, "as is")
 
 
 _SPACING = Vector(None, "", above=0, sizes=(1, 3))
@@ -217,7 +339,10 @@ _SPACING = Vector(None, "", above=0, sizes=(1, 3))
 
 def _numbers(array: ArrayLike) -> NDArray[np.float32]:
     """Numbers as C-contiguous float32, checked."""
-    given = np.asarray(array)
+    try:
+        given = on_host(array)
+    except BufferError as error:
+        raise VolumeError(str(error)) from None
     if given.ndim != 3 or given.dtype.kind not in "biuf" or not 0 < given.size <= MOST:
         found = f"{given.dtype} of shape {list(given.shape)}"
         raise VolumeError(f"expected an array of at most {MOST:,} numbers [nx, ny, nz], found {found}")
