@@ -225,8 +225,10 @@ def _run_command(command: list[str], text: str, work: Work) -> tuple[str, dict[s
 def _wait_for_child(child: subprocess.Popen[bytes], work: Work) -> tuple[int, Any, float]:
     """Wait for a child process; stop it if the work is cancelled. Returns its status, usage and peak memory,
     MiB.
+
+    The pauses grow with the age of the process, so that its memory is read in the last part of its life.
     """
-    seen = 0.0
+    seen, start = 0.0, time.perf_counter()
     while True:
         seen = max(seen, own_peak_mb(child.pid))
         pid, status, usage = os.wait4(child.pid, os.WNOHANG)
@@ -234,7 +236,7 @@ def _wait_for_child(child: subprocess.Popen[bytes], work: Work) -> tuple[int, An
             child.returncode = os.waitstatus_to_exitcode(status)
             most = usage.ru_maxrss / MAXRSS
             return child.returncode, usage, seen if seen and most <= peak_rss_mb() else most
-        if work.cancel.wait(0.02):
+        if work.cancel.wait(min(0.02, 0.001 + (time.perf_counter() - start) / 20)):
             child.kill()
             child.wait()
             work.check()

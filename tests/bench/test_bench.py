@@ -22,7 +22,12 @@ from ..mesh import shapes
 
 pytestmark = pytest.mark.once
 
-COPY = 'import shutil, sys; shutil.copy(sys.argv[1], sys.argv[2]); print(\'{"wall_s": 7.5, "cpu_s": 8}\')'
+COPY = """
+import shutil, sys, time
+shutil.copy(sys.argv[1], sys.argv[2])
+time.sleep(0.2)  # long enough that its memory is seen
+print('{"wall_s": 7.5, "cpu_s": 8}')
+"""
 
 
 @pytest.fixture
