@@ -30,6 +30,7 @@ from .formulas import flake as flake
 from .formulas import frd as frd
 from .formulas import gear as gear
 from .formulas import gyroid as gyroid
+from .formulas import heightmap as heightmap
 from .formulas import hilbert as hilbert
 from .formulas import honeycomb as honeycomb
 from .formulas import intersection as intersection
@@ -43,6 +44,7 @@ from .formulas import kifs_tetrahedron as kifs_tetrahedron
 from .formulas import koch as koch
 from .formulas import lambda_bulb as lambda_bulb
 from .formulas import lidinoid as lidinoid
+from .formulas import lithophane as lithophane
 from .formulas import mandelbox as mandelbox
 from .formulas import mandelbulb as mandelbulb
 from .formulas import material as material
@@ -59,6 +61,7 @@ from .formulas import prism as prism
 from .formulas import pseudo_kleinian as pseudo_kleinian
 from .formulas import quaternion_mandelbrot as quaternion_mandelbrot
 from .formulas import quaternion_power as quaternion_power
+from .formulas import relief as relief
 from .formulas import repeat as repeat
 from .formulas import revolve as revolve
 from .formulas import schwarz_d as schwarz_d

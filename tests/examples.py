@@ -36,6 +36,7 @@ from fracslice.formulas import (
     frd,
     gear,
     gyroid,
+    heightmap,
     hilbert,
     honeycomb,
     intersection,
@@ -49,6 +50,7 @@ from fracslice.formulas import (
     koch,
     lambda_bulb,
     lidinoid,
+    lithophane,
     mandelbox,
     mandelbulb,
     material,
@@ -65,6 +67,7 @@ from fracslice.formulas import (
     pseudo_kleinian,
     quaternion_mandelbrot,
     quaternion_power,
+    relief,
     repeat,
     revolve,
     schwarz_d,
@@ -113,6 +116,8 @@ GRID = str(Path(__file__).parent / "models" / "bracket.vdb")
 """The same, not turned, as distances at samples 0.1 apart, on its faces and between."""
 WASHER = str(Path(__file__).parent / "models" / "washer.svg")
 """A square of 2 mm with a hole of a diamond of 0.5 square mm, in the middle."""
+HILLS = str(Path(__file__).parent / "models" / "hills.png")
+"""A picture of 16 x 9 pixels of 8 bits."""
 
 FONT = str(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf")
 
@@ -167,6 +172,11 @@ EXAMPLES: dict[str, Node] = {
     "extrude": extrude(WASHER, size=1.4, height=0.6),
     "text": text("o8", FONT, depth=0.4),
     "revolve": revolve(WASHER, size=0.6, offset=0.4),
+    "heightmap": heightmap(HILLS, size=1.5, height=0.4, base=0.1),
+    "lithophane": lithophane(HILLS, thinnest=0.1, thickest=0.3),
+    "lithophane wall": lithophane(HILLS, form="cylinder", thinnest=0.1, thickest=0.3, degrees=200),
+    "lithophane ball": lithophane(HILLS, form="sphere", thinnest=0.1, thickest=0.3),
+    "relief": relief(sphere(radius=0.7), file=HILLS, height=0.2),
     "honeycomb": honeycomb(thickness=0.3, reach=0.9),
     "pseudo kleinian": cut(pseudo_kleinian(steps=5)),
     "tetrabrot": tetrabrot(iterations=7),
@@ -240,7 +250,10 @@ EXAMPLES: dict[str, Node] = {
     ),
 }
 
-OF_FILES = {"model", "extrude", "revolve", "text", "volume"}
+OF_FILES = {
+    "model", "extrude", "revolve", "text", "volume", "heightmap", "lithophane", "lithophane wall",
+    "lithophane ball", "relief",
+}  # fmt: skip
 """Examples that native code computes, on the CPU alone; each is of a file."""
 
 _TURNED = "return scale * turn(fold(w, 1), (0, 0, 1), 20) + c"
@@ -254,13 +267,13 @@ DEFINED = {
 REPRESENTATIVES = {
     "a distance", "a step", "abox", "apollonian", "bend", "bounds", "bristorbrot julia", "burning ship",
     "cone", "cosine bulb", "deep", "difference", "extrude", "foam of walls", "gear", "gyroid wall",
-    "honeycomb",
+    "heightmap", "honeycomb",
     "hybrid transformed", "julia 4d", "kaleidoscopic octahedron", "kelvin struts", "koch",
-    "lambda bulb", "mandelbox -1.5", "mandelbulb", "mandelbulb 7.5", "many", "material", "menger",
-    "mirror", "model", "octahedron flake", "perlin noise", "prism", "pseudo kleinian", "quaternion julia 4",
-    "repeat overlapping", "revolve", "rounded box", "schwarz_d wall", "shell", "smooth intersection",
-    "smooth union", "snowflake", "sphere", "superquadric", "text", "thread", "transform", "tree", "twist x",
-    "volume",
+    "lambda bulb", "lithophane wall", "mandelbox -1.5", "mandelbulb", "mandelbulb 7.5", "many", "material",
+    "menger", "mirror", "model", "octahedron flake", "perlin noise", "prism", "pseudo kleinian",
+    "quaternion julia 4", "repeat overlapping", "revolve", "rounded box", "schwarz_d wall", "shell",
+    "smooth intersection", "smooth union", "snowflake", "sphere", "superquadric", "text", "thread",
+    "transform", "tree", "twist x", "volume",
 }  # fmt: skip
 """Examples of which none is built like another; tests that are stamped on all have the others in a night."""
 

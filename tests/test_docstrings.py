@@ -41,7 +41,7 @@ def test_no_two_public_classes_have_one_name(trees: dict[Path, ast.Module]) -> N
 
 TWINS = {
     "camera", "cuda", "environment", "film", "machine", "model", "models",
-    "outlines",
+    "outlines", "reliefs",
 }  # fmt: skip
 """Modules of one name in two packages: mostly two sides of one thing, such as a formula and its kernel."""
 

@@ -143,14 +143,14 @@ def solid_distance(x: np.ndarray, y: np.ndarray, z: np.ndarray, solid: Any) -> n
 
 
 def outline_distance(x: np.ndarray, y: np.ndarray, outline: Any) -> np.ndarray:
-    """Signed distance to an outline in a plane, by native code. For the formulas of outlines alone.
+    """Signed distance to an outline in a plane, or height above it, by native code. For formulas of files.
 
     Parameters
     ----------
     x, y
         Coordinates, of one shape.
     outline
-        The outline, a `functions.InMemory`.
+        The outline or relief, a `functions.InMemory`.
 
     Returns
     -------
@@ -165,6 +165,6 @@ NAMES = frozenset((*_FUNCTIONS, "minimum", "maximum", "absolute", "any_of"))
 OF_CELLS = frozenset(("cell_middle", "cell_extent"))
 """Functions that only code of the kernel calls."""
 OF_FILES = frozenset(("solid_distance", "outline_distance"))
-"""Functions that only the formulas of models and outlines call: a point, and what lies in memory."""
+"""Functions that only the formulas of files call: a point, and what lies in memory."""
 ALL = NAMES | OF_CELLS | OF_FILES
 __all__ = sorted(NAMES)

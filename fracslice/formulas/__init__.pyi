@@ -449,6 +449,32 @@ def gyroid(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] =
     Node
     """
 
+def heightmap(file: str, size: float = 1.0, height: float = 0.1, base: float = 0.05, place: Literal['centre', 'bed'] = 'centre', sha256: str | None = None) -> Node:
+    """A picture as a landscape: above the middle of each pixel the height of its level of grey, of 8 or 16
+    bits, and bilinear between (a displacement map: Cook 1984, "Shade trees"). The field is measured along z,
+    and L = sqrt(1 + s^2), where s is the largest slope of the picture, from all its pixels. One of more than
+    4 million pixels is averaged.
+
+    Parameters
+    ----------
+    file : the name of a file
+        a picture, .png, .jpg, .webp or .tif, in the folder of the scene
+    size : a number > 0, default 1.0
+        longest side, between the middles of pixels
+    height : a number > 0, default 0.1
+        of white above black
+    base : a number > 0, default 0.05
+        thickness below black
+    place : centre or bed, default 'centre'
+        centred at the origin, or there from z = 0
+    sha256 : the SHA-256 of the file, 64 hexadecimal digits
+        hash of the file, by which a file that has changed is noticed
+
+    Returns
+    -------
+    Node
+    """
+
 def hilbert(level: int = 2, thickness: float = 0.5) -> Node:
     """A tube along a Hilbert curve in the cube [-1, 1]^3 (Hilbert 1891; as a Lindenmayer system by
     Prusinkiewicz and Lindenmayer 1990, "The Algorithmic Beauty of Plants").
@@ -706,6 +732,36 @@ def lidinoid(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float]
         of the wall at the origin, at its thinnest
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
+
+    Returns
+    -------
+    Node
+    """
+
+def lithophane(file: str, form: Literal['flat', 'cylinder', 'sphere'] = 'flat', size: float = 1.0, thinnest: float = 0.01, thickest: float = 0.05, degrees: float = 360.0, place: Literal['centre', 'bed'] = 'centre', sha256: str | None = None) -> Node:
+    """A picture that shows where light shines through (de Bourgoing 1827): the darker, the thicker, linear in
+    levels of grey, of 8 or 16 bits. One face is smooth, the lower or inner one. The field is measured across
+    it, and L = sqrt(1 + s^2), where s is the largest slope of the picture, from all its pixels. One of more
+    than 4 million pixels is averaged.
+
+    Parameters
+    ----------
+    file : the name of a file
+        a picture, .png, .jpg, .webp or .tif, in the folder of the scene
+    form : flat, cylinder or sphere, default 'flat'
+        a plate, seen from above; a wall around the z axis, seen from outside, its middle towards -y; or a ball with the picture as a map of longitudes and latitudes, such as that of a moon
+    size : a number > 0, default 1.0
+        longest side of the plate, height of the wall, or inner diameter of the ball
+    thinnest : a number > 0, default 0.01
+        thickness of white
+    thickest : a number > 0, default 0.05
+        thickness of black
+    degrees : a number > 0 and <= 360, default 360.0
+        how far a wall goes around the axis, to a whole column of pixels
+    place : centre or bed, default 'centre'
+        centred at the origin, or there from z = 0
+    sha256 : the SHA-256 of the file, 64 hexadecimal digits
+        hash of the file, by which a file that has changed is noticed
 
     Returns
     -------
@@ -1055,6 +1111,28 @@ def quaternion_power(power: int = 3, iterations: Union[int, Literal['auto']] = '
         adds this point in each step instead of the start point: a Julia set
     repeat : a whole number from 1 to 8, default 1
         times that the step is taken in each round of an <orbit>
+
+    Returns
+    -------
+    Node
+    """
+
+def relief(*elements: Node, file: str, size: float = 1.0, height: float = 0.05, sha256: str | None = None) -> Node:
+    """The element raised by a picture that falls on it along z, by its levels of grey; around the picture, by
+    the levels of its edge. L = the element's plus the largest slope of the picture, from all its pixels.
+
+    Parameters
+    ----------
+    *elements : Node
+        What it is applied to; several are a union.
+    file : the name of a file
+        a picture, .png, .jpg, .webp or .tif, in the folder of the scene
+    size : a number > 0, default 1.0
+        longest side, between the middles of pixels; its middle is on the z axis
+    height : a number > 0, default 0.05
+        by which the surface rises under white, from none under black
+    sha256 : the SHA-256 of the file, 64 hexadecimal digits
+        hash of the file, by which a file that has changed is noticed
 
     Returns
     -------

@@ -7,13 +7,15 @@ from dataclasses import dataclass
 from math import cos, pi, radians, sin, sqrt
 
 import numpy as np
+from PIL import Image
+from scipy.ndimage import map_coordinates
 
 from fracslice import formulas as f
 from fracslice.fields.orbits import growth_of
 from fracslice.fields.reference import reference
 from fracslice.formulas import Node
 from fracslice.formulas.bulbs import DIAGONAL, DIAGONAL_AXIS
-from tests.examples import EXAMPLES
+from tests.examples import EXAMPLES, HILLS
 
 Field = Callable[..., np.ndarray]
 Matrix = np.ndarray
@@ -195,7 +197,36 @@ HOLED = f.difference(
 )
 """The same of two boxes."""
 
+PIXELS = np.asarray(Image.open(HILLS), float)[::-1] / 255
+
+
+def level(x: np.ndarray, y: np.ndarray, size: float) -> np.ndarray:
+    """Level of a picture whose longest side has a size, bilinear between its pixels."""
+    rows, columns = PIXELS.shape
+    at = [np.clip(a * (columns - 1) / size + (n - 1) / 2, 0, n - 1) for a, n in ((y, rows), (x, columns))]
+    return np.asarray(map_coordinates(PIXELS, at, order=1, mode="nearest"))
+
+
+def plate(root: Node, black: float, white: float) -> Truth:
+    """What is below a picture."""
+    box, size = root.bounds.box, root["size"]
+
+    def field(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+        inside = (abs(x) < box.hi[0]) & (abs(y) < box.hi[1]) & (z > box.lo[2])
+        below = z - box.lo[2] < black + (white - black) * level(x, y, size)
+        return np.where(inside & below, -1.0, 1.0)
+
+    return Equal(root, field, sign=True)
+
+
+def raised(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+    return np.sqrt(x * x + y * y + z * z) - 0.7 - 0.2 * level(x, y, 1.0)
+
+
 TRUTHS: dict[str, list[Truth]] = {
+    "heightmap": [plate(EXAMPLES["heightmap"], 0.1, 0.5)],
+    "lithophane": [plate(EXAMPLES["lithophane"], 0.3, 0.1)],
+    "relief": [Equal(EXAMPLES["relief"], raised, sign=True)],
     "revolve": [Volume(EXAMPLES["revolve"], 2 * pi * 0.7 * 0.6**2 * (1 - 0.5 / 4))],
     "text": [Equal(EXAMPLES["text"].changed(size=2, depth=0.8), f.transform(EXAMPLES["text"], scale=2))],
     "extrude": [Volume(WASHER, 1.4**2 * (1 - 0.5 / 4) * 0.6), Equal(WASHER, HOLED, sign=True)],

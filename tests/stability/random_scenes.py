@@ -32,7 +32,7 @@ LOOKED = 4000
 TREES, TRIES = 100, 10
 LEAVES = [f for f in formulas() if f.kind == "shape" and f.name not in OF_FILES]
 """Shapes that numbers make."""
-OTHERS = [f for f in formulas() if f.kind != "shape" and f.name != "material"]
+OTHERS = [f for f in formulas() if f.kind != "shape" and f.name not in OF_FILES | {"material"}]
 Draw = Callable[[np.random.Generator, float], Any]
 
 

@@ -22,6 +22,7 @@ LENGTHS: dict[str, tuple[str, ...]] = {
     "prism": ("radius", "height"),
     "superquadric": ("size",),
     "koch": ("radius", "height"),
+    "relief": ("size", "height"),
     "gear": ("radius", "height", "bore"),
     "thread": ("radius", "pitch", "height"),
     **dict.fromkeys(WALLS, ("period", "thickness")),

@@ -1,9 +1,10 @@
-// Fewer triangles, how far they are, a mesh as a field, and outlines: classes of fracslice._native that keep the arrays they look into.
+// Fewer triangles, how far they are, a mesh as a field, outlines and reliefs: classes of fracslice._native that keep the arrays they look into.
 #include "../unlocked.h"
 #include "input.h"
 #include "mesh_field.h"
 #include "outline.h"
 #include "reduction.h"
+#include "relief.h"
 #include "solid.h"
 
 namespace fracslice::mesh {
@@ -189,6 +190,20 @@ class BoundOutline {
     Outline outline_;
 };
 
+class BoundRelief {
+  public:
+    using Grid = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+
+    BoundRelief(const Grid& heights, double across, double up, bool wraps)
+        : relief_((require(heights.size() > 0, "a relief has heights"), span_of(heights)), heights.shape(1), across, up, wraps) {}
+
+    uintptr_t address() const { return reinterpret_cast<uintptr_t>(relief_.entry()); }
+    nb::object distances(const Rows<double, 2>& points) const { return distances_of(relief_, points); }
+
+  private:
+    Relief relief_;
+};
+
 }  // namespace
 
 void bind_reduction(nb::module_& module) {
@@ -220,6 +235,10 @@ void bind_reduction(nb::module_& module) {
         .def(nb::init<const Rows<double, 2>&, const Vector<int64_t>&>(), "corners"_a, "ends"_a)
         .def("distances", &BoundOutline::distances, "points"_a)
         .def_prop_ro("address", &BoundOutline::address);
+    nb::class_<BoundRelief>(module, "Relief")
+        .def(nb::init<const BoundRelief::Grid&, double, double, bool>(), "heights"_a, "across"_a, "up"_a, "wraps"_a)
+        .def("distances", &BoundRelief::distances, "points"_a)
+        .def_prop_ro("address", &BoundRelief::address);
 }
 
 }  // namespace fracslice::mesh
