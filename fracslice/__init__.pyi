@@ -33,6 +33,7 @@ from .formulas import gyroid as gyroid
 from .formulas import heightmap as heightmap
 from .formulas import hilbert as hilbert
 from .formulas import honeycomb as honeycomb
+from .formulas import infill as infill
 from .formulas import intersection as intersection
 from .formulas import iwp as iwp
 from .formulas import jerusalem as jerusalem

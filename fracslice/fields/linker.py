@@ -416,7 +416,7 @@ def _folds(node: Node) -> bool:
     """True if a CSG operator's function takes the values of two elements and is called once per further
     element.
     """
-    return node.formula.children[1] is None
+    return node.formula.children[1] != 1
 
 
 def leading(node: Node) -> int:

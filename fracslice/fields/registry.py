@@ -247,8 +247,8 @@ class Formula(Hooks):
         if len(children) < least or (most == 0 and children):
             wanted = "no elements" if most == 0 else f"at least {least} element{'s' if least > 1 else ''}"
             raise SceneError(f"<{self.name}> takes {wanted} inside it, found {len(children)}")
-        if most == 1 and len(children) > 1:
-            return (get("union")(*children),)
+        if most is not None and len(children) > most:
+            return (*children[: most - 1], get("union")(*children[most - 1 :]))
         return tuple(children)
 
     @property

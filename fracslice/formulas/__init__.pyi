@@ -351,7 +351,7 @@ def extrude(file: str, size: float | None = None, height: float = 1.0, place: Li
     Node
     """
 
-def fischer_koch_s(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
+def fischer_koch_s(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
     """A wall along the surface S of Fischer and Koch 1987. The gradient of its level function is at most
     2.444: L = 1.
 
@@ -363,6 +363,8 @@ def fischer_koch_s(period: float = 1.0, thickness: float = 0.1, grade: Sequence[
         of the wall at the origin, at its thinnest
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
+    volume_fraction : a number > 0 and < 1
+        share of space that is solid, within 0.2 % of it; the thickness follows
 
     Returns
     -------
@@ -388,7 +390,7 @@ def flake(solid: Literal['tetrahedron', 'octahedron', 'dodecahedron', 'icosahedr
     Node
     """
 
-def frd(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
+def frd(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
     """A wall along the surface F-RD of Schoen 1970. The gradient of its level function is at most 7.041:
     L = 1.
 
@@ -400,6 +402,8 @@ def frd(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0
         of the wall at the origin, at its thinnest
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
+    volume_fraction : a number > 0 and < 1
+        share of space that is solid, within 0.2 % of it; the thickness follows
 
     Returns
     -------
@@ -431,7 +435,7 @@ def gear(teeth: int = 16, radius: float = 1.0, height: float = 0.4, bore: float 
     Node
     """
 
-def gyroid(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
+def gyroid(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
     """A wall along the gyroid (Schoen 1970, "Infinite periodic minimal surfaces without
     self-intersections"). The gradient of its level function is at most sqrt(3): L = 1.
 
@@ -443,6 +447,8 @@ def gyroid(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] =
         of the wall at the origin, at its thinnest
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
+    volume_fraction : a number > 0 and < 1
+        share of space that is solid, within 0.2 % of it; the thickness follows
 
     Returns
     -------
@@ -516,6 +522,22 @@ def honeycomb(kind: Literal['435', '534', '535', '353'] = '534', thickness: floa
     Node
     """
 
+def infill(*elements: Node, shell: float) -> Node:
+    """The first element, of which a wall stays whole, and behind it what the other elements fill, such as a
+    lattice. L = maximum of the elements'.
+
+    Parameters
+    ----------
+    *elements : Node
+        What it is made of.
+    shell : a number > 0
+        thickness of the wall that stays whole, in scene units
+
+    Returns
+    -------
+    Node
+    """
+
 def intersection(*elements: Node, smooth: float = 0.0) -> Node:
     """The intersection of the elements. L = maximum of the elements', as for a union.
 
@@ -531,7 +553,7 @@ def intersection(*elements: Node, smooth: float = 0.0) -> Node:
     Node
     """
 
-def iwp(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
+def iwp(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
     """A wall along the surface I-WP of Schoen 1970. The gradient of its level function is at most
     3 sqrt(3): L = 1.
 
@@ -543,6 +565,8 @@ def iwp(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0
         of the wall at the origin, at its thinnest
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
+    volume_fraction : a number > 0 and < 1
+        share of space that is solid, within 0.2 % of it; the thickness follows
 
     Returns
     -------
@@ -720,7 +744,7 @@ def lambda_bulb(power: float = 4.0, factor: float = 1.1, angle: float = 30.0, it
     Node
     """
 
-def lidinoid(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
+def lidinoid(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
     """A wall along the lidinoid (Lidin and Larsson 1990). The gradient of its level function is at most
     1.5 sqrt(3): L = 1.
 
@@ -732,6 +756,8 @@ def lidinoid(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float]
         of the wall at the origin, at its thinnest
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
+    volume_fraction : a number > 0 and < 1
+        share of space that is solid, within 0.2 % of it; the thickness follows
 
     Returns
     -------
@@ -939,7 +965,7 @@ def model(file: str, size: float | None = None, place: Literal['as is', 'centre'
     Node
     """
 
-def neovius(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
+def neovius(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
     """A wall along the surface of Neovius 1883. The gradient of its level function is at most 7: L = 1.
 
     Parameters
@@ -950,6 +976,8 @@ def neovius(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] 
         of the wall at the origin, at its thinnest
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
+    volume_fraction : a number > 0 and < 1
+        share of space that is solid, within 0.2 % of it; the thickness follows
 
     Returns
     -------
@@ -1182,7 +1210,7 @@ def revolve(file: str, size: float | None = None, offset: float = 0.0, place: Li
     Node
     """
 
-def schwarz_d(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
+def schwarz_d(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
     """A wall along the surface D of Schwarz 1890. The gradient of its level function is at most
     sqrt(3): L = 1.
 
@@ -1194,13 +1222,15 @@ def schwarz_d(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float
         of the wall at the origin, at its thinnest
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
+    volume_fraction : a number > 0 and < 1
+        share of space that is solid, within 0.2 % of it; the thickness follows
 
     Returns
     -------
     Node
     """
 
-def schwarz_p(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
+def schwarz_p(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
     """A wall along the surface P of Schwarz 1890. The gradient of its level function is at most
     sqrt(3): L = 1.
 
@@ -1212,6 +1242,8 @@ def schwarz_p(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float
         of the wall at the origin, at its thinnest
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
+    volume_fraction : a number > 0 and < 1
+        share of space that is solid, within 0.2 % of it; the thickness follows
 
     Returns
     -------
@@ -1246,7 +1278,7 @@ def sphere(radius: float = 1.0) -> Node:
     Node
     """
 
-def split_p(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0)) -> Node:
+def split_p(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
     """A wall along the surface Split P of Lord and Mackay 2003. The gradient of its level function is at most
     3.6201: L = 1.
 
@@ -1258,13 +1290,15 @@ def split_p(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] 
         of the wall at the origin, at its thinnest
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
+    volume_fraction : a number > 0 and < 1
+        share of space that is solid, within 0.2 % of it; the thickness follows
 
     Returns
     -------
     Node
     """
 
-def struts(kind: Literal['cubic', 'bcc', 'fcc', 'octet', 'kelvin'] = 'octet', period: float = 1.0, thickness: float = 0.1) -> Node:
+def struts(kind: Literal['cubic', 'bcc', 'fcc', 'octet', 'kelvin'] = 'octet', period: float = 1.0, thickness: float = 0.1, volume_fraction: float | None = None) -> Node:
     """Struts along a cubic lattice: its edges, the space diagonals (bcc), the face diagonals (fcc), these and
     an octahedron (octet truss: Fuller 1961; Deshpande, Fleck and Ashby 2001), or the edges of truncated
     octahedra (Kelvin cells: Thomson 1887, "On the division of space with minimum partitional area").
@@ -1279,6 +1313,8 @@ def struts(kind: Literal['cubic', 'bcc', 'fcc', 'octet', 'kelvin'] = 'octet', pe
         length of the edges of a cell
     thickness : a number > 0, default 0.1
         diameter of the struts
+    volume_fraction : a number > 0 and < 1
+        share of space that is solid, within 0.2 % of it; the thickness follows
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""CSG operators: union, intersection, difference and shell."""
+"""CSG operators: union, intersection, difference, shell and infill."""
 
 from __future__ import annotations
 
@@ -167,7 +167,30 @@ def shell_select(node: Node):  # type: ignore[no-untyped-def]
     return conservative_shell if node.is_conservative and node.bounds.exterior_only else shell.function
 
 
+@csg_operator(
+    (2, 2),
+    shell=Number(REQUIRED, "thickness of the wall that stays whole, in scene units", above=0),
+)
+def infill(a, b, shell):  # type: ignore[no-untyped-def]
+    """The first element, of which a wall stays whole, and behind it what the other elements fill, such as a
+    lattice. L = maximum of the elements'.
+    """
+    return maximum(a, minimum(-(a + shell), b))
+
+
+def conservative_infill(a, b, shell):  # type: ignore[no-untyped-def]
+    """Conservative bound of the distance to an infill, where the first field is an exterior bound only."""
+    return maximum(a, minimum(minimum(-(a + shell), b), 0.0))
+
+
+@infill.select
+def infill_select(node: Node):  # type: ignore[no-untyped-def]
+    exterior_only = node.is_conservative and node.children[0].bounds.exterior_only
+    return conservative_infill if exterior_only else infill.function
+
+
 @difference.bounds
 @shell.bounds
+@infill.bounds
 def first_bounds(node: Node) -> Box:
     return node.children[0].bounds.box

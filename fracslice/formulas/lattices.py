@@ -7,17 +7,25 @@ divided by a bound of its gradient, so L = 1 without a grade; walls are thicker 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
+
+import numpy as np
 
 from ..common.parameters import Choice, Number, Vector
 from ..expr.vocabulary import absolute, cos, floor, maximum, minimum, sin, sqrt
 from ..fields.box import Box
 from ..fields.registry import Fixed, Node, shape
 
+FRACTION = Number(
+    None, "share of space that is solid, within 0.2 % of it; the thickness follows", above=0, below=1
+)
 WALL: dict[str, Any] = {
     "period": Number(1.0, "length after which the surface repeats", above=0),
     "thickness": Number(0.1, "of the wall at the origin, at its thinnest", above=0),
     "grade": Vector((0.0, 0.0, 0.0), "growth of the thickness per length along x, y and z", least=-4, most=4),
+    "volume_fraction": FRACTION,
 }
 
 
@@ -130,11 +138,38 @@ def split_p(x, y, z, k, half, grade):  # type: ignore[no-untyped-def]
     return absolute(f - 0.2 * (u * v + v * w + w * u) - 0.4 * (u + v + w)) / (3.6201 * k) - half
 
 
+SIDE = 160
+"""Cubes along each side of a cell, each with a sample, by which a thickness is found."""
+
+
+def wall_half(node: Node) -> float:
+    """Half the thickness of a wall at the origin, in units of its field."""
+    if (fraction := node["volume_fraction"]) is not None:
+        k, flat = 2 * math.pi, (0.0, 0.0, 0.0)
+        return float(node["period"] * quantile(node.formula.function, fraction, k, 0.0, flat))
+    return float(STEEPEST.get(node.formula.name, 1.0) * node["thickness"] / 2)
+
+
+@lru_cache(maxsize=256)
+def quantile(function: Callable[..., Any], fraction: float, *arguments: Any) -> float:
+    """Value that a share of a cell's points, [0, 1]^3, is below, by a sample at random in each small cube."""
+    rng, side = np.random.default_rng(0), np.arange(SIDE)
+    y, z = np.meshgrid(side, side)
+    slabs = ((np.stack([x + 0 * y, y, z]) + rng.random((3, SIDE, SIDE))) / SIDE for x in side)
+    return float(np.quantile([function(*slab, *arguments) for slab in slabs], fraction))
+
+
+def lattice_check(node: Node) -> None:
+    thickness = node.formula.parameters["thickness"].default
+    if node["volume_fraction"] is not None and node["thickness"] != thickness:
+        raise node.fail("thickness and volume_fraction: expected one of them")
+
+
 def wall_arguments(node: Node) -> dict[str, object]:
     steepest = STEEPEST.get(node.formula.name, 1.0)
     return {
         "k": 2 * math.pi / node["period"],
-        "half": steepest * node["thickness"] / 2,
+        "half": wall_half(node),
         "grade": tuple(steepest * g / 2 for g in node["grade"]),
     }
 
@@ -151,6 +186,7 @@ for _surface in (gyroid, schwarz_p, schwarz_d, neovius, iwp, lidinoid, frd, fisc
     _surface.arguments(wall_arguments)
     _surface.bounds(wall_bounds)
     _surface.slope(wall_slope)
+    _surface.check(lattice_check)
 
 
 Segment = tuple[float, float, float, float, float, float]
@@ -189,6 +225,7 @@ STRUTS: dict[str, tuple[Segment, ...]] = {
     kind=Choice("octet", "the lattice", tuple(STRUTS)),
     period=Number(1.0, "length of the edges of a cell", above=0),
     thickness=Number(0.1, "diameter of the struts", above=0),
+    volume_fraction=FRACTION,
 )
 def struts(x, y, z, over, period, radius, segments):  # type: ignore[no-untyped-def]
     """Struts along a cubic lattice: its edges, the space diagonals (bcc), the face diagonals (fcc), these and
@@ -213,12 +250,18 @@ def struts(x, y, z, over, period, radius, segments):  # type: ignore[no-untyped-
 
 @struts.arguments
 def struts_arguments(node: Node) -> dict[str, object]:
+    segments, radius = STRUTS[node["kind"]], node["thickness"] / 2
+    if (fraction := node["volume_fraction"]) is not None:
+        radius = node["period"] * quantile(struts.function, fraction, 1.0, 1.0, 0.0, segments)
     return {
         "over": 1.0 / node["period"],
         "period": node["period"],
-        "radius": node["thickness"] / 2,
-        "segments": Fixed(STRUTS[node["kind"]]),
+        "radius": radius,
+        "segments": Fixed(segments),
     }
+
+
+struts.check(lattice_check)
 
 
 @struts.bounds

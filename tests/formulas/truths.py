@@ -226,6 +226,12 @@ def raised(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
 TRUTHS: dict[str, list[Truth]] = {
     "heightmap": [plate(EXAMPLES["heightmap"], 0.1, 0.5)],
     "lithophane": [plate(EXAMPLES["lithophane"], 0.3, 0.1)],
+    "infill": [
+        Equal(
+            f.infill(BALL, f.gyroid(), shell=0.1),
+            f.union(f.shell(BALL, thickness=0.1), f.intersection(BALL, f.gyroid())),
+        )
+    ],
     "relief": [Equal(EXAMPLES["relief"], raised, sign=True)],
     "revolve": [Volume(EXAMPLES["revolve"], 2 * pi * 0.7 * 0.6**2 * (1 - 0.5 / 4))],
     "text": [Equal(EXAMPLES["text"].changed(size=2, depth=0.8), f.transform(EXAMPLES["text"], scale=2))],

@@ -175,6 +175,7 @@ KNOWN: dict[str, dict[str, Draw]] = {
     "intersection": SEAM,
     "difference": SEAM,
     "shell": {"thickness": _one(0.03, 0.2)},
+    "infill": {"shell": _one(0.03, 0.2)},
     "offset": {"distance": _one(-0.05, 0.1)},
     "bounds": {"min": _vector(-0.6, -0.2), "max": _vector(0.2, 0.6)},
     "repeat": {

@@ -30,6 +30,7 @@ LENGTHS: dict[str, tuple[str, ...]] = {
     "intersection": ("smooth",),
     "difference": ("smooth",),
     "shell": ("thickness",),
+    "infill": ("shell",),
     "offset": ("distance",),
     "noise": ("amplitude", "period"),
     "bounds": ("min", "max"),

@@ -1,0 +1,102 @@
+"""Lattices of a given share of space, and solids that are filled with them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fracslice import make_mesh, reads
+from fracslice.errors import SceneError
+from fracslice.fields.reference import reference
+from fracslice.formulas import Node, box, get, gyroid, infill, mandelbulb, schwarz_p, shell, sphere, struts
+from fracslice.formulas.lattices import STRUTS
+
+from ..examples import WALLS, stamped
+
+pytestmark = pytest.mark.once
+
+SIDE = 128
+LATTICES = [wall.name for wall in WALLS] + list(STRUTS)
+
+
+def lattice(name: str, **values: object) -> Node:
+    return struts(kind=name, **values) if name in STRUTS else get(name)(**values)
+
+
+def share(root: Node, period: float) -> float:
+    """Share of a cell that is solid, by other samples than those of the formula."""
+    rng = np.random.default_rng(11)
+    cubes = np.stack(np.unravel_index(np.arange(SIDE**3), (SIDE,) * 3))
+    points = period * (cubes + rng.random(cubes.shape)) / SIDE
+    return float((root.kernel(precision="float64").points(*points) < 0).mean())
+
+
+@pytest.mark.parametrize("name", stamped(LATTICES, {"gyroid", "split_p", "octet"}))
+@pytest.mark.parametrize("fraction", [0.1, 0.3, 0.7])
+def test_a_lattice_fills_its_share_of_space(name: str, fraction: float) -> None:
+    root = lattice(name, volume_fraction=fraction, period=1.7)
+    assert share(root, 1.7) == pytest.approx(fraction, rel=2e-3)
+
+
+def test_a_known_share() -> None:
+    """Struts along the edges of cubes: three cylinders, less what they have in common."""
+    r = 0.1
+    known = 3 * np.pi * r**2 - 8 * np.sqrt(2) * r**3
+    root = struts(kind="cubic", volume_fraction=known)
+    assert root.arguments["radius"] == pytest.approx(r, rel=1e-3)
+
+
+def test_a_mesh_has_the_share() -> None:
+    """In a cube of whole cells, by the volume of its triangles."""
+    cube = box(size=(2, 2, 2)) & gyroid(volume_fraction=0.25)
+    mesh = make_mesh(cube, resolution=129)
+    assert mesh.volume / np.ptp(mesh.vertices[:, 0]) ** 3 == pytest.approx(0.25, rel=2e-3)
+
+
+def test_the_field_of_an_infill_is_that_of_a_wall_and_what_is_behind() -> None:
+    ball, filler = sphere(radius=1.2), schwarz_p(period=0.5, volume_fraction=0.3)
+    root = infill(ball, filler, shell=0.15)
+    points = np.random.default_rng(2).uniform(-1.3, 1.3, (3, 20_000))
+    wall, within = reference(shell(ball, thickness=0.15)), reference(ball & filler)
+    np.testing.assert_array_equal(reference(root)(*points), np.minimum(wall(*points), within(*points)))
+    assert root.bounds.box == ball.bounds.box and root.bounds.lipschitz == 1
+    assert make_mesh(root, resolution=65).is_watertight
+
+
+def test_several_fillers_are_united() -> None:
+    ball, one, other = sphere(), gyroid(), schwarz_p()
+    assert infill(ball, one, other, shell=0.1) == infill(ball, one | other, shell=0.1)
+
+
+def test_a_fractal_is_filled() -> None:
+    """Its field bounds nothing inside: the conservative one skips nothing there."""
+    root = infill(mandelbulb(iterations=4), gyroid(period=0.4, volume_fraction=0.4), shell=0.05)
+    points = np.random.default_rng(2).uniform(-1, 1, (3, 5000))
+    inside = reference(mandelbulb(iterations=4))(*points) < 0
+    assert inside.any() and (reference(root.conservative())(*points)[inside] <= 0).all()
+    assert make_mesh(root, resolution=97).is_watertight
+
+
+SCENE = '<scene version="1"><solid size="20mm">\n{}</solid></scene>'
+
+
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [
+        (
+            '<infill shell="0.1"><sphere/></infill>',
+            ":2: <infill> takes at least 2 elements inside it, found 1",
+        ),
+        ('<infill shell="0"><sphere/><gyroid/></infill>', "shell='0': expected a number > 0"),
+        ("<infill><sphere/><gyroid/></infill>", "needs the attribute shell"),
+        ('<gyroid volume_fraction="1"/>', "volume_fraction='1': expected a number > 0 and < 1"),
+        (
+            '<gyroid volume_fraction="0.2" thickness="0.3"/>',
+            "thickness and volume_fraction: expected one of them",
+        ),
+    ],
+)
+def test_errors_are_one_line(text: str, error: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        reads(SCENE.format(text))
+    assert error in str(caught.value).replace('"', "'") and "\n" not in str(caught.value)
