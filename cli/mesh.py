@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import click
 
@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from fracslice.work import Work
 
 GRID = ".vdb"
+
+Parts: TypeAlias = "Iterable[tuple[str, Scene]]"
 
 
 class MeshFileOptions(ClusterOptions, MeshOptions):
@@ -95,6 +97,16 @@ def mesh(given: MeshFileOptions) -> int:
     fracslice mesh geode -o geode.3mf --thickness 0.8mm --bridge 1.5mm
     fracslice mesh menger-sponge -o sponge.stl --set menger.level=1..3
     """
+    return make_files(given)
+
+
+def whole(scene: Scene, _: Work) -> Parts:
+    """The scene as it is, of which one mesh is made."""
+    return [("", scene)]
+
+
+def make_files(given: MeshFileOptions, parts: Callable[[Scene, Work], Parts] = whole) -> int:
+    """Make meshes of a scene; `parts`: what they are made of, and what the names of their files end in."""
     from fracslice.fields.devices import choose_device
 
     check_outputs(given)
@@ -109,7 +121,7 @@ def mesh(given: MeshFileOptions) -> int:
     scenes = moments(scene, given.seconds, given.every)
     problems = False
     with given.working(store=store_in(given.cache), device=choose_device(given.device)) as work:
-        for suffix, scene in scenes:
+        for suffix, scene in [(s + end, part) for s, whole in scenes for end, part in parts(whole, work)]:
             files = {name: vars(given)[name] for name in ("output", "report", "picture")}
             own = given.but(**{name: file and with_suffix(file, suffix) for name, file in files.items()})
             with going_on(own.output):

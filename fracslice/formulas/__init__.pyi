@@ -766,16 +766,16 @@ def lidinoid(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float]
 
 def lithophane(file: str, form: Literal['flat', 'cylinder', 'sphere'] = 'flat', size: float = 1.0, thinnest: float = 0.01, thickest: float = 0.05, degrees: float = 360.0, place: Literal['centre', 'bed'] = 'centre', sha256: str | None = None) -> Node:
     """A picture that shows where light shines through (de Bourgoing 1827): the darker, the thicker, linear in
-    levels of grey, of 8 or 16 bits. One face is smooth, the lower or inner one. The field is measured across
-    it, and L = sqrt(1 + s^2), where s is the largest slope of the picture, from all its pixels. One of more
-    than 4 million pixels is averaged.
+    levels of grey, of 8 or 16 bits. One face is smooth, the lower or inner one; a ball takes a map of
+    longitudes and latitudes. The field is measured across the smooth face, and L = sqrt(1 + s^2), where s is
+    the largest slope of the picture, from all its pixels. One of more than 4 million pixels is averaged.
 
     Parameters
     ----------
     file : the name of a file
         a picture, .png, .jpg, .webp or .tif, in the folder of the scene
     form : flat, cylinder or sphere, default 'flat'
-        a plate, seen from above; a wall around the z axis, seen from outside, its middle towards -y; or a ball with the picture as a map of longitudes and latitudes, such as that of a moon
+        a plate; a wall around the z axis, the picture's middle towards -y; a ball, of a map of its surface
     size : a number > 0, default 1.0
         longest side of the plate, height of the wall, or inner diameter of the ball
     thinnest : a number > 0, default 0.01

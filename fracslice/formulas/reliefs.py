@@ -73,8 +73,7 @@ def heightmap(x, y, z, relief, slope, half, rise):  # type: ignore[no-untyped-de
     file=_FILE,
     form=Choice(
         "flat",
-        "a plate, seen from above; a wall around the z axis, seen from outside, its middle towards -y; or a "
-        "ball with the picture as a map of longitudes and latitudes, such as that of a moon",
+        "a plate; a wall around the z axis, the picture's middle towards -y; a ball, of a map of its surface",
         ("flat", "cylinder", "sphere"),
     ),
     size=Number(1.0, "longest side of the plate, height of the wall, or inner diameter of the ball", above=0),
@@ -88,9 +87,9 @@ def heightmap(x, y, z, relief, slope, half, rise):  # type: ignore[no-untyped-de
 )
 def lithophane(x, y, z, relief, slope, half, rise):  # type: ignore[no-untyped-def]
     """A picture that shows where light shines through (de Bourgoing 1827): the darker, the thicker, linear in
-    levels of grey, of 8 or 16 bits. One face is smooth, the lower or inner one. The field is measured across
-    it, and L = sqrt(1 + s^2), where s is the largest slope of the picture, from all its pixels. One of more
-    than 4 million pixels is averaged.
+    levels of grey, of 8 or 16 bits. One face is smooth, the lower or inner one; a ball takes a map of
+    longitudes and latitudes. The field is measured across the smooth face, and L = sqrt(1 + s^2), where s is
+    the largest slope of the picture, from all its pixels. One of more than 4 million pixels is averaged.
     """
     return _plate(x, y, z, relief, slope, half, rise)
 
