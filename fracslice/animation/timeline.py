@@ -21,6 +21,7 @@ from ..common.parameters import Number, Vector
 from ..errors import SceneError
 from ..fields.depth import resolve_depths
 from ..fields.registry import Node
+from ..fields.varying import Varying
 from ..rendering.setup import prepare
 from ..scene.animation import Animation, Keyframes, Track
 from ..scene.layout import kind_of
@@ -307,7 +308,8 @@ def _automatic(of: str, kind: Any) -> str:
 
 def _check_curve(track: Track, name: str, kind: Any, values: list[Any]) -> None:
     """Raise `SceneError` for a curve that does not suit the attribute."""
-    if not isinstance(kind, (Number, Vector)) or len({np.size(value) for value in values}) > 1:
+    words = not isinstance(kind, (Number, Vector)) or any(isinstance(value, Varying) for value in values)
+    if words or len({np.size(value) for value in values}) > 1:
         raise track.fail(f"curve={name!r}: expected step, or keys of as many numbers each")
     if name == "zoom" and track.of != "camera.eye":
         raise track.fail("curve='zoom': expected of='camera.eye'")

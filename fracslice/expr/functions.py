@@ -165,6 +165,19 @@ class Fixed:
     value: Any
 
 
+@dataclass(frozen=True)
+class OfPoint:
+    """An argument that differs from point to point.
+
+    Attributes
+    ----------
+    function : callable
+        Function of x, y and z in the language of formulas.
+    """
+
+    function: Callable[..., Any]
+
+
 WORDS = 4
 """Numbers of P that an address takes, of 16 bits each: every float holds them."""
 

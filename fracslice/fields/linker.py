@@ -24,7 +24,7 @@ import numpy as np
 from ..common.parameters import AUTO
 from ..errors import KernelError
 from ..expr.frontend import FormulaReader, formula, text_function
-from ..expr.functions import Fixed, InMemory, words
+from ..expr.functions import Fixed, InMemory, OfPoint, words
 from ..expr.graph import FlowGraph, Function, Program, Value, Width, Writer, identified, written
 from ..expr.language import CHILD
 
@@ -78,7 +78,19 @@ class Linked:
 
 
 Passed = Any
-"""Where an argument lies in P, from its beginning: an index, of an integer in a list, or a tuple of these."""
+"""Where an argument lies in P, from its beginning: an index, of an integer in a list, or a tuple of these; or
+a `Called`.
+"""
+
+
+@dataclass(frozen=True)
+class Called:
+    """Function of a point that gives an argument there."""
+
+    function: Function
+
+    def __repr__(self) -> str:
+        return self.function.identity
 
 
 def load(writer: Writer, passed: Passed, origin: Value | None = None) -> Value:
@@ -88,6 +100,8 @@ def load(writer: Writer, passed: Passed, origin: Value | None = None) -> Value:
     """
     if isinstance(passed, tuple):
         return writer.add("tuple", *(load(writer, part, origin) for part in passed))
+    if isinstance(passed, Called):
+        return writer.call(passed.function, *(writer.names[name] for name in POINT))
     place = passed[0] if isinstance(passed, list) else passed
     index = writer.constant(place) if origin is None else writer.add("add", origin, place)
     value = writer.add("element", writer.names["P"], index)
@@ -96,6 +110,8 @@ def load(writer: Writer, passed: Passed, origin: Value | None = None) -> Value:
 
 def append_numbers(value: Any, numbers: list[float]) -> Passed:
     """Append a number or a tuple of numbers to a list; of an argument in memory its hash."""
+    if isinstance(value, OfPoint):
+        return Called(formula(value.function))
     if isinstance(value, InMemory):
         value = words(value.digest)
     if isinstance(value, tuple):

@@ -102,15 +102,16 @@ class Operators:
         """Translation by an offset (x, y, z)."""
         return NotImplemented if isinstance(offset, Operators) else self.translate(offset)
 
-    def union(self, *others: Node, smooth: float = 0.0) -> Node:
+    def union(self, *others: Node, smooth: float | str | Callable[..., Any] = 0.0) -> Node:
         """Union of this shape and others.
 
         Parameters
         ----------
         *others : Node
             The other shapes.
-        smooth : float
-            Width of the rounded seam; 0: a sharp seam.
+        smooth : float, str or callable
+            Width of the rounded seam; 0: a sharp seam. An expression in x, y and z, or a function of a point,
+            gives it at each point.
 
         Returns
         -------
@@ -118,15 +119,16 @@ class Operators:
         """
         return _make_node("union", self, *others, smooth=smooth)
 
-    def intersection(self, *others: Node, smooth: float = 0.0) -> Node:
+    def intersection(self, *others: Node, smooth: float | str | Callable[..., Any] = 0.0) -> Node:
         """Intersection of this shape and others.
 
         Parameters
         ----------
         *others : Node
             The other shapes.
-        smooth : float
-            Width of the rounded seam; 0: a sharp seam.
+        smooth : float, str or callable
+            Width of the rounded seam; 0: a sharp seam. An expression in x, y and z, or a function of a point,
+            gives it at each point.
 
         Returns
         -------
@@ -134,15 +136,16 @@ class Operators:
         """
         return _make_node("intersection", self, *others, smooth=smooth)
 
-    def difference(self, *others: Node, smooth: float = 0.0) -> Node:
+    def difference(self, *others: Node, smooth: float | str | Callable[..., Any] = 0.0) -> Node:
         """This shape minus others.
 
         Parameters
         ----------
         *others : Node
             The shapes to subtract.
-        smooth : float
-            Width of the rounded seam; 0: a sharp seam.
+        smooth : float, str or callable
+            Width of the rounded seam; 0: a sharp seam. An expression in x, y and z, or a function of a point,
+            gives it at each point.
 
         Returns
         -------
@@ -270,13 +273,14 @@ class Operators:
         """
         return _make_node("offset", self, distance=distance)
 
-    def shell(self, thickness: float) -> Node:
+    def shell(self, thickness: float | str | Callable[..., Any]) -> Node:
         """Hollow the shape, leaving a wall.
 
         Parameters
         ----------
-        thickness : float
-            Thickness of the wall. Its outer face is the surface of the shape.
+        thickness : float, str or callable
+            Thickness of the wall, or an expression in x, y and z, or a function of a point, that gives it.
+            Its outer face is the surface of the shape.
 
         Returns
         -------
@@ -481,7 +485,7 @@ def annotation(parameter: Any) -> Any:
         case File() | Digest() | Label():
             type_ = str
         case _:
-            type_ = float
+            type_ = getattr(parameter, "annotation", float)
     return type_ | None if parameter.default is None else type_
 
 

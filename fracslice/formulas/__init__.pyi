@@ -1,6 +1,6 @@
 # Made from the registry of formulas by `python docs/generate.py`; do not edit.
-from collections.abc import Sequence
-from typing import Literal, Union
+from collections.abc import Callable, Sequence
+from typing import Any, Literal, Union
 
 from ..common.parameters import Axis as Axis
 from ..common.parameters import Choice as Choice
@@ -313,14 +313,14 @@ def cylinder(radius: float = 0.5, height: float = 1.0) -> Node:
     Node
     """
 
-def difference(*elements: Node, smooth: float = 0.0) -> Node:
+def difference(*elements: Node, smooth: float | str | Callable[..., Any] = 0.0) -> Node:
     """The first element minus the others. L = maximum of the elements', as for a union.
 
     Parameters
     ----------
     *elements : Node
         What it is made of.
-    smooth : a number >= 0, default 0.0
+    smooth : a number >= 0, or an expression such as 0.1+0.02*z, default 0.0
         width of the rounded seam: where two fields differ by less than this they are blended (0: a sharp seam)
 
     Returns
@@ -351,7 +351,7 @@ def extrude(file: str, size: float | None = None, height: float = 1.0, place: Li
     Node
     """
 
-def fischer_koch_s(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
+def fischer_koch_s(period: float = 1.0, thickness: float | str | Callable[..., Any] = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
     """A wall along the surface S of Fischer and Koch 1987. The gradient of its level function is at most
     2.444: L = 1.
 
@@ -359,8 +359,8 @@ def fischer_koch_s(period: float = 1.0, thickness: float = 0.1, grade: Sequence[
     ----------
     period : a number > 0, default 1.0
         length after which the surface repeats
-    thickness : a number > 0, default 0.1
-        of the wall at the origin, at its thinnest
+    thickness : a number > 0, or an expression such as 0.1+0.02*z, default 0.1
+        of the wall at its thinnest, at the origin, or at each point
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
     volume_fraction : a number > 0 and < 1
@@ -390,7 +390,7 @@ def flake(solid: Literal['tetrahedron', 'octahedron', 'dodecahedron', 'icosahedr
     Node
     """
 
-def frd(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
+def frd(period: float = 1.0, thickness: float | str | Callable[..., Any] = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
     """A wall along the surface F-RD of Schoen 1970. The gradient of its level function is at most 7.041:
     L = 1.
 
@@ -398,8 +398,8 @@ def frd(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0
     ----------
     period : a number > 0, default 1.0
         length after which the surface repeats
-    thickness : a number > 0, default 0.1
-        of the wall at the origin, at its thinnest
+    thickness : a number > 0, or an expression such as 0.1+0.02*z, default 0.1
+        of the wall at its thinnest, at the origin, or at each point
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
     volume_fraction : a number > 0 and < 1
@@ -435,7 +435,7 @@ def gear(teeth: int = 16, radius: float = 1.0, height: float = 0.4, bore: float 
     Node
     """
 
-def gyroid(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
+def gyroid(period: float = 1.0, thickness: float | str | Callable[..., Any] = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
     """A wall along the gyroid (Schoen 1970, "Infinite periodic minimal surfaces without
     self-intersections"). The gradient of its level function is at most sqrt(3): L = 1.
 
@@ -443,8 +443,8 @@ def gyroid(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] =
     ----------
     period : a number > 0, default 1.0
         length after which the surface repeats
-    thickness : a number > 0, default 0.1
-        of the wall at the origin, at its thinnest
+    thickness : a number > 0, or an expression such as 0.1+0.02*z, default 0.1
+        of the wall at its thinnest, at the origin, or at each point
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
     volume_fraction : a number > 0 and < 1
@@ -522,7 +522,7 @@ def honeycomb(kind: Literal['435', '534', '535', '353'] = '534', thickness: floa
     Node
     """
 
-def infill(*elements: Node, shell: float) -> Node:
+def infill(*elements: Node, shell: float | str | Callable[..., Any]) -> Node:
     """The first element, of which a wall stays whole, and behind it what the other elements fill, such as a
     lattice. L = maximum of the elements'.
 
@@ -530,7 +530,7 @@ def infill(*elements: Node, shell: float) -> Node:
     ----------
     *elements : Node
         What it is made of.
-    shell : a number > 0
+    shell : a number > 0, or an expression such as 0.1+0.02*z
         thickness of the wall that stays whole, in scene units
 
     Returns
@@ -538,14 +538,14 @@ def infill(*elements: Node, shell: float) -> Node:
     Node
     """
 
-def intersection(*elements: Node, smooth: float = 0.0) -> Node:
+def intersection(*elements: Node, smooth: float | str | Callable[..., Any] = 0.0) -> Node:
     """The intersection of the elements. L = maximum of the elements', as for a union.
 
     Parameters
     ----------
     *elements : Node
         What it is made of.
-    smooth : a number >= 0, default 0.0
+    smooth : a number >= 0, or an expression such as 0.1+0.02*z, default 0.0
         width of the rounded seam: where two fields differ by less than this they are blended (0: a sharp seam)
 
     Returns
@@ -553,7 +553,7 @@ def intersection(*elements: Node, smooth: float = 0.0) -> Node:
     Node
     """
 
-def iwp(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
+def iwp(period: float = 1.0, thickness: float | str | Callable[..., Any] = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
     """A wall along the surface I-WP of Schoen 1970. The gradient of its level function is at most
     3 sqrt(3): L = 1.
 
@@ -561,8 +561,8 @@ def iwp(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0
     ----------
     period : a number > 0, default 1.0
         length after which the surface repeats
-    thickness : a number > 0, default 0.1
-        of the wall at the origin, at its thinnest
+    thickness : a number > 0, or an expression such as 0.1+0.02*z, default 0.1
+        of the wall at its thinnest, at the origin, or at each point
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
     volume_fraction : a number > 0 and < 1
@@ -744,7 +744,7 @@ def lambda_bulb(power: float = 4.0, factor: float = 1.1, angle: float = 30.0, it
     Node
     """
 
-def lidinoid(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
+def lidinoid(period: float = 1.0, thickness: float | str | Callable[..., Any] = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
     """A wall along the lidinoid (Lidin and Larsson 1990). The gradient of its level function is at most
     1.5 sqrt(3): L = 1.
 
@@ -752,8 +752,8 @@ def lidinoid(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float]
     ----------
     period : a number > 0, default 1.0
         length after which the surface repeats
-    thickness : a number > 0, default 0.1
-        of the wall at the origin, at its thinnest
+    thickness : a number > 0, or an expression such as 0.1+0.02*z, default 0.1
+        of the wall at its thinnest, at the origin, or at each point
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
     volume_fraction : a number > 0 and < 1
@@ -965,15 +965,15 @@ def model(file: str, size: float | None = None, place: Literal['as is', 'centre'
     Node
     """
 
-def neovius(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
+def neovius(period: float = 1.0, thickness: float | str | Callable[..., Any] = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
     """A wall along the surface of Neovius 1883. The gradient of its level function is at most 7: L = 1.
 
     Parameters
     ----------
     period : a number > 0, default 1.0
         length after which the surface repeats
-    thickness : a number > 0, default 0.1
-        of the wall at the origin, at its thinnest
+    thickness : a number > 0, or an expression such as 0.1+0.02*z, default 0.1
+        of the wall at its thinnest, at the origin, or at each point
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
     volume_fraction : a number > 0 and < 1
@@ -1210,7 +1210,7 @@ def revolve(file: str, size: float | None = None, offset: float = 0.0, place: Li
     Node
     """
 
-def schwarz_d(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
+def schwarz_d(period: float = 1.0, thickness: float | str | Callable[..., Any] = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
     """A wall along the surface D of Schwarz 1890. The gradient of its level function is at most
     sqrt(3): L = 1.
 
@@ -1218,8 +1218,8 @@ def schwarz_d(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float
     ----------
     period : a number > 0, default 1.0
         length after which the surface repeats
-    thickness : a number > 0, default 0.1
-        of the wall at the origin, at its thinnest
+    thickness : a number > 0, or an expression such as 0.1+0.02*z, default 0.1
+        of the wall at its thinnest, at the origin, or at each point
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
     volume_fraction : a number > 0 and < 1
@@ -1230,7 +1230,7 @@ def schwarz_d(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float
     Node
     """
 
-def schwarz_p(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
+def schwarz_p(period: float = 1.0, thickness: float | str | Callable[..., Any] = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
     """A wall along the surface P of Schwarz 1890. The gradient of its level function is at most
     sqrt(3): L = 1.
 
@@ -1238,8 +1238,8 @@ def schwarz_p(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float
     ----------
     period : a number > 0, default 1.0
         length after which the surface repeats
-    thickness : a number > 0, default 0.1
-        of the wall at the origin, at its thinnest
+    thickness : a number > 0, or an expression such as 0.1+0.02*z, default 0.1
+        of the wall at its thinnest, at the origin, or at each point
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
     volume_fraction : a number > 0 and < 1
@@ -1250,14 +1250,14 @@ def schwarz_p(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float
     Node
     """
 
-def shell(*elements: Node, thickness: float) -> Node:
+def shell(*elements: Node, thickness: float | str | Callable[..., Any]) -> Node:
     """The element made hollow: material deeper inside than the thickness is removed. L = the element's.
 
     Parameters
     ----------
     *elements : Node
         What it is applied to; several are a union.
-    thickness : a number > 0
+    thickness : a number > 0, or an expression such as 0.1+0.02*z
         of the wall, in scene units; its outer face is the element's surface
 
     Returns
@@ -1278,7 +1278,7 @@ def sphere(radius: float = 1.0) -> Node:
     Node
     """
 
-def split_p(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
+def split_p(period: float = 1.0, thickness: float | str | Callable[..., Any] = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
     """A wall along the surface Split P of Lord and Mackay 2003. The gradient of its level function is at most
     3.6201: L = 1.
 
@@ -1286,8 +1286,8 @@ def split_p(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] 
     ----------
     period : a number > 0, default 1.0
         length after which the surface repeats
-    thickness : a number > 0, default 0.1
-        of the wall at the origin, at its thinnest
+    thickness : a number > 0, or an expression such as 0.1+0.02*z, default 0.1
+        of the wall at its thinnest, at the origin, or at each point
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
     volume_fraction : a number > 0 and < 1
@@ -1298,7 +1298,7 @@ def split_p(period: float = 1.0, thickness: float = 0.1, grade: Sequence[float] 
     Node
     """
 
-def struts(kind: Literal['cubic', 'bcc', 'fcc', 'octet', 'kelvin'] = 'octet', period: float = 1.0, thickness: float = 0.1, volume_fraction: float | None = None) -> Node:
+def struts(kind: Literal['cubic', 'bcc', 'fcc', 'octet', 'kelvin'] = 'octet', period: float = 1.0, thickness: float | str | Callable[..., Any] = 0.1, volume_fraction: float | None = None) -> Node:
     """Struts along a cubic lattice: its edges, the space diagonals (bcc), the face diagonals (fcc), these and
     an octahedron (octet truss: Fuller 1961; Deshpande, Fleck and Ashby 2001), or the edges of truncated
     octahedra (Kelvin cells: Thomson 1887, "On the division of space with minimum partitional area").
@@ -1311,7 +1311,7 @@ def struts(kind: Literal['cubic', 'bcc', 'fcc', 'octet', 'kelvin'] = 'octet', pe
         the lattice
     period : a number > 0, default 1.0
         length of the edges of a cell
-    thickness : a number > 0, default 0.1
+    thickness : a number > 0, or an expression such as 0.1+0.02*z, default 0.1
         diameter of the struts
     volume_fraction : a number > 0 and < 1
         share of space that is solid, within 0.2 % of it; the thickness follows
@@ -1488,7 +1488,7 @@ def twist(*elements: Node, degrees: float, axis: Literal['x', 'y', 'z'] = 'z') -
     Node
     """
 
-def union(*elements: Node, smooth: float = 0.0) -> Node:
+def union(*elements: Node, smooth: float | str | Callable[..., Any] = 0.0) -> Node:
     """The union of the elements; with `smooth`, seams are filled by at most smooth/4 (Quilez 2013,
     quadratic).
 
@@ -1500,7 +1500,7 @@ def union(*elements: Node, smooth: float = 0.0) -> Node:
     ----------
     *elements : Node
         What it is made of.
-    smooth : a number >= 0, default 0.0
+    smooth : a number >= 0, or an expression such as 0.1+0.02*z, default 0.0
         width of the rounded seam: where two fields differ by less than this they are blended (0: a sharp seam)
 
     Returns

@@ -6,12 +6,13 @@ from collections.abc import Callable
 from functools import reduce
 from typing import Any
 
-from ..common.parameters import REQUIRED, SMALLEST, Number
+from ..common.parameters import REQUIRED, SMALLEST
 from ..expr.vocabulary import absolute, maximum, minimum
 from ..fields.box import Box
 from ..fields.registry import Node, csg_operator
+from ..fields.varying import Variable, Varying, as_argument, slope_of
 
-SMOOTH = Number(
+SMOOTH = Variable(
     0.0,
     "width of the rounded seam: where two fields differ by less than this they are blended (0: a sharp seam)",
     least=0,
@@ -83,12 +84,15 @@ SHARP = {union: sharp_union, intersection: sharp_intersection, difference: sharp
 
 def _needs_conservative(node: Node) -> bool:
     """True for the conservative field of a smooth operator with an escape-time fractal among its elements."""
-    smooth = node["smooth"] >= SMALLEST
-    return smooth and node.is_conservative and any(child.bounds.exterior_only for child in node.children)
+    return (
+        not csg_unordered(node)
+        and node.is_conservative
+        and any(child.bounds.exterior_only for child in node.children)
+    )
 
 
 def csg_unordered(node: Node) -> bool:
-    return bool(node["smooth"] < SMALLEST)
+    return not isinstance(node["smooth"], Varying) and bool(node["smooth"] < SMALLEST)
 
 
 def csg_keeps_sign(node: Node) -> bool:
@@ -110,7 +114,13 @@ def csg_select(node: Node) -> Callable[..., Any]:
 def csg_arguments(node: Node) -> dict[str, object]:
     if node.function is conservative_union:
         return {"smooth": node["smooth"], "steepest": 1 + node.bounds.steepening / 8}
-    return {"smooth": node["smooth"]} if node.function is node.formula.function else {}
+    smooth = node["smooth"].at_least(SMALLEST) if isinstance(node["smooth"], Varying) else node["smooth"]
+    return {"smooth": as_argument(smooth)} if node.function is node.formula.function else {}
+
+
+def csg_check(node: Node) -> None:
+    if isinstance(node["smooth"], Varying) and any(child.bounds.exterior_only for child in node.children):
+        raise node.fail(f"smooth={node['smooth']!r}: expected a number, as an element is a fractal")
 
 
 def csg_slope(node: Node) -> float:
@@ -119,12 +129,13 @@ def csg_slope(node: Node) -> float:
     Minimum, maximum and their quadratic seams take a weighted mean of the gradients: L = maximum of the
     elements'. A seam follows level sets other than the surface, where the field of an escape-time fractal is
     steeper than its bound. The factors for one such field and for several are measured
-    (`docs/how/accuracy.md`).
+    (`docs/how/accuracy.md`). A seam grows by at most a quarter of its width.
     """
     fields = [child.bounds for child in node.children]
     seams = not (csg_unordered(node) or _needs_conservative(node))
     exterior_only = seams * sum(f.exterior_only for f in fields)
-    return max(f.lipschitz for f in fields) * (1.0, 1.25, 3.0)[min(exterior_only, 2)]
+    widening = (len(fields) - 1) * slope_of(node["smooth"]) / 4
+    return max(f.lipschitz for f in fields) * (1.0, 1.25, 3.0)[min(exterior_only, 2)] + widening
 
 
 for _operator in SHARP:
@@ -133,12 +144,14 @@ for _operator in SHARP:
     _operator.select(csg_select)
     _operator.arguments(csg_arguments)
     _operator.slope(csg_slope)
+    _operator.check(csg_check)
 
 
 @union.bounds
 def union_bounds(node: Node) -> Box:
-    seams = len(node.children) - 1
-    return reduce(Box.__or__, (c.bounds.box for c in node.children)).grown(seams * node["smooth"] / 4)
+    sharp, smooth = reduce(Box.__or__, (c.bounds.box for c in node.children)), node["smooth"]
+    width = max(smooth.most(sharp), 0.0) if isinstance(smooth, Varying) else smooth
+    return sharp.grown((len(node.children) - 1) * width / 4)
 
 
 @intersection.bounds
@@ -148,7 +161,7 @@ def intersection_bounds(node: Node) -> Box:
 
 @csg_operator(
     (1, 1),
-    thickness=Number(
+    thickness=Variable(
         REQUIRED, "of the wall, in scene units; its outer face is the element's surface", above=0
     ),
 )
@@ -169,7 +182,7 @@ def shell_select(node: Node):  # type: ignore[no-untyped-def]
 
 @csg_operator(
     (2, 2),
-    shell=Number(REQUIRED, "thickness of the wall that stays whole, in scene units", above=0),
+    shell=Variable(REQUIRED, "thickness of the wall that stays whole, in scene units", above=0),
 )
 def infill(a, b, shell):  # type: ignore[no-untyped-def]
     """The first element, of which a wall stays whole, and behind it what the other elements fill, such as a
@@ -187,6 +200,20 @@ def conservative_infill(a, b, shell):  # type: ignore[no-untyped-def]
 def infill_select(node: Node):  # type: ignore[no-untyped-def]
     exterior_only = node.is_conservative and node.children[0].bounds.exterior_only
     return conservative_infill if exterior_only else infill.function
+
+
+def hollow_arguments(node: Node) -> dict[str, object]:
+    return {name: as_argument(value) for name, value in node.values.items()}
+
+
+def hollow_slope(node: Node) -> float:
+    slopes = map(slope_of, node.values.values())
+    return max(child.bounds.lipschitz for child in node.children) + sum(slopes)
+
+
+for _operator in (shell, infill):
+    _operator.arguments(hollow_arguments)
+    _operator.slope(hollow_slope)
 
 
 @difference.bounds

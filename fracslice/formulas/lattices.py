@@ -17,13 +17,14 @@ from ..common.parameters import Choice, Number, Vector
 from ..expr.vocabulary import absolute, cos, floor, maximum, minimum, sin, sqrt
 from ..fields.box import Box
 from ..fields.registry import Fixed, Node, shape
+from ..fields.varying import Variable, Varying, as_argument, slope_of
 
 FRACTION = Number(
     None, "share of space that is solid, within 0.2 % of it; the thickness follows", above=0, below=1
 )
 WALL: dict[str, Any] = {
     "period": Number(1.0, "length after which the surface repeats", above=0),
-    "thickness": Number(0.1, "of the wall at the origin, at its thinnest", above=0),
+    "thickness": Variable(0.1, "of the wall at its thinnest, at the origin, or at each point", above=0),
     "grade": Vector((0.0, 0.0, 0.0), "growth of the thickness per length along x, y and z", least=-4, most=4),
     "volume_fraction": FRACTION,
 }
@@ -142,12 +143,13 @@ SIDE = 160
 """Cubes along each side of a cell, each with a sample, by which a thickness is found."""
 
 
-def wall_half(node: Node) -> float:
+def wall_half(node: Node) -> float | Varying:
     """Half the thickness of a wall at the origin, in units of its field."""
     if (fraction := node["volume_fraction"]) is not None:
         k, flat = 2 * math.pi, (0.0, 0.0, 0.0)
         return float(node["period"] * quantile(node.formula.function, fraction, k, 0.0, flat))
-    return float(STEEPEST.get(node.formula.name, 1.0) * node["thickness"] / 2)
+    thickness, steepest = node["thickness"], STEEPEST.get(node.formula.name, 1.0)
+    return thickness.times(steepest / 2) if isinstance(thickness, Varying) else steepest * thickness / 2
 
 
 @lru_cache(maxsize=256)
@@ -169,7 +171,7 @@ def wall_arguments(node: Node) -> dict[str, object]:
     steepest = STEEPEST.get(node.formula.name, 1.0)
     return {
         "k": 2 * math.pi / node["period"],
-        "half": wall_half(node),
+        "half": as_argument(wall_half(node)),
         "grade": tuple(steepest * g / 2 for g in node["grade"]),
     }
 
@@ -179,7 +181,7 @@ def wall_bounds(node: Node) -> Box:
 
 
 def wall_slope(node: Node) -> float:
-    return 1.0 + math.hypot(*node["grade"]) / 2
+    return 1.0 + math.hypot(*node["grade"]) / 2 + slope_of(node["thickness"]) / 2
 
 
 for _surface in (gyroid, schwarz_p, schwarz_d, neovius, iwp, lidinoid, frd, fischer_koch_s, split_p):
@@ -224,7 +226,7 @@ STRUTS: dict[str, tuple[Segment, ...]] = {
 @shape(
     kind=Choice("octet", "the lattice", tuple(STRUTS)),
     period=Number(1.0, "length of the edges of a cell", above=0),
-    thickness=Number(0.1, "diameter of the struts", above=0),
+    thickness=Variable(0.1, "diameter of the struts", above=0),
     volume_fraction=FRACTION,
 )
 def struts(x, y, z, over, period, radius, segments):  # type: ignore[no-untyped-def]
@@ -250,15 +252,21 @@ def struts(x, y, z, over, period, radius, segments):  # type: ignore[no-untyped-
 
 @struts.arguments
 def struts_arguments(node: Node) -> dict[str, object]:
-    segments, radius = STRUTS[node["kind"]], node["thickness"] / 2
-    if (fraction := node["volume_fraction"]) is not None:
+    segments, thickness, fraction = STRUTS[node["kind"]], node["thickness"], node["volume_fraction"]
+    radius = thickness.times(0.5) if isinstance(thickness, Varying) else thickness / 2
+    if fraction is not None:
         radius = node["period"] * quantile(struts.function, fraction, 1.0, 1.0, 0.0, segments)
     return {
         "over": 1.0 / node["period"],
         "period": node["period"],
-        "radius": radius,
+        "radius": as_argument(radius),
         "segments": Fixed(segments),
     }
+
+
+@struts.slope
+def struts_slope(node: Node) -> float:
+    return 1.0 + slope_of(node["thickness"]) / 2
 
 
 struts.check(lattice_check)

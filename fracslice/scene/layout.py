@@ -20,6 +20,7 @@ from ..common.parameters import REQUIRED, Choice, Count, Length, Number, Paramet
 from ..errors import FracsliceError, SceneError
 from ..fields.definitions import is_name
 from ..fields.registry import Formula, load_installed
+from ..fields.varying import Varying
 from ..formulas import Node, get, names
 from ..records import Part, Print
 from .animation import Animation, Track
@@ -286,7 +287,7 @@ def _node(node: Node, rng: np.random.Generator, spread: float, step: bool = Fals
 
 def _value(name: str, kind: Any, value: Any, rng: np.random.Generator, spread: float) -> Any:
     """Varied value of a parameter; words, automatic depths and values left out stay."""
-    if value is None or isinstance(value, str):
+    if value is None or isinstance(value, (str, Varying)):
         return value
     if isinstance(kind, Count):
         step = round(rng.normal() * spread * max(1.0, value / 4))

@@ -36,6 +36,7 @@ from ..errors import SceneError
 from ..expr import vocabulary
 from ..fields.node import docstring, signature
 from ..fields.registry import Formula, Node, get, names, origin
+from ..fields.varying import Variable
 from .animation import AttributePath, Keys, Seconds
 from .layout import DEFINE, LISTED, PARAMETER, SCENE, SECTIONS, Element, Identifier, formulas
 
@@ -168,14 +169,16 @@ def package_stub(modules: Mapping[str, str]) -> str:
 _MADE = "# Made from the registry of formulas by `python docs/generate.py`; do not edit."
 _HEAD = f"""\
 {_MADE}
-from collections.abc import Sequence
-from typing import Literal, Union
+from collections.abc import Callable, Sequence
+from typing import Any, Literal, Union
 """
 
 
 def _function(formula: Formula) -> str:
     """Function of a formula in the stub file."""
-    text = re.sub(r"\b(?:fracslice\.fields\.\w+|collections\.abc)\.", "", str(signature(formula, Node)))
+    text = re.sub(
+        r"\b(?:fracslice\.fields\.\w+|collections\.abc|typing)\.", "", str(signature(formula, Node))
+    )
     body = docstring(formula).replace("\n", "\n    ").replace("\n    \n", "\n\n")
     return f'def {formula.name}{text}:\n    """{body}\n    """'
 
@@ -315,6 +318,7 @@ def _length(parent: Tree.Element, kind: Length) -> None:
 
 _PATTERNS: dict[type, Any] = {
     Number: _number,
+    Variable: _text,
     Count: _count,
     Vector: _vector,
     Axis: _choices,

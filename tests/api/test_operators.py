@@ -101,7 +101,7 @@ def test_numpy_leaves_operators_to_the_shape() -> None:
         (lambda: box().rotate(30, "q"), r"<transform> rotate=\('q', 30\): expected 4 numbers"),
         (lambda: box().rotate(30, 2), r"<transform> rotate=\(2, 30\): expected 4 numbers"),
         (lambda: box() + (1, 2), r"<transform> translate=\(1, 2\): expected 3 numbers"),
-        (lambda: box().shell("thick"), "<shell> thickness='thick': expected a number > 0"),
+        (lambda: box().shell("thick"), "<shell> thickness='thick': expected a number > 0, or an expr"),
     ],
 )
 def test_values_that_cannot_be_are_named(wrong, message: str) -> None:

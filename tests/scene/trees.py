@@ -20,11 +20,12 @@ from fracslice.common.parameters import (
     Vector,
 )
 from fracslice.errors import SceneError
+from fracslice.fields.varying import Variable
 from fracslice.formulas import Node
 from fracslice.scene import scene
 from fracslice.scene.layout import formulas
 from fracslice.scene.model import computing
-from tests.examples import BRACKET, GRID
+from tests.examples import BRACKET, GRID, HILLS
 
 SHAPES = [f for f in formulas() if f.children[1] == 0]
 OTHERS = [f for f in formulas() if f.children[1] != 0]
@@ -58,10 +59,11 @@ def _vector(kind: Vector) -> st.SearchStrategy[tuple[float, ...]]:
 
 _POSSIBLE: dict[type, Any] = {
     Number: _number,
+    Variable: lambda kind: _number(kind) | st.sampled_from(("0.1 + 0.2*z", "min(x*x, 0.5)")),
     Count: _count,
     Vector: _vector,
     Choice: lambda kind: st.sampled_from(kind.choices),
-    File: lambda kind: st.sampled_from((BRACKET, GRID)) if kind.inside else st.none(),
+    File: lambda kind: st.sampled_from((BRACKET, GRID, HILLS)) if kind.inside else st.none(),
     Digest: lambda kind: st.none(),
     Label: lambda kind: st.sampled_from(("LUMEN", "surface", "<&lt;", "e\u0301")),
     Axis: lambda kind: st.sampled_from("xyz"),
