@@ -25,6 +25,8 @@ CODECS = {
 """Codec and options of ffmpeg by ending: H.264, VP9, ProRes 422 HQ and AV1."""
 COLOURS = ("-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv")
 """Tags of a film's colours: a player guesses the matrix of a film without them by its size."""
+ALIKE = ("-fflags", "+bitexact")
+"""No random identity in .webm and .mkv: the same frames are the same file."""
 COLUMNS, ROWS, THUMBNAIL = 6, 4, 240
 """Pictures of a contact sheet, and their width in pixels."""
 FASTEST_GIF = 50.0
@@ -163,7 +165,8 @@ def _encode_film(pictures: Iterator[Any], ending: str, fps: float) -> bytes:
     with temporary_folder() as folder, tempfile.TemporaryFile() as log:
         film = folder / f"film{ending}"
         command = [imageio_ffmpeg.get_ffmpeg_exe(), "-loglevel", "error", *source, "-i", "-"]
-        command += ["-vf", "scale=out_color_matrix=bt709", "-c:v", codec, *options, *COLOURS, str(film)]
+        command += ["-vf", "scale=out_color_matrix=bt709", "-c:v", codec, *options, *COLOURS]
+        command += [*ALIKE, str(film)]
         with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=log) as process:
             assert process.stdin
             try:

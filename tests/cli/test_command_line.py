@@ -328,6 +328,7 @@ def listens(pid: int) -> bool:
 @pytest.mark.parametrize(
     ("module", "command"),
     [
+        ("typing", "mesh"),
         ("click", "mesh"),
         ("fracslice.common.memory", "mesh"),
         ("fracslice.cli.mesh", "mesh"),

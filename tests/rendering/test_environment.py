@@ -105,6 +105,7 @@ def test_hostile_pictures_are_one_line(tmp_path: Path, recwarn, capfd) -> None: 
     (tmp_path / "thin.hdr").write_bytes(HEAD + b"-Y 4 +X 0\n")
     (tmp_path / "huge.hdr").write_bytes(HEAD + b"-Y 999999 +X 999999\n\2\2\0\0")
     Image.new("1", (10_000, 10_000)).save(tmp_path / "large.png")
+    Image.new("1", (20_000, 10_000)).save(tmp_path / "larger.png")
     write_image(tmp_path / "cut.exr", light := sky(), light)
     data = (tmp_path / "cut.exr").read_bytes()
     (tmp_path / "cut.exr").write_bytes(data[: len(data) * 2 // 3])
@@ -115,6 +116,7 @@ def test_hostile_pictures_are_one_line(tmp_path: Path, recwarn, capfd) -> None: 
         ("thin.hdr", "0 x 4 pixels"),
         ("huge.hdr", "999999 x 999999 pixels: expected at most 67108864"),
         ("large.png", "10000 x 10000 pixels: expected at most 67108864"),
+        ("larger.png", "too many pixels: expected at most 67108864"),
         ("cut.exr", "not a picture"),
         ("pipe.png", "expected a file, found a pipe"),
         ("pipe.exr", "expected a file, found a pipe"),
