@@ -15,9 +15,8 @@ import numpy as np
 from ..common.cache import Kept, cache_folder, key
 from ..expr.frontend import loop_function
 from ..expr.graph import Program
-from ..expr.host import REGISTERS, host, lane_count, toolchain
 from ..expr.loops import Loop, bricks, points
-from ..expr.machine import CompiledFunction, constant, load_object
+from ..expr.runtime import REGISTERS, CompiledFunction, constant, host, lane_count, load_object, toolchain
 from .field import Kernel, Loops, Precision
 from .linker import Linked, link
 
@@ -34,7 +33,7 @@ def object_code(program: Program, bits: int, width: int, loops: Sequence[Loop]) 
     name = f"{key(*about, bits, width, toolchain())}.o"
 
     def compiled() -> bytes:
-        from ..expr.compiler import Target, compile_object
+        from ..expr.emitter import Target, compile_object
 
         return compile_object(program, Target(bits, width, min(REGISTERS, width), *host()), loops)
 

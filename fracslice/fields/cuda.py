@@ -20,8 +20,8 @@ from ..expr import cuda_driver
 from ..expr.cuda_driver import DeviceArray, address, device_array, require, to_device
 from ..expr.frontend import loop_function
 from ..expr.graph import Program
-from ..expr.host import toolchain
 from ..expr.loops import OWN, Loop, bricks, element_type, is_array, points
+from ..expr.runtime import toolchain
 from .field import Kernel, Loops, Precision
 from .linker import Linked, link
 
@@ -86,7 +86,7 @@ def machine_code(program: Program, precision: Precision, loops: tuple[Loop, ...]
     name = f"{key(*about, precision, capability, toolchain())}.cubin"
 
     def compiled() -> bytes:
-        from ..expr.compiler import compile_ptx
+        from ..expr.emitter import compile_ptx
 
         bits = 8 * np.dtype(precision).itemsize
         ptx = compile_ptx(program, bits, capability, loops)

@@ -669,22 +669,22 @@ class Node(Operators, Field):
     @property
     def key(self) -> str:
         # all depths must be resolved, as for kernels and loops
-        from .tree import key
+        from .devices import key
 
         return key(self)
 
     def kernel(self, device: Device = "cpu", precision: Precision = "float32") -> Kernel:
-        from .tree import kernel
+        from .devices import kernel
 
         return kernel(self, device, precision)
 
     def cells(self, precision: Precision = "float32") -> Cells | None:
-        from .tree import cells
+        from .devices import cells
 
         return cells(self, precision)
 
     def loops(self, loops: Sequence[Any], precision: Precision, device: Device = "cpu") -> Loops:
-        from .tree import linked_loops
+        from .devices import linked_loops
 
         return linked_loops(self, loops, precision, device)
 

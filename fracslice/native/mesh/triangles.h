@@ -36,7 +36,7 @@ struct MeshView : Triangles {
 // Triangles in a leaf of a tree.
 constexpr size_t kLeaf = 8;
 
-// As `fracslice.mesh.spatial.Tree` has it: a complete binary tree as a heap, the root at 1, the children of node i at 2 i and
+// As `fracslice.mesh.model.Tree` has it: a complete binary tree as a heap, the root at 1, the children of node i at 2 i and
 // 2 i + 1; leaf k has the triangles order[kLeaf k] to order[kLeaf k + kLeaf - 1]. Empty boxes have low above high.
 struct TreeView {
     const int64_t* order;        // [count]

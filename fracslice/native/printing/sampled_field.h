@@ -1,4 +1,4 @@
-// A sampled field, interpolated between its samples, and rays through it: `fracslice.printing.samples`, `fracslice.printing.walls`.
+// A sampled field, interpolated between its samples, and rays through it: `fracslice.printing.walls`, `fracslice.printing.walls`.
 #pragma once
 #include <array>
 #include <cmath>

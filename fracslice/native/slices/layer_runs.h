@@ -1,4 +1,4 @@
-// Layers as runs of pixels: components, overlaps and what nothing supports; `fracslice.slicing.runs`.
+// Layers as runs of pixels: components, overlaps and what nothing supports; `fracslice.slicing.feature_graph`.
 #pragma once
 #include <array>
 #include <cstdint>
