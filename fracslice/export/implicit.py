@@ -23,7 +23,7 @@ import numpy as np
 from ..common.files import HEAD, package, replacing
 from ..errors import KernelError
 from ..expr.graph import Evaluator
-from ..fields.linker import FIELD, link
+from ..fields.linker import FIELD
 from ..formats._3mf import CORE_NAMES, mesh_element
 from ..mesh.model import Mesh
 
@@ -65,7 +65,7 @@ def operations(
     for node in root.solids():
         if node.formula.name == "model":
             raise node.fail("is made of triangles: expected formulas alone, or a mesh of them")
-    linked, made = link(root), _Graph()
+    linked, made = root.linked, _Graph()
     vocabulary = FUNCTIONS.keys() - {"add", "subtract", "multiply", "divide", "select"}
     domain: dict[str, Any] = {name: made.function(name) for name in vocabulary}
     domain |= {"where": made.where, "any_of": made.any_of}

@@ -18,7 +18,7 @@ from ..expr.graph import Program
 from ..expr.loops import Loop, bricks, points
 from ..expr.runtime import REGISTERS, CompiledFunction, constant, host, lane_count, load_object, toolchain
 from .field import Kernel, Loops, Precision
-from .linker import Linked, link
+from .linker import Linked
 
 if TYPE_CHECKING:
     from .node import Node
@@ -116,7 +116,7 @@ def compile_scene(root: Node, precision: Precision = "float32") -> CpuKernel:
     KernelError
         If the scene cannot be linked or compiled.
     """
-    return _kernel(link(root), precision)
+    return _kernel(root.linked, precision)
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ from ..expr.graph import Program
 from ..expr.loops import OWN, Loop, bricks, element_type, is_array, points
 from ..expr.runtime import toolchain
 from .field import Kernel, Loops, Precision
-from .linker import Linked, link
+from .linker import Linked
 
 if TYPE_CHECKING:
     from .node import Node
@@ -165,7 +165,7 @@ _kernel = lru_cache(maxsize=32)(CudaKernel)
 
 def compile_scene(root: Node, precision: Precision = "float32") -> CudaKernel:
     """Compile the kernel of a scene tree for the GPU; see `cpu.compile_scene`."""
-    return _kernel(link(root), precision)
+    return _kernel(root.linked, precision)
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from ..expr.language import words
 from ..expr.loops import Loop, enclosures
 from . import cpu
 from .field import Cells, Device, Field, Kernel, Loops, Precision
-from .linker import FIELD, link
+from .linker import FIELD
 
 if TYPE_CHECKING:
     from .node import Node
@@ -100,7 +100,7 @@ def enclosure(root: Node) -> Callable[[Interval, Interval, Interval], Interval]:
 
 def _field(root: Node, operations: Mapping[str, Callable[..., Any]]) -> Callable[..., Any]:
     """Field of a tree with given functions of the vocabulary."""
-    linked = link(root)
+    linked = root.linked
     memory = {words(memory.digest): memory for _, memory in linked.held}
 
     def asking(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -164,23 +164,22 @@ def kernel(root: Node, device: Device, precision: Precision) -> Kernel:
 def linked_loops(root: Node, loops: Sequence[Loop], precision: Precision, device: Device = "cpu") -> Loops:
     """Compile loops over a tree with resolved depths; see `Field.loops`."""
     if for_field(root, device) == "cpu":
-        return cpu.compile_loops(link(root), tuple(loops), precision)
+        return cpu.compile_loops(root.linked, tuple(loops), precision)
     from . import cuda
 
-    return cuda.compile_loops(link(root), tuple(loops), precision)
+    return cuda.compile_loops(root.linked, tuple(loops), precision)
 
 
 def cells(root: Node, precision: Precision) -> Cells:
     """Compile proofs that a tree's field has one sign on cells; see `Field.cells`."""
-    return Enclosures(cpu.compile_loops(link(root.signs()), (enclosures,), precision), np.dtype(precision))
+    return Enclosures(cpu.compile_loops(root.signs().linked, (enclosures,), precision), np.dtype(precision))
 
 
 def key(root: Node) -> str:
     """Hash the text, parameters and bounds of a tree and of its conservative field; see `Field.key`."""
     parts: list[object] = []
     for node in (root, root.conservative()):
-        linked = link(node)
-        parts += [linked.program.identity, linked.parameters, node.bounds]
+        parts += [node.linked.program.identity, node.linked.parameters, node.bounds]
     return hashed(*parts)
 
 

@@ -29,6 +29,7 @@ from .field import Bounds, Cells, Device, Field, Kernel, Loops, Precision
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from .linker import Linked
     from .registry import Formula
 
 FORMULAS: dict[str, Formula] = {}
@@ -651,6 +652,13 @@ class Node(Operators, Field):
         names = (name for b in below for name in b.measured)
         measured = dict.fromkeys([*names, *([self.formula.name] if is_measured else [])])
         return Bounds(box, slope, exterior_only, steepening, tuple(boxless), tuple(measured))
+
+    @cached_property
+    def linked(self) -> Linked:
+        """Functions and numbers of the tree, whose depths are resolved; see `linker.link`."""
+        from .linker import link
+
+        return link(self)
 
     def _hooked(self, name: str, default: Any, *arguments: Any) -> Any:
         """Value of a hook of the formula, or the default of a formula without it."""
