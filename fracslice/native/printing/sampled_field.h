@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "../array.h"
-#include "../volume/bricks.h"
+#include "../volume/signs.h"
 
 namespace fracslice::printing {
 

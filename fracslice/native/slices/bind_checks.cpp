@@ -50,7 +50,7 @@ class RunsArrays {
     Vector<int32_t> rows_, begin_, end_;
 
   public:
-    Runs view;
+    LayerRuns view;
 };
 
 void require_like(const RunsArrays& one, const RunsArrays& other) {
