@@ -15,7 +15,7 @@ from fracslice.common.messages import decimal, format_count, significant
 from fracslice.formats import ENDINGS
 from fracslice.records import PIXEL, MeshJob, Placed, Print, SliceJob
 
-from .inputs import BadInput, check_targets, is_model, load_model, load_scene, refuse_options
+from .execution import BadInput, check_targets, is_model, load_model, load_scene, refuse_options
 from .options import (
     LENGTH,
     ClusterOptions,
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from fracslice.scene import Scene
     from fracslice.slicing import Stack
     from fracslice.slicing.printers import Printer
-    from fracslice.volume.sizing import Sizing
+    from fracslice.volume.amount import Sizing
     from fracslice.work import Work
 
 SHARED = {"cluster", "shard", "store"}
@@ -168,7 +168,7 @@ def of_mesh(given: CheckOptions, work: Work) -> Checked:
     from fracslice.checks import problems_of
     from fracslice.checks.defects import MeshEvidence
     from fracslice.jobs.mesh import make_mesh
-    from fracslice.volume.sizing import sizing
+    from fracslice.volume.amount import sizing
 
     scene = load_scene(given.source, given.settings)
     made = make_mesh(scene, given.mesh_job(scene), work)
@@ -191,7 +191,7 @@ def in_layers(given: CheckOptions, size: float) -> CheckOptions:
 
 def of_scene(given: CheckOptions, work: Work) -> Checked:
     """Check the layers of a scene."""
-    from fracslice.volume.sizing import sizing
+    from fracslice.volume.amount import sizing
 
     scene = load_scene(given.source, given.settings)
     size = sizing(scene, given.size, given.scale, work)
@@ -207,7 +207,7 @@ def of_model(given: CheckOptions, work: Work) -> Checked:
     from fracslice.mesh.checks import check_mesh
     from fracslice.mesh.models import MeshField
     from fracslice.records import SAME, UP
-    from fracslice.volume.sizing import Sizing
+    from fracslice.volume.amount import Sizing
 
     turned = place(load_model(given.source), given.up, SAME)
     length = longest(turned) or 1.0
@@ -242,9 +242,9 @@ def of_model(given: CheckOptions, work: Work) -> Checked:
 
 def place(mesh: Mesh, up: Triple, scale: Triple) -> Mesh:
     """Mesh turned and scaled."""
-    from fracslice.fields.algebra import product
+    from fracslice.common.arrays import product
     from fracslice.records import SAME, UP
-    from fracslice.volume.sizing import orientation
+    from fracslice.volume.amount import orientation
 
     if up == UP and scale == SAME:
         return mesh
@@ -449,7 +449,7 @@ def shared_check(scene: Scene, job: SliceJob, given: CheckOptions, work: Work) -
 def draw(stack: Stack, report: PrintReport, path: str, work: Work) -> None:
     """Draw the worst layers."""
     from fracslice.common.files import replacing
-    from fracslice.slicing.preview import worst_layers
+    from fracslice.slicing.raster import worst_layers
 
     with replacing(path) as file:
         worst_layers(stack, report.worst, file, work)

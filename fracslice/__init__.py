@@ -96,7 +96,7 @@ _WHERE = {
     "sweep": "api.calls",
     "to_xml": "scene",
     "write": "formats",
-    "write_vdb": "api.grids",
+    "write_vdb": "api.calls",
 }
 
 _PACKAGE = "volume"

@@ -20,9 +20,8 @@ from xml.parsers import expat
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.files import open_regular
-from ..common.packages import HEAD, Fragment, Text, append, deflate, join, number_rows, rows
-from ..common.triangles import COPIES, DEEPEST, LARGEST, MOST_PARTS, Triangles, concatenate, count, moved
+from ..common.arrays import COPIES, DEEPEST, LARGEST, MOST_PARTS, Triangles, concatenate, count, moved
+from ..common.files import HEAD, Fragment, Text, append, deflate, join, number_rows, open_regular, rows
 from ..errors import MeshError
 from ..work import Work
 from . import MeshFormat

@@ -17,7 +17,7 @@ from PIL import Image, ImageSequence
 
 from fracslice import read, reads
 from fracslice.animation import FilmJob, Timeline, encode, write_frames
-from fracslice.animation.encode import CODECS
+from fracslice.animation.film import CODECS
 from fracslice.common.files import locked_folder
 from fracslice.errors import Cancelled, ExportError, RenderError
 from fracslice.rendering import Renderer, develop

@@ -15,9 +15,9 @@ from fracslice.export.images import write_image
 from fracslice.formulas import Node, material, plane, sphere
 from fracslice.rendering import Pass, Renderer, lighting
 from fracslice.rendering.environments import Environment, LinearImage, load_picture
-from fracslice.rendering.units import environment as units
-from fracslice.rendering.units.glossy import facet_density, glossy, highlight
-from fracslice.rendering.units.pixel import linear
+from fracslice.rendering.units import shade as units
+from fracslice.rendering.units.camera import linear
+from fracslice.rendering.units.shade import facet_density, glossy, highlight
 from fracslice.scene import reads
 from fracslice.scene.view import Camera, Light, Shading, View
 from fracslice.work import Work

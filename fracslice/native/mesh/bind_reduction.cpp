@@ -1,10 +1,9 @@
 // Fewer triangles, how far they are, a mesh as a field, and outlines: classes of fracslice._native that keep the arrays they look into.
 #include "../unlocked.h"
 #include "input.h"
-#include "mesh_field.h"
+#include "solid.h"
 #include "outline.h"
 #include "reduction.h"
-#include "solid.h"
 
 namespace fracslice::mesh {
 namespace {
