@@ -392,7 +392,7 @@ class Lighting:
             pane = "where((clear > 0.0) | (side < 0.0), 1.0, last)" if look.inside else "last"
             lines.append(f"free = {pane}")
         for k, light in enumerate(self.view.lights):
-            if light.kind == "environment" and (look.paths or light.shadows == "yes"):
+            if light.is_picture and (look.paths or light.shadows == "yes"):
                 lines += self.environment(light, look)
             elif not light.surrounds:
                 lines += self.light(k, light, look)
@@ -404,7 +404,7 @@ class Lighting:
     def weighted(self) -> bool:
         """True if lights are sampled by their own distribution and by the surface's; see `units.weights`."""
         paths = self.view.shading.paths == "yes" and self.view.shading.mode == "light"
-        return paths and any(x.kind == "environment" or seen_as_disc(x) for x in self.view.lights)
+        return paths and any(x.is_picture or seen_as_disc(x) for x in self.view.lights)
 
     def blocker(self) -> list[str]:
         """Lines of `units.intrinsics.blocker`."""
@@ -523,7 +523,7 @@ class Lighting:
 
     def bind_sky(self, light: Light) -> None:
         """Bind the unit of the sky, or of the light of an environment without shadows."""
-        if light.kind == "environment":
+        if light.is_picture:
             self.around.bind_irradiance("sky_", light)
             return
         names = {"zenith": light.colour, "horizon": light.horizon, "ground": light.ground}

@@ -188,6 +188,7 @@ def test_one_code_serves_all_models_and_keeps_theirs_alive(tmp_path: Path) -> No
     assert alive() is not None
     assert made.points(np.array([5.0]), np.array([5.0]), np.array([5.0]))[0] == -5
     made.__dict__.clear()
+    del other
     gc.collect()
     assert alive() is None
 
