@@ -145,7 +145,7 @@ def test_a_picture_that_cannot_be_read_is_named(tmp_path: Path) -> None:
         ("a.hdr", "it ends too early"),
         ("b.exr", ""),
         ("c.hdr", "No such file or directory"),
-        ("d.png", "exceeds limit of 178956970 pixels"),
+        ("d.png", "too many pixels: expected at most 67108864 of them"),
     ):
         read = reads(text.format(f'file="{tmp_path / name}"'))
         with pytest.raises(SceneError, match=f"(?s)^scene:2: <light> .*{name}.*{message}.*; expected a .hdr"):
