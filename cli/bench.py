@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from .inputs import check_folder
+from .execution import check_folder
 from .options import POSITIVE, ClusterOptions, Name, Whole, command, option
 
 

@@ -15,7 +15,7 @@ from fracslice.common.messages import decimal, format_count, significant
 from fracslice.formats import ENDINGS
 from fracslice.records import PIXEL, MeshJob, Placed, Print, SliceJob
 
-from .inputs import BadInput, check_targets, is_model, load_model, load_scene, refuse_options
+from .execution import BadInput, check_targets, is_model, load_model, load_scene, refuse_options
 from .options import (
     LENGTH,
     ClusterOptions,
@@ -41,12 +41,12 @@ if TYPE_CHECKING:
     from fracslice.scene import Scene
     from fracslice.slicing import Stack
     from fracslice.slicing.printers import Printer
-    from fracslice.volume.sizing import Sizing
+    from fracslice.volume.amount import Sizing
     from fracslice.work import Work
 
 SHARED = {"cluster", "shard", "store"}
 OF_MESHES = MeshJob.kinds().keys() - Placed.kinds().keys()
-OF_SCENES = {*OF_MESHES, *SHARED, "settings", "fixed"}
+OF_SCENES = {*OF_MESHES, *SHARED, "settings"}
 
 AXES = (0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0)
 """Directions up that --fix tries."""
@@ -100,7 +100,7 @@ class CheckOptions(LayerOptions, MeshOptions, ClusterOptions):
     fix: bool = flag("Try what would mend the problems, and keep what helps.")
     fixed: str | None = option(
         Name("FILE", *ENDINGS),
-        "With --fix, of a scene: write the mesh of what it made.",
+        "With --fix: write the mesh of what it made.",
         "-o",
         "--output",
     )
@@ -168,7 +168,7 @@ def of_mesh(given: CheckOptions, work: Work) -> Checked:
     from fracslice.checks import problems_of
     from fracslice.checks.defects import MeshEvidence
     from fracslice.jobs.mesh import make_mesh
-    from fracslice.volume.sizing import sizing
+    from fracslice.volume.amount import sizing
 
     scene = load_scene(given.source, given.settings)
     made = make_mesh(scene, given.mesh_job(scene), work)
@@ -191,7 +191,7 @@ def in_layers(given: CheckOptions, size: float) -> CheckOptions:
 
 def of_scene(given: CheckOptions, work: Work) -> Checked:
     """Check the layers of a scene."""
-    from fracslice.volume.sizing import sizing
+    from fracslice.volume.amount import sizing
 
     scene = load_scene(given.source, given.settings)
     size = sizing(scene, given.size, given.scale, work)
@@ -207,7 +207,7 @@ def of_model(given: CheckOptions, work: Work) -> Checked:
     from fracslice.mesh.checks import check_mesh
     from fracslice.mesh.models import MeshField
     from fracslice.records import SAME, UP
-    from fracslice.volume.sizing import Sizing
+    from fracslice.volume.amount import Sizing
 
     turned = place(load_model(given.source), given.up, SAME)
     length = longest(turned) or 1.0
@@ -223,7 +223,10 @@ def of_model(given: CheckOptions, work: Work) -> Checked:
     faults = problems_of("mesh", MeshEvidence(report, report.problems, mesh))
     line, numbers = f"{given.source}: {sizes(report)}", report.as_dict()
     if not report.watertight or report.misoriented_edges or not report.volume_mm3:
-        return numbers, [f"{given.source}: {figures(report, [str(fault) for fault in faults])}"], faults
+        lines = [f"{given.source}: {figures(report, [str(fault) for fault in faults])}"]
+        if given.fixed:
+            lines.append(f"{given.fixed}: not written; fracslice repair makes a solid of a model")
+        return numbers, lines, faults
     size = longest(mesh)
     if size <= THINNEST and given.layer is None:
         raise BadInput(f"{given.source}: {size:.3g} mm long, less than a layer: expected a model in mm")
@@ -231,16 +234,17 @@ def of_model(given: CheckOptions, work: Work) -> Checked:
     factor = size / side  # the mesh is compensated already: a size that is advised is before that
     sides = Sizing(side, 1 / factor, (factor,) * 3)
     field = MeshField(replace(mesh, vertices=mesh.vertices - mesh.bounds.mean(0)))
-    made = Variant(field, sides, given.printing(Print()), UP, faults=faults)
+    turns = given.up == UP and x == y == z
+    made = Variant(field, sides, given.printing(Print()), given.up, faults=faults, turns=turns)
     layers, lines, problems = of_layers(made, layered, work)
     return numbers | {"layers": layers}, [line, *lines], problems
 
 
 def place(mesh: Mesh, up: Triple, scale: Triple) -> Mesh:
     """Mesh turned and scaled."""
-    from fracslice.fields.algebra import product
+    from fracslice.common.arrays import product
     from fracslice.records import SAME, UP
-    from fracslice.volume.sizing import orientation
+    from fracslice.volume.amount import orientation
 
     if up == UP and scale == SAME:
         return mesh
@@ -263,6 +267,7 @@ class Variant:
     scene: Scene | None = None  # that it was read from; None for a model
     faults: Sequence[Problem] = ()  # problems of its mesh
     flags: tuple[str, ...] = ()
+    turns: bool = True  # whether --fix may try other directions up
 
     def changed(self, settings: dict[str, str]) -> Variant:
         """With other print settings, or another size."""
@@ -273,8 +278,14 @@ class Variant:
         return replace(self, size=size, how=how, flags=(*self.flags, *options_of(settings)))
 
     def turned(self, up: Triple) -> Variant:
-        """With another direction up."""
-        return replace(self, up=up, flags=(*self.flags, "--up " + " ".join(f"{c:g}" for c in up)))
+        """With another direction up; a model is turned itself, as its mesh has fewer distances to find."""
+        turned = replace(self, up=up, flags=(*self.flags, "--up " + " ".join(f"{c:g}" for c in up)))
+        if self.scene:
+            return turned
+        from fracslice.mesh.models import MeshField
+        from fracslice.records import SAME
+
+        return replace(turned, root=MeshField(place(cast("MeshField", self.root).mesh, up, SAME)))
 
 
 def options_of(settings: dict[str, str]) -> tuple[str, ...]:
@@ -370,9 +381,10 @@ def mended_object(first: Attempt, given: CheckOptions, work: Work) -> tuple[Atte
                 break
         elif now and (len(choice) == 1 or len(choices) == 1):
             lines.append(f"with {' '.join(options_of(choice))}: no better, left out")
-    if best.variant.scene and any("--up" in problem.advice for problem in best.problems):
+    if best.variant.turns and any("--up" in problem.advice for problem in best.problems):
         turns = [tried(best.variant.turned(up)) for up in AXES if up != best.variant.up]
         helpful = [turned for turned in turns if turned and turned.mends(best)]
+        lines += ["with other directions up: no better, left out"] * (any(turns) and not helpful)
         best = min([best, *helpful], key=lambda attempt: attempt.severity)
     if best is base:
         return first, lines
@@ -383,11 +395,11 @@ def mended_object(first: Attempt, given: CheckOptions, work: Work) -> tuple[Atte
 
 
 def write_mesh(variant: Variant, given: CheckOptions, work: Work) -> None:
-    """Write the mesh of a variant of a scene."""
+    """Write the mesh of a variant."""
     from fracslice.jobs.mesh import make_mesh
 
-    scene = cast("Scene", variant.scene)
-    size = variant.size.side if variant.size.unit is None else None
+    scene = variant.scene or load_scene(given.source)
+    size = variant.size.side if variant.size.unit is None else given.size
     job = replace(given.mesh_job(scene), size=size, printing=variant.how, up=variant.up)
     make_mesh(scene, job, work, given.fixed)
 
@@ -396,11 +408,12 @@ def examine_layers(variant: Variant, given: CheckOptions, work: Work, finest: fl
     """Check the layers of a variant of an object, in layers and pixels of at least `finest` mm."""
     from fracslice.checks.fitting import misfit
     from fracslice.checks.layer_checks import check_layers
+    from fracslice.records import UP
     from fracslice.slicing import adapted, plan_stack
 
     begun, machine, size = time.process_time(), given.machine, variant.size
     side = None if size.unit else size.side
-    job = replace(given.slice_job(variant.how), up=variant.up, size=side)
+    job = replace(given.slice_job(variant.how), up=variant.up if variant.scene else UP, size=side)
     if finest:
         layer = tuple(step and max(step, finest) for step in job.layer)
         pixel = tuple(max(step, finest) for step in job.pixels)
@@ -436,7 +449,7 @@ def shared_check(scene: Scene, job: SliceJob, given: CheckOptions, work: Work) -
 def draw(stack: Stack, report: PrintReport, path: str, work: Work) -> None:
     """Draw the worst layers."""
     from fracslice.common.files import replacing
-    from fracslice.slicing.preview import worst_layers
+    from fracslice.slicing.raster import worst_layers
 
     with replacing(path) as file:
         worst_layers(stack, report.worst, file, work)

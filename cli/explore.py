@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .inputs import check_folder, check_targets, load_scene
+from .execution import check_folder, check_targets, load_scene
 from .options import PIXELS, Parsed, SceneOptions, Whole, argument, command, option, output
 
 if TYPE_CHECKING:

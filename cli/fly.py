@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from .inputs import scene_path
+from .execution import scene_path
 from .options import DEVICE, PIXELS, SceneOptions, argument, command, option
 
 

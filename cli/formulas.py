@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .inputs import BadInput, check_targets
+from .execution import BadInput, check_targets
 from .options import CommandOptions, Name, argument, command, option
 
 if TYPE_CHECKING:
@@ -48,8 +48,8 @@ def formulas(given: FormulaOptions) -> None:
             raise click.UsageError("--picture: expected --check FILE")
         click.echo(manual.overview() if given.name is None else manual.page(given.name))
         return
+    from fracslice.fields.definitions import trial
     from fracslice.fields.registry import run_file
-    from fracslice.fields.validation import trial
 
     check_targets(given.file, given.picture)
     trials = [(formula.name, trial(formula)) for formula in run_file(given.file)]

@@ -14,7 +14,7 @@ from fracslice.common.messages import decimal
 from fracslice.common.parameters import alternatives
 from fracslice.formats import ENDINGS
 
-from .inputs import BadInput, check_folder, check_targets, load_scene, refuse_moved, refuse_options
+from .execution import BadInput, check_folder, check_targets, load_scene, refuse_moved, refuse_options
 from .options import (
     AMOUNT,
     INTERVAL,

@@ -35,8 +35,7 @@ from fracslice.common.parameters import (
 from fracslice.errors import ClusterError, SceneError, VolumeError
 from fracslice.records import MeshJob, Part, Print, RasterOptions, SliceJob
 
-from .execution import NOTHING, working
-from .inputs import BadInput
+from .execution import NOTHING, BadInput, working
 
 if TYPE_CHECKING:
     from fracslice.checks.layer_checks import PrintReport
@@ -412,7 +411,7 @@ def write_page(
 
     from fracslice.checks.problems import verdict
     from fracslice.common.files import replacing
-    from fracslice.slicing.preview import page, worst_layers
+    from fracslice.slicing.raster import page, worst_layers
 
     with io.BytesIO() as picture, replacing(path) as file:
         worst_layers(stack, report.worst, picture, work)

@@ -10,7 +10,7 @@ import click
 
 from fracslice.errors import keeping
 
-from .inputs import check_targets, load_scene
+from .execution import check_targets, load_scene
 from .options import MeshOptions, Name, argument, command, option, output
 from .summary import duration
 

@@ -11,7 +11,7 @@ import click
 
 from fracslice.records import RenderJob
 
-from .inputs import check_folder, check_targets, load_scene, refuse_options
+from .execution import check_folder, check_targets, load_scene, refuse_options
 from .options import (
     DEVICE,
     ClusterOptions,

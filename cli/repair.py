@@ -9,7 +9,7 @@ import click
 from fracslice.common.parameters import alternatives
 from fracslice.formats import ENDINGS
 
-from .inputs import BadInput, check_targets, load_model
+from .execution import BadInput, check_targets, load_model
 from .options import RunOptions, argument, command, output
 from .summary import figures
 
@@ -33,8 +33,8 @@ def repair(given: RepairOptions) -> int:
     """
     from fracslice.errors import MeshError
     from fracslice.formats import write
+    from fracslice.mesh.checks import repair as repaired
     from fracslice.mesh.models import faults
-    from fracslice.mesh.repair import repair as repaired
 
     if os.path.splitext(given.output)[1].lower() not in ENDINGS:
         raise click.UsageError(f"{given.output}: unknown kind of file; known are {', '.join(ENDINGS)}")

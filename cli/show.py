@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .inputs import is_model, load_model, load_scene, refuse_options
+from .execution import is_model, load_model, load_scene, refuse_options
 from .options import MeshOptions, argument, command
 
 

@@ -15,7 +15,7 @@ from fracslice.common.messages import decimal, format_count
 from fracslice.errors import keeping
 from fracslice.records import RasterOptions
 
-from .inputs import check_targets, load_scene, refuse_options
+from .execution import check_targets, load_scene, refuse_options
 from .options import (
     AMOUNT,
     NUMBER,
@@ -33,12 +33,11 @@ from .summary import of_layers
 from .sweeps import families
 
 if TYPE_CHECKING:
-    from fracslice.export.resins import Resin
     from fracslice.export.slice_run import SliceRun
     from fracslice.jobs.slices import SliceRecipe
     from fracslice.scene import Scene
     from fracslice.slicing import Stack
-    from fracslice.slicing.printers import Printer
+    from fracslice.slicing.printers import Printer, Resin
     from fracslice.volume.amount import Completeness
     from fracslice.work import Work
 
@@ -50,7 +49,7 @@ def listed_resin(context: click.Context, _: click.Parameter, name: str | None) -
     """Return the name of a resin; "list" prints those of the printer, or all, and ends the command."""
     if name != "list":
         return name
-    from fracslice.export.resins import resin_names
+    from fracslice.slicing.printers import resin_names
 
     machine = context.params.get("machine")
     for known in resin_names(machine):
@@ -184,7 +183,7 @@ def describe_layers(run: SliceRun, output: str, complete: Completeness) -> list[
 
 def calibration(resin: Resin) -> str:
     """Line on exposures that are no resin's."""
-    from fracslice.export.resins import START
+    from fracslice.slicing.printers import START
 
     keys = attrgetter("name", "exposure", "bottom_exposure", "bottom_layers", "transition_layers")
     if keys(resin) != keys(START):
@@ -199,7 +198,7 @@ def resin_of(given: SliceOptions) -> Resin | None:
     """Exposure and motion of --resin, else of the printer's own; --exposure changes them. None if there is
     neither.
     """
-    from fracslice.export.resins import Resin, default_resin, moving, resin
+    from fracslice.slicing.printers import Resin, default_resin, moving, resin
 
     machine, (layer, _) = given.machine, given.layer
     profile = default_resin(machine, layer) if machine else None
@@ -270,7 +269,7 @@ def creation_date() -> datetime:
 def write_preview(stack: Stack, path: str, work: Work) -> None:
     """Write a contact sheet (.png) or an animation (.webp) of the layers."""
     from fracslice.common.files import replacing
-    from fracslice.slicing.preview import animation, contact_sheet
+    from fracslice.slicing.raster import animation, contact_sheet
 
     with replacing(path) as file:
         (contact_sheet if path.lower().endswith(".png") else animation)(stack, file, work)

@@ -15,7 +15,7 @@ import click
 
 from fracslice.errors import SharedError
 
-from .inputs import load_scene
+from .execution import load_scene
 from .options import SceneOptions
 
 R = TypeVar("R", bound=SceneOptions)

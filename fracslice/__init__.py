@@ -62,7 +62,11 @@ True
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Any
+
+TYPE_CHECKING = False
+"""True for type checkers alone. The command guards its imports against Ctrl-C only after this module."""
+if TYPE_CHECKING:
+    from typing import Any
 
 _WHERE = {
     "Camera": "scene.view",
@@ -92,7 +96,7 @@ _WHERE = {
     "sweep": "api.calls",
     "to_xml": "scene",
     "write": "formats",
-    "write_vdb": "api.grids",
+    "write_vdb": "api.calls",
 }
 
 _PACKAGE = "volume"

@@ -5,7 +5,7 @@ from .api.calls import make_mesh as make_mesh
 from .api.calls import render as render
 from .api.calls import slice_layers as slice_layers
 from .api.calls import sweep as sweep
-from .api.grids import write_vdb as write_vdb
+from .api.calls import write_vdb as write_vdb
 from .errors import FracsliceError as FracsliceError
 from .formats import write as write
 from .formulas import Node as Node

@@ -9,7 +9,7 @@ from typing import Any
 from numpy import bool_, float32, float64, int8, int16, int32, int64, uint8
 from numpy.typing import NDArray
 
-from .expr.machine import CompiledFunction
+from .expr.runtime import CompiledFunction
 
 Point = tuple[float, float, float]
 Loop = tuple[CompiledFunction, NDArray[Any], NDArray[Any]] | Callable[..., None]
@@ -353,7 +353,7 @@ def open_edges(ijk: NDArray[int32], values: NDArray[float32], index: NDArray[int
 def edge_topology(
     triangles: NDArray[int32], counted: NDArray[bool_], threads: int = 0
 ) -> tuple[int, int, int, int, int]:
-    """See `fracslice.mesh.spatial.edge_ends`."""
+    """See `fracslice.mesh.model.edge_ends`."""
 
 def corners_by_vertex(
     triangles: NDArray[int32], vertices: int, threads: int = 0
@@ -375,7 +375,7 @@ def component_sizes(
     count: int,
     threads: int = 0,
 ) -> tuple[NDArray[float64], NDArray[float64], NDArray[float64], NDArray[int32], NDArray[int64]]:
-    """See `fracslice.mesh.spatial.component_sizes`."""
+    """See `fracslice.mesh.model.component_sizes`."""
 
 def turned(
     vertices: NDArray[float64], triangles: NDArray[int32], frame: tuple[float, Point, float], threads: int = 0
@@ -464,7 +464,7 @@ def weld(points: NDArray[float32]) -> tuple[NDArray[int64], NDArray[int32]]:
 def tree(
     vertices: NDArray[float64], triangles: NDArray[int32], threads: int = 0, halved: bool = False
 ) -> tuple[NDArray[int64], NDArray[float64], NDArray[float64]]:
-    """See `fracslice.mesh.spatial.Tree`."""
+    """See `fracslice.mesh.model.Tree`."""
 
 def self_intersecting_triangles(
     vertices: NDArray[float64],
@@ -519,7 +519,7 @@ class MeshField:
     def bricks(self, corners: NDArray[int32], origin: Point, voxel: float) -> NDArray[float32]: ...
 
 class Nearest:
-    """See `fracslice.mesh.spatial.Nearest`. Refers to the arrays during its lifetime."""
+    """See `fracslice.mesh.model.Nearest`. Refers to the arrays during its lifetime."""
 
     def __init__(
         self,
@@ -567,7 +567,7 @@ def foremost(vertices: NDArray[float64], triangles: NDArray[int32], shape: tuple
     """
 
 class SampledField:
-    """Samples of a field, interpolated: see `fracslice.printing.samples.Samples`."""
+    """Samples of a field, interpolated: see `fracslice.printing.walls.Samples`."""
 
     def __init__(
         self,

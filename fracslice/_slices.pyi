@@ -10,8 +10,8 @@ from enum import Enum
 from numpy import bool_, float32, float64, int32, int64, uint8
 from numpy.typing import NDArray
 
-from .expr.machine import CompiledFunction
-from .slicing.runs import Runs
+from .expr.runtime import CompiledFunction
+from .slicing.feature_graph import Runs
 
 class BorderError(ValueError):
     """The solid reaches the border of the lattice."""
@@ -245,7 +245,7 @@ def components(
     runs: Runs, reach: int
 ) -> tuple[NDArray[int64], NDArray[int64], NDArray[float64], NDArray[bool_]]:
     """Connected component of each run, of those that overlap or, at `reach` 1, touch at a corner; and area,
-    centroid and openness of each component: see `fracslice.slicing.runs.Nodes`.
+    centroid and openness of each component: see `fracslice.slicing.feature_graph.Nodes`.
     """
 
 def overlaps(

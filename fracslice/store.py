@@ -14,7 +14,7 @@ import numpy as np
 
 from .common.cache import Kept, key, program
 from .errors import ExportError, VolumeError
-from .expr.host import toolchain
+from .expr.runtime import toolchain
 from .fields.field import Field
 
 Arrays = Mapping[str, np.ndarray]

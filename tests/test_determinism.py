@@ -25,7 +25,7 @@ from fracslice.mesh.contouring import contour
 from fracslice.printing.walls import Walls
 from fracslice.rendering import Renderer
 from fracslice.rendering import packets as tiles
-from fracslice.rendering.film import develop
+from fracslice.rendering.accumulator import develop
 from fracslice.scene.view import Film, View
 from fracslice.slicing import SliceJob, Slicer, plan_stack
 from fracslice.volume import Lattice, sample

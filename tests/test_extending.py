@@ -122,7 +122,7 @@ def test_a_format_of_layers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 MESH_FORMAT = """
 import numpy as np
-from fracslice.common.triangles import Triangles
+from fracslice.common.arrays import Triangles
 from fracslice.formats import MeshFormat
 
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from fracslice.expr.loops import points as points_loop
+from fracslice.fields.devices import reference
 from fracslice.fields.field import Field, Precision
-from fracslice.fields.reference import reference
 from fracslice.formulas import mandelbulb, sphere, transform, union
 from fracslice.printing.edits import Does, EditedField, edited_field
-from fracslice.printing.samples import Samples
 from fracslice.printing.thin_features import OffsetField
+from fracslice.printing.walls import Samples
 from fracslice.volume import Bricks, Lattice, sample
 
 Values = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]

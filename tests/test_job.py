@@ -29,7 +29,7 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.jobs import surfaces
+from fracslice.jobs import mesh_steps
 from fracslice.jobs.mesh import import_ahead
 from fracslice.scene import Print, read, scene
 
@@ -176,7 +176,7 @@ def test_scenes_without_a_finite_surface_are_refused(node, message):
 
 
 def test_what_does_not_fit_in_memory_is_refused_before_it_is_meshed(monkeypatch):
-    monkeypatch.setattr("fracslice.jobs.surfaces.available_bytes", lambda: 1 << 27)
+    monkeypatch.setattr("fracslice.jobs.mesh_steps.available_bytes", lambda: 1 << 27)
     with pytest.raises(
         VolumeError, match=r"a voxel of .*mm needs about .* GB .* a voxel of ([0-9.]+)mm fits"
     ) as caught:
@@ -189,7 +189,7 @@ def test_the_memory_of_a_mesh_follows_its_vertices():
     """All vertices of a ball but a few are on grid edges."""
     result = make_mesh(BALL, MeshJob(resolution=96))
     signs = result.bricks.signs
-    counted = surfaces.crossings_a_brick(signs) * len(signs)
+    counted = mesh_steps.crossings_a_brick(signs) * len(signs)
     assert counted == pytest.approx(result.report.mesh.vertices, rel=0.05)
 
 

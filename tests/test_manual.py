@@ -133,7 +133,7 @@ def test_commands_are_understood(line: str, folder: Path, monkeypatch, capfd) ->
         return
     for work in (
         "jobs.mesh.make_mesh",
-        "mesh.repair.repair",
+        "mesh.checks.repair",
         "jobs.mesh.make_implicit",
         "slicing.plan_stack",
         "jobs.slices.plan_layers",

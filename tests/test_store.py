@@ -15,7 +15,7 @@ from fracslice.fields.cpu import compile_scene
 from fracslice.fields.field import Field
 from fracslice.formulas import Box, Node, mandelbulb, offset, sphere
 from fracslice.printing.edits import EditedField
-from fracslice.printing.samples import Samples
+from fracslice.printing.walls import Samples
 from fracslice.scene import scene
 from fracslice.store import Store
 from fracslice.volume import Lattice, Plan, sample, sample_scene

@@ -23,7 +23,7 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.jobs import surfaces
+from fracslice.jobs import mesh_steps
 from fracslice.mesh.models import read_mesh
 from fracslice.scene import Print, scene
 from fracslice.work import Work
@@ -72,8 +72,8 @@ CASES = [
 @pytest.fixture
 def pieces(monkeypatch: pytest.MonkeyPatch) -> None:
     """No mesh fits in memory, and pieces are small."""
-    monkeypatch.setattr(surfaces, "available_bytes", lambda: 1)
-    monkeypatch.setattr(surfaces, "BRICKS", 20)
+    monkeypatch.setattr(mesh_steps, "available_bytes", lambda: 1)
+    monkeypatch.setattr(mesh_steps, "BRICKS", 20)
 
 
 @pytest.mark.parametrize(("name", "job"), CASES)
@@ -215,8 +215,7 @@ def test_cancelled_leaves_nothing(stage: str, pieces: None, tmp_path: Path) -> N
 def test_the_volume_of_a_speck_far_from_the_origin(most: int) -> None:
     """A single sample inside: the octahedron around it has 1e-12 of a voxel, and its sign."""
     from fracslice.mesh.contouring import contour_pieces
-    from fracslice.mesh.pieces import Pieces
-    from fracslice.mesh.shells import survey
+    from fracslice.mesh.shells import Pieces, survey
     from fracslice.volume import SignBricks
 
     signs = np.zeros((2, 8, 8), np.uint8)

@@ -17,7 +17,6 @@ from fracslice.bench.measurements import BenchmarkTask
 from fracslice.checks.problems import Limits
 from fracslice.common.parameters import AUTO, REQUIRED, Count, Number, Vector
 from fracslice.errors import FracsliceError
-from fracslice.export.resins import Resin
 from fracslice.fields.devices import choose_device
 from fracslice.fields.registry import Formula
 from fracslice.formulas import Node, names, sphere
@@ -27,6 +26,7 @@ from fracslice.rendering import Renderer
 from fracslice.scene import Print, parse_length, scene
 from fracslice.scene.view import PARTS, Camera, Film, View
 from fracslice.slicing import SliceJob, adapted, plan_stack
+from fracslice.slicing.printers import Resin
 from fracslice.slicing.raster import Screen
 from fracslice.viewer import picture
 

@@ -1,7 +1,6 @@
 """Films: a scene over time, its frames and their files."""
 
-from .encode import ENDINGS, check_film, encode, sheet_frames
-from .film import FilmJob, write_frames
+from .film import ENDINGS, FilmJob, check_film, encode, sheet_frames, write_frames
 from .timeline import Timeline, with_flight
 
 __all__ = [

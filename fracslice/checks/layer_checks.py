@@ -9,10 +9,20 @@ from typing import Any
 import numpy as np
 
 from ..printing.walls import Widths, widths_of
-from ..slicing.feature_graph import Feature, Graph, Neck, Overhang, farthest, unsupported_pixels, weakest
+from ..slicing.feature_graph import (
+    Feature,
+    Graph,
+    LayerComponents,
+    Neck,
+    Overhang,
+    farthest,
+    layer_components,
+    unsupported_pixels,
+    weakest,
+    widths,
+)
 from ..slicing.layers import Layer, Slicer
 from ..slicing.printers import Printer
-from ..slicing.runs import LayerComponents, layer_components, widths
 from ..slicing.stack import Stack
 from ..work import Work
 from . import checks_of, problems_of

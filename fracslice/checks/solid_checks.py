@@ -11,9 +11,8 @@ import numpy as np
 from ..common.messages import format_count, place, significant
 from ..fields.box import Box, Triple
 from ..fields.field import Field
-from ..printing.samples import Samples
 from ..printing.thin_features import narrow_holes, sampled_object, thin_features
-from ..printing.walls import BINS, Measure, Walls, Widths, project_faces, walls_of, widths_of
+from ..printing.walls import BINS, Measure, Samples, Walls, Widths, project_faces, walls_of, widths_of
 from ..volume import Bricks, Drain
 from ..work import Work
 from . import problems_of

@@ -1,9 +1,8 @@
 """One job on several machines: tasks are made by workers, and their results are files that all can reach."""
 
-from .connection import connect
 from .pool import Pool, Shard, Task
 from .result_folder import PAGE, Contents, Files, ResultFolder, pack_arrays, unpack_arrays
-from .workers import HIDDEN, Workers
+from .workers import HIDDEN, Workers, connect
 
 __all__ = [
     "HIDDEN",

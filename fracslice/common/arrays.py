@@ -1,14 +1,23 @@
-"""Arrays: quantiles, records of arrays of equal length, the transfer function of sRGB, other libraries."""
+"""Arrays: quantiles, records of arrays, linear algebra, triangles with shared vertices, sRGB, other
+libraries.
+
+Linear algebra libraries choose the summation order and fused operations by processor. With them, a rotated
+scene would have other parameters, and its mesh other last bits, on another machine.
+"""
 
 from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
-from typing import Any, Self
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import trimesh
 
 
 def quantile(values: np.ndarray, share: float) -> float:
@@ -78,3 +87,191 @@ def of_library(values: np.ndarray, given: Any) -> Any:
         return values
     library = sys.modules[type(given).__module__.partition(".")[0]]
     return library.from_dlpack(values) if hasattr(library, "from_dlpack") else values
+
+
+SWEEPS = 60
+SMALL = 2.0**-52
+
+
+def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Matrix product.
+
+    `a`: matrix; `b`: matrix or vector.
+    """
+    terms = [np.multiply.outer(a[:, k], b[k]) for k in range(a.shape[1])]
+    total: np.ndarray = terms[0]
+    for term in terms[1:]:
+        total = total + term
+    return total
+
+
+def dot(a: np.ndarray, b: np.ndarray) -> float:
+    """Inner product of two vectors of equal length."""
+    total = 0.0
+    for x, y in zip(a.tolist(), b.tolist(), strict=True):
+        total += x * y
+    return total
+
+
+def length(vector: np.ndarray) -> float:
+    """Euclidean norm of a vector."""
+    return math.sqrt(dot(vector, vector))
+
+
+def inverse(matrix: np.ndarray) -> np.ndarray:
+    """Inverse by Gauss-Jordan elimination with partial pivoting."""
+    rows = np.hstack([np.asarray(matrix, float), np.eye(3)])
+    for k in range(3):
+        pivot = k + int(np.abs(rows[k:, k]).argmax())
+        rows[[k, pivot]] = rows[[pivot, k]]
+        rows[k] = rows[k] / rows[k, k]
+        for other in {0, 1, 2} - {k}:
+            rows[other] = rows[other] - rows[other, k] * rows[k]
+    return rows[:, 3:]
+
+
+def stretches(matrix: np.ndarray) -> np.ndarray:
+    """Singular values, in descending order.
+
+    One-sided Jacobi rotations make the columns orthogonal (Hestenes 1958, "Inversion of matrices by
+    biorthogonalization and related results").
+    """
+    columns = np.array(matrix, float).T.copy()
+    for _ in range(SWEEPS):
+        turned = False
+        for p, q in ((0, 1), (0, 2), (1, 2)):
+            a, b = dot(columns[p], columns[p]), dot(columns[q], columns[q])
+            both = dot(columns[p], columns[q])
+            if abs(both) <= SMALL * math.sqrt(a * b):
+                continue
+            half = (b - a) / (2 * both)
+            tangent = math.copysign(1 / (abs(half) + math.sqrt(1 + half * half)), half)
+            cosine = 1 / math.sqrt(1 + tangent * tangent)
+            sine = cosine * tangent
+            one, other = columns[p], columns[q]
+            columns[p], columns[q] = cosine * one - sine * other, sine * one + cosine * other
+            turned = True
+        if not turned:
+            break
+    return np.sort([length(column) for column in columns])[::-1]
+
+
+def rotation(rotate: Sequence[float]) -> np.ndarray:
+    """Rotation matrix of an axis and an angle in degrees, by Rodrigues' formula."""
+    axis = np.array(rotate[:3]) / length(np.array(rotate[:3]))
+    angle = math.radians(rotate[3])
+    cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    turn: np.ndarray = np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * product(cross, cross)
+    return turn
+
+
+def affine(values: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    """Affine map of a `transform`: of its rotation, scale, translation and matrix.
+
+    Returns float64.
+    """
+    linear = np.diag(np.broadcast_to(np.array(values["scale"]), 3))
+    if values["rotate"]:
+        linear = product(rotation(values["rotate"]), linear)
+    offset = np.array(values["translate"])
+    if values["matrix"]:
+        given = np.array(values["matrix"][:12]).reshape(3, 4)
+        offset = offset + product(linear, given[:, 3])
+        linear = product(linear, given[:, :3])
+    return linear, offset
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Triangles:
+    """Triangles as they are in a file. `Mesh` adds measures and checks of the arrays."""
+
+    vertices: NDArray[np.float64]  # positions, (n, 3)
+    triangles: NDArray[np.int32]  # vertex indices, (m, 3), counter-clockwise seen from outside
+    colours: NDArray[np.uint8] | None = None  # of the vertices, sRGB, (n, 3)
+    scalars: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)  # of the vertices, (n,)
+
+    @property
+    def _arrays(self) -> tuple[Any, ...]:
+        """Values of the fields."""
+        return self.vertices, self.triangles, self.colours, dict(self.scalars)
+
+    def in_order(self) -> Triangles:
+        """Sort the vertices by their first use, so that the triangles alone determine the arrays."""
+        from .._native import in_order
+
+        return self._taken(*in_order(self.triangles, len(self.vertices)))
+
+    def _taken(self, index: NDArray[Any], triangles: NDArray[np.int32]) -> Triangles:
+        """Triangles of some of the vertices, with their colours and scalars.
+
+        `index`: int (k,), of the vertices; `triangles`: int32 (m, 3), of their numbers among these.
+        """
+        colours = None if self.colours is None else self.colours[index]
+        scalars = {name: values[index] for name, values in self.scalars.items()}
+        return Triangles(self.vertices[index], triangles, colours, scalars)
+
+    def to_trimesh(self) -> trimesh.Trimesh:
+        """Copy of the mesh as a `trimesh.Trimesh`, unprocessed.
+
+        Returns
+        -------
+        trimesh.Trimesh
+            The same vertices and triangles; colours and, as vertex attributes, scalars.
+        """
+        import trimesh
+
+        return trimesh.Trimesh(
+            self.vertices.copy(),
+            self.triangles.copy(),
+            process=False,
+            vertex_colors=None if self.colours is None else self.colours.copy(),
+            vertex_attributes={name: values.copy() for name, values in self.scalars.items()},
+        )
+
+
+T = TypeVar("T", bound=Triangles)
+
+NO_TRIANGLES = Triangles(np.empty((0, 3)), np.empty((0, 3), np.int32))
+
+
+def concatenate(parts: Sequence[T]) -> T:
+    """Concatenate triangles without welding, and without colours and scalars."""
+    offsets = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
+    triangles = [part.triangles + np.int32(offset) for part, offset in zip(parts, offsets, strict=True)]
+    return type(parts[0])(np.concatenate([part.vertices for part in parts]), np.concatenate(triangles))
+
+
+def count(part: Triangles) -> int:
+    """Number of vertices and triangles."""
+    return len(part.vertices) + len(part.triangles)
+
+
+def fans(lengths: NDArray[np.integer], corners: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Triangles of polygons, each from its first corner.
+
+    `lengths`: number of corners of each polygon. Returns int32 (m, 3).
+    """
+    lengths = lengths.astype(np.int64)
+    triangles = np.maximum(lengths - 2, 0)
+    first = np.repeat(np.cumsum(lengths) - lengths, triangles)
+    second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(triangles) - triangles, triangles)
+    result: NDArray[np.int32] = corners[np.stack([first, second, second + 1], axis=1)]
+    return result
+
+
+def moved(part: Triangles, vertices: NDArray[np.float64], matrix: NDArray[np.float64]) -> Triangles:
+    """Triangles with the vertices that a transform gives them; a mirror image is turned inside out again.
+
+    `matrix`: its linear part, (3, 3).
+    """
+    order = -1 if np.linalg.det(matrix) < 0 else 1
+    return Triangles(vertices, part.triangles[:, ::order])
+
+
+DEEPEST, MOST_PARTS = 32, 1 << 16
+"""Limits for a file that places parts: levels of nesting, and number of nodes, parts and their uses."""
+
+LARGEST, COPIES = 1 << 21, 64
+"""Vertices, triangles and parts that it may make, and how many times those of the file. A few lines could ask
+for any number.
+"""

@@ -24,9 +24,8 @@ from ..common.parameters import printable
 from ..errors import ExportError
 from ..slicing import Layer
 from ..slicing.layers import Pictures
-from ..slicing.printers import Printer
+from ..slicing.printers import Printer, Resin
 from ..work import ahead, in_background
-from .resins import Resin
 from .resuming import Journal, journal, resumable_folder
 from .slice_run import Encode, SliceRun, begin, encoded_layers
 

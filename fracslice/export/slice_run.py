@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 from ..common.cache import key, program
 from ..common.messages import format_count
 from ..errors import ClusterError, ExportError, SharedError, SliceError
-from ..expr.host import toolchain
+from ..expr.runtime import toolchain
 from ..records import SECTIONS
 from ..slicing import Layer, Slicer, Stack
 from ..slicing.layers import SLAB, MeanSlicer, Pictures
+from ..slicing.printers import Resin
 from ..slicing.raster import Screen
 from ..work import Work
-from .resins import Resin
 from .resuming import Journal, whole_layers
 
 if TYPE_CHECKING:

@@ -23,7 +23,6 @@ from typing import Any, NoReturn
 
 from ..errors import KernelError
 from . import vocabulary
-from .functions import fingerprint, identity, is_number, parameters, scope
 from .graph import (
     Block,
     FlowGraph,
@@ -35,7 +34,20 @@ from .graph import (
     Writer,
     identified,
 )
-from .language import HIGHEST, body_of, check, depends_on_points, intrinsic_name, parse, stored_names
+from .language import (
+    HIGHEST,
+    body_of,
+    check,
+    depends_on_points,
+    fingerprint,
+    identity,
+    intrinsic_name,
+    is_number,
+    parameters,
+    parse,
+    scope,
+    stored_names,
+)
 from .loops import OPERATIONS, Loop, is_intrinsic
 
 OPERATORS: dict[type, str] = {

@@ -1,6 +1,6 @@
 """Loops around a field, the entry points of a compiled kernel, and the intrinsics that they use.
 
-A loop is a Python function that uses the intrinsics of formulas and of `intrinsics`, ``while``, array
+A loop is a Python function that uses the intrinsics of formulas and of render units, ``while``, array
 elements, and the numbers and functions of its module. It becomes a C function.
 
 Here they are implemented on NumPy arrays, so that a loop also runs as plain Python: lanes are a slice, and P

@@ -1,4 +1,4 @@
-"""Elementary functions on one thread of an NVIDIA GPU, as those of `lanes_math` on lanes.
+"""Elementary functions on one thread of an NVIDIA GPU, as those of `lanes` on lanes.
 
 No fast-math flag is set: these flags let the compiler assume that there is no NaN and no infinity, and
 reorder sums (a Mandelbulb rendered that way loses its normals). Instead each function names its instruction.
@@ -13,12 +13,12 @@ import math
 
 from llvmlite import ir
 
-from . import lanes_math
-from .lanes_math import absolute as absolute
-from .lanes_math import cell_extent as cell_extent
-from .lanes_math import cell_middle as cell_middle
-from .lanes_math import floor as floor
-from .registers import Vec
+from . import lanes
+from .lanes import Vec
+from .lanes import absolute as absolute
+from .lanes import cell_extent as cell_extent
+from .lanes import cell_middle as cell_middle
+from .lanes import floor as floor
 
 
 def _instruction(name: str, a: Vec, *others: Vec) -> Vec:
@@ -33,7 +33,7 @@ def _instruction(name: str, a: Vec, *others: Vec) -> Vec:
 
 def sqrt(a: Vec) -> Vec:
     """Return the square root."""
-    return _instruction("sqrt.approx.ftz.f32", a) if a.bits == 32 else lanes_math.sqrt(a)
+    return _instruction("sqrt.approx.ftz.f32", a) if a.bits == 32 else lanes.sqrt(a)
 
 
 def rsqrt(a: Vec) -> Vec:
@@ -67,25 +67,25 @@ def ratio(a: Vec, b: Vec) -> Vec:
 
 def minimum(a: Vec, b: Vec) -> Vec:
     """Return the smaller number, or NaN: a point at infinity is not inside."""
-    return a.call("minimum", b) if a.bits == 32 else lanes_math.minimum(a, b)
+    return a.call("minimum", b) if a.bits == 32 else lanes.minimum(a, b)
 
 
 def maximum(a: Vec, b: Vec) -> Vec:
     """Return the larger number, or NaN."""
-    return a.call("maximum", b) if a.bits == 32 else lanes_math.maximum(a, b)
+    return a.call("maximum", b) if a.bits == 32 else lanes.maximum(a, b)
 
 
 def log(x: Vec) -> Vec:
     """Return the natural logarithm."""
-    return _instruction("lg2.approx.ftz.f32", x) * math.log(2) if x.bits == 32 else lanes_math.log(x)
+    return _instruction("lg2.approx.ftz.f32", x) * math.log(2) if x.bits == 32 else lanes.log(x)
 
 
 def exp(x: Vec) -> Vec:
     """Return e^x: 2^n by the exponent, and a power of 2 up to a half in size."""
     if x.bits == 64:
-        return lanes_math.exp(x)
+        return lanes.exp(x)
     n = floor(x * (1 / math.log(2)) + 0.5)
-    rest = (x - n * lanes_math.LN2_HI[32]) - n * lanes_math.LN2_LO[32]
+    rest = (x - n * lanes.LN2_HI[32]) - n * lanes.LN2_LO[32]
     return _instruction("ex2.approx.ftz.f32", rest * (1 / math.log(2))) * _instruction(
         "ex2.approx.ftz.f32", n
     )
@@ -98,12 +98,12 @@ _COS = [2.48015873e-05, -1.38888889e-03, 4.16666667e-02]
 
 def sin(x: Vec) -> Vec:
     """Return the sine for |x| up to about 10^4."""
-    return lanes_math.sine(x, 0, _SIN, _COS) if x.bits == 32 else lanes_math.sin(x)
+    return lanes.sine(x, 0, _SIN, _COS) if x.bits == 32 else lanes.sin(x)
 
 
 def cos(x: Vec) -> Vec:
     """Return the cosine for |x| up to about 10^4."""
-    return lanes_math.sine(x, 1, _SIN, _COS) if x.bits == 32 else lanes_math.cos(x)
+    return lanes.sine(x, 1, _SIN, _COS) if x.bits == 32 else lanes.cos(x)
 
 
 _ATAN = [
@@ -116,13 +116,13 @@ _ATAN = [
 def atan2(y: Vec, x: Vec) -> Vec:
     """Return the angle of (x, y), in (-pi, pi]; 0 at the origin."""
     if x.bits == 64:
-        return lanes_math.atan2(y, x)
+        return lanes.atan2(y, x)
     ax, ay = absolute(x), absolute(y)
     steep = ay > ax
     low, high = steep.choose(ax, ay), steep.choose(ay, ax)
     t = divide(low, maximum(high, high.const(1e-30)))
     z = t * t
-    angle = t + t * (z * lanes_math.polynomial(z, _ATAN))
+    angle = t + t * (z * lanes.polynomial(z, _ATAN))
     angle = steep.choose(math.pi / 2 - angle, angle)
     angle = (x < 0.0).choose(math.pi - angle, angle)
     return (y < 0.0).choose(-angle, angle)

@@ -3,7 +3,7 @@ arithmetic of scalars.
 
 Lanes and masks are `Vec`, a few registers; on cells, pairs of these (`intervals`). A scalar is one LLVM
 value, the same for all lanes: see `scalars`.
-There is no fast-math: results do not depend on the code around an operation (`registers` describes how
+There is no fast-math: results do not depend on the code around an operation (`lanes` describes how
 products are fused), and NaN and infinity are handled.
 
 Scalars mix as NumPy's do: an operation with a float literal is computed in 64 bits, and rounded once where it
@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 
-from . import lanes_math, thread_math
+from . import lanes, thread_math
 from .graph import MismatchError
 from .intervals import TINY, Interval, Numbers, Possible
-from .registers import Vec, splat, vector
+from .lanes import Vec, splat, vector
 
 BOOL, WHOLE, FLOAT, DOUBLE = ir.IntType(1), ir.IntType(64), ir.FloatType(), ir.DoubleType()
 
@@ -136,8 +136,8 @@ Value = Any
 
 
 LANES = {
-    32: Numbers(lanes_math, 2.0**-23, 1e37, TINY[32], Vec.const),
-    64: Numbers(lanes_math, 2.0**-52, 1e300, TINY[64], Vec.const),
+    32: Numbers(lanes, 2.0**-23, 1e37, TINY[32], Vec.const),
+    64: Numbers(lanes, 2.0**-52, 1e300, TINY[64], Vec.const),
 }
 """Bounds of intervals by the width of floats."""
 
@@ -159,7 +159,7 @@ class Lanes:
     @property
     def math(self) -> ModuleType:
         """Elementary functions."""
-        return thread_math if self.on_gpu else lanes_math
+        return thread_math if self.on_gpu else lanes
 
     @property
     def scalar(self) -> ir.Type:

@@ -10,9 +10,9 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..common.arrays import length
 from ..common.parameters import Triple as Triple
 from ..expr.intervals import ARRAYS, Interval
-from .algebra import length
 
 
 @dataclass(frozen=True)

@@ -15,11 +15,10 @@ import numpy as np
 from ..common.cache import Kept, cache_folder, key
 from ..expr.frontend import loop_function
 from ..expr.graph import Program
-from ..expr.host import REGISTERS, host, lane_count, toolchain
 from ..expr.loops import Loop, bricks, points
-from ..expr.machine import CompiledFunction, constant, load_object
+from ..expr.runtime import REGISTERS, CompiledFunction, constant, host, lane_count, load_object, toolchain
 from .field import Kernel, Loops, Precision
-from .linker import Linked, link
+from .linker import Linked
 
 if TYPE_CHECKING:
     from .node import Node
@@ -34,7 +33,7 @@ def object_code(program: Program, bits: int, width: int, loops: Sequence[Loop]) 
     name = f"{key(*about, bits, width, toolchain())}.o"
 
     def compiled() -> bytes:
-        from ..expr.compiler import Target, compile_object
+        from ..expr.emitter import Target, compile_object
 
         return compile_object(program, Target(bits, width, min(REGISTERS, width), *host()), loops)
 
@@ -117,7 +116,7 @@ def compile_scene(root: Node, precision: Precision = "float32") -> CpuKernel:
     KernelError
         If the scene cannot be linked or compiled.
     """
-    return _kernel(link(root), precision)
+    return _kernel(root.linked, precision)
 
 
 @dataclass(frozen=True, eq=False)

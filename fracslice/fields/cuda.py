@@ -20,10 +20,10 @@ from ..expr import cuda_driver
 from ..expr.cuda_driver import DeviceArray, address, device_array, require, to_device
 from ..expr.frontend import loop_function
 from ..expr.graph import Program
-from ..expr.host import toolchain
 from ..expr.loops import OWN, Loop, bricks, element_type, is_array, points
+from ..expr.runtime import toolchain
 from .field import Kernel, Loops, Precision
-from .linker import Linked, link
+from .linker import Linked
 
 if TYPE_CHECKING:
     from .node import Node
@@ -86,7 +86,7 @@ def machine_code(program: Program, precision: Precision, loops: tuple[Loop, ...]
     name = f"{key(*about, precision, capability, toolchain())}.cubin"
 
     def compiled() -> bytes:
-        from ..expr.compiler import compile_ptx
+        from ..expr.emitter import compile_ptx
 
         bits = 8 * np.dtype(precision).itemsize
         ptx = compile_ptx(program, bits, capability, loops)
@@ -165,7 +165,7 @@ _kernel = lru_cache(maxsize=32)(CudaKernel)
 
 def compile_scene(root: Node, precision: Precision = "float32") -> CudaKernel:
     """Compile the kernel of a scene tree for the GPU; see `cpu.compile_scene`."""
-    return _kernel(link(root), precision)
+    return _kernel(root.linked, precision)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,11 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from ..common.arrays import quantile
+from ..common.arrays import affine, quantile, stretches
 from ..common.parameters import AUTO, Count
 from ..errors import EmptyError
-from ..expr.host import keep_text, kept_text
-from .algebra import affine, stretches
+from ..expr.runtime import keep_text, kept_text
 from .box import possible_cells
 from .cpu import compile_scene
 from .registry import Node

@@ -24,9 +24,8 @@ import numpy as np
 from ..common.parameters import AUTO
 from ..errors import KernelError
 from ..expr.frontend import FormulaReader, formula, text_function
-from ..expr.functions import Fixed, InMemory, OfPoint, words
 from ..expr.graph import FlowGraph, Function, Program, Value, Width, Writer, identified, written
-from ..expr.language import CHILD
+from ..expr.language import CHILD, Fixed, InMemory, OfPoint, words
 
 if TYPE_CHECKING:
     from .node import Node

@@ -29,6 +29,7 @@ from .field import Bounds, Cells, Device, Field, Kernel, Loops, Precision
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from .linker import Linked
     from .registry import Formula
 
 FORMULAS: dict[str, Formula] = {}
@@ -656,6 +657,13 @@ class Node(Operators, Field):
         measured = dict.fromkeys([*names, *([self.formula.name] if is_measured else [])])
         return Bounds(box, slope, exterior_only, steepening, tuple(boxless), tuple(measured))
 
+    @cached_property
+    def linked(self) -> Linked:
+        """Functions and numbers of the tree, whose depths are resolved; see `linker.link`."""
+        from .linker import link
+
+        return link(self)
+
     def _hooked(self, name: str, default: Any, *arguments: Any) -> Any:
         """Value of a hook of the formula, or the default of a formula without it."""
         hook = self.formula.hooks.get(name)
@@ -673,22 +681,22 @@ class Node(Operators, Field):
     @property
     def key(self) -> str:
         # all depths must be resolved, as for kernels and loops
-        from .tree import key
+        from .devices import key
 
         return key(self)
 
     def kernel(self, device: Device = "cpu", precision: Precision = "float32") -> Kernel:
-        from .tree import kernel
+        from .devices import kernel
 
         return kernel(self, device, precision)
 
     def cells(self, precision: Precision = "float32") -> Cells | None:
-        from .tree import cells
+        from .devices import cells
 
         return cells(self, precision)
 
     def loops(self, loops: Sequence[Any], precision: Precision, device: Device = "cpu") -> Loops:
-        from .tree import linked_loops
+        from .devices import linked_loops
 
         return linked_loops(self, loops, precision, device)
 

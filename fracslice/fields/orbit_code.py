@@ -2,7 +2,7 @@
 
 A round of an orbit takes its steps one after the other. The solid of N rounds is ``{p : |w_N(p)| <= R}`` for
 the radius R beyond which no orbit comes back. The field is ``(|w| - R) / |w'|`` where the orbit stops if
-rounds grow linearly, and that of the potential (`fields.escape`) if they grow by a power. The derivative is
+rounds grow linearly, and that of the potential (`fields.maps`) if they grow by a power. The derivative is
 bounded by the stretch of each step: ``dr -> s dr + t``, where t is the stretch by the constant.
 
 The derivative bounds how far a point of the orbit moves only near the start point; the bend, a majorant of
@@ -18,14 +18,12 @@ from dataclasses import astuple, dataclass
 from functools import lru_cache
 from typing import Any
 
-from ..expr import functions
+from ..expr import language
 from ..expr.frontend import formula, text_function
-from ..expr.functions import identity
 from ..expr.graph import Function
-from ..expr.host import kept_text
-from ..expr.language import parse_expression
-from .escape import potential_distance, sure_distance
-from .maps import MAJORANTS, RIGID
+from ..expr.language import identity, parse_expression
+from ..expr.runtime import kept_text
+from .maps import MAJORANTS, RIGID, potential_distance, sure_distance
 from .steps import Step, trace
 
 
@@ -89,7 +87,7 @@ class Code:
 
     def traced(self, place: int) -> Step:
         """Straight-line code of the step at a place in the round."""
-        return _trace_step(self, place, functions.fingerprint(self.step))
+        return _trace_step(self, place, language.fingerprint(self.step))
 
     def is_fixed(self, place: int) -> bool:
         """True if the step is the same map for all start points, as in a Julia set."""
@@ -196,7 +194,7 @@ class Form:
     scaled: bool = False  # true if the potential is that of ``scale |w|`` after each step
     # true if critical points may be outside, for constants that are the same at all points
     critical: bool = True
-    # true if the field stays below twice the sure distance (`fields.escape.sure_distance`)
+    # true if the field stays below twice the sure distance (`fields.maps.sure_distance`)
     sure: bool = False
     torn: bool = False  # true if it stays below twice the sure distance to the tears of the steps
     blind: bool = False  # true if it is at most 0
@@ -208,7 +206,7 @@ class Form:
 
 def field(steps: Round, form: Form) -> Function:
     """Write the function of an orbit's field."""
-    return _field(steps, form, tuple(functions.fingerprint(code.step) for code in steps))
+    return _field(steps, form, tuple(language.fingerprint(code.step) for code in steps))
 
 
 @lru_cache(maxsize=256)

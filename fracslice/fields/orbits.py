@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from ..common.arrays import affine, inverse, product, stretches
 from ..common.parameters import AUTO, Count, Parameter, Vector
-from ..expr.functions import Fixed
 from ..expr.graph import Function
-from .algebra import affine, inverse, product, stretches
+from ..expr.language import Fixed
 from .box import Box
 from .growth import Growth, arguments, growth, proved_box, sign, sign_arguments
 from .orbit_code import Code, field

@@ -23,7 +23,7 @@ from typing import Any, Literal, TypeVar
 
 from ..common.parameters import REQUIRED, Parameter, python_name, validate_value
 from ..errors import FracsliceError, FracsliceWarning, SceneError
-from ..expr.functions import Fixed as Fixed
+from ..expr.language import Fixed as Fixed
 from .box import Box
 from .node import FORMULAS, bind_arguments, docstring, ordered_parameters, signature
 from .node import Node as Node

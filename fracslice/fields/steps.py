@@ -22,11 +22,10 @@ from math import isfinite, nan
 from typing import Any, cast
 
 from ..errors import KernelError
-from ..expr import functions, graph
+from ..expr import graph, language
 from ..expr.frontend import FormulaReader, Source, source_function
-from ..expr.functions import EVALUATED
 from ..expr.graph import MismatchError
-from ..expr.language import parse, parse_expression
+from ..expr.language import EVALUATED, parse, parse_expression
 from .maps import CENTRAL, LENGTHS, MAJORANTS, RIGID
 
 Terms = dict[tuple[str, ...], float]
@@ -115,7 +114,7 @@ Stretch = tuple[str | None, str | None]
 
 
 Majorant = tuple[str | None, str | None]
-"""Bend by w (`fields.escape.sure_distance`), and distance to the nearest tear; None is none."""
+"""Bend by w (`fields.maps.sure_distance`), and distance to the nearest tear; None is none."""
 
 
 @dataclass(frozen=True)
@@ -454,7 +453,7 @@ def trace(
     constant = tape.variable(f"cx{place} cy{place} cz{place}", 3, f"rc{place}")
     env: dict[str, Value] = {"w": tape.variable("x y z", 0, f"rw{place}"), "c": constant}
     env |= {name: _argument(f"v{place}_{name}", size) for name, size in parameters.items()}
-    names = functions.parameters(function)
+    names = language.parameters(function)
     if names[:2] != ["w", "c"] or {*names[2:]} != {*parameters, *fixed}:
         line = f"{function.__code__.co_filename}:{function.__code__.co_firstlineno}"
         wanted = ", ".join(("w", "c", *parameters, *fixed))
@@ -493,7 +492,7 @@ class StepReader(FormulaReader):
         match node:
             case ast.Call(ast.Name(name), arguments) if self.outside(name) in EVALUATED:
                 values = map(self.known, arguments)
-                return self.scope[name](*(v if functions.is_number(v) else nan for v in values))
+                return self.scope[name](*(v if language.is_number(v) else nan for v in values))
         return super().known(node)
 
     def read_statement(self, node: ast.stmt) -> bool:
@@ -517,10 +516,10 @@ class StepReader(FormulaReader):
 
     def call_function(self, called: Callable[..., Any], arguments: list[ast.expr]) -> graph.Value:
         """A call of a verb; what is known is fixed in it."""
-        names, known = functions.parameters(called), [self.known(argument) for argument in arguments]
+        names, known = language.parameters(called), [self.known(argument) for argument in arguments]
         pairs = list(zip(names, known, strict=False))
-        fixed = {name: value for name, value in pairs if functions.is_number(value)}
-        passed = [a for a, value in zip(arguments, known, strict=True) if not functions.is_number(value)]
+        fixed = {name: value for name, value in pairs if language.is_number(value)}
+        passed = [a for a, value in zip(arguments, known, strict=True) if not language.is_number(value)]
         return self.call_counted(step_function(called, {}, fixed), list(map(self.value, passed)))
 
 
@@ -542,7 +541,7 @@ class Verb:
     def values(self, given: Sequence[Any]) -> list[Any]:
         """Return all arguments in order, from those that are not known."""
         rest = iter(given)
-        names = functions.parameters(self.function)
+        names = language.parameters(self.function)
         return [self.fixed[name] if name in self.fixed else next(rest) for name in names]
 
 
@@ -666,9 +665,9 @@ class _Follower(graph.Evaluator):
 
     def followed(self, function: Callable[..., Any], values: Sequence[Any]) -> Any:
         """Follow a function of all values, some of which are known numbers."""
-        names = functions.parameters(function)
-        fixed = {n: v for n, v in zip(names, values, strict=True) if functions.is_number(v)}
-        given = [v for v in values if not functions.is_number(v)]
+        names = language.parameters(function)
+        fixed = {n: v for n, v in zip(names, values, strict=True) if language.is_number(v)}
+        given = [v for v in values if not language.is_number(v)]
         return self(step_function(function, {}, fixed), *given)
 
     def intrinsic(self, name: str, given: list[Value]) -> Value:

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from ..common.parameters import Number, short_repr
 from ..errors import SceneError
 from ..expr.frontend import formula
-from ..expr.functions import OfPoint
 from ..expr.graph import Evaluator
 from ..expr.intervals import ARRAYS, Interval
+from ..expr.language import OfPoint
 from .box import Box
 from .definitions import Definition
 from .definitions import formula as defined

@@ -20,9 +20,8 @@ from xml.parsers import expat
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.files import open_regular
-from ..common.packages import HEAD, Fragment, Text, append, deflate, join, number_rows, rows
-from ..common.triangles import COPIES, DEEPEST, LARGEST, MOST_PARTS, Triangles, concatenate, count, moved
+from ..common.arrays import COPIES, DEEPEST, LARGEST, MOST_PARTS, Triangles, concatenate, count, moved
+from ..common.files import HEAD, Fragment, Text, append, deflate, join, number_rows, open_regular, rows
 from ..errors import MeshError
 from ..work import Work
 from . import MeshFormat
@@ -305,14 +304,15 @@ class _Package:
 
         An unknown object, and components nested too deep, are refused.
         """
-        if name in self.meshes and depth <= DEEPEST:
-            if name not in known:
-                inner = [self.size(part, known, depth + 1) for part, _ in self.parts[name]]
-                sizes, levels = zip((count(self.meshes[name]), -1), *inner, strict=True)
-                known[name] = 1 + sum(sizes), 1 + max(levels)
-            if depth + known[name][1] <= DEEPEST:
-                return known[name]
-        raise MeshError(f"not a valid 3MF file: no such object: {name[1]}")
+        if name not in self.meshes:
+            raise MeshError(f"not a valid 3MF file: no such object: {name[1]}")
+        if name not in known and depth <= DEEPEST:
+            inner = [self.size(part, known, depth + 1) for part, _ in self.parts[name]]
+            sizes, levels = zip((count(self.meshes[name]), -1), *inner, strict=True)
+            known[name] = 1 + sum(sizes), 1 + max(levels)
+        if depth + known.get(name, (0, 1))[1] > DEEPEST:
+            raise MeshError(f"not a valid 3MF file: components are nested more than {DEEPEST} deep")
+        return known[name]
 
     def placed(self, name: _Name, matrix: NDArray[np.float64]) -> Triangles:
         """An object with its components, in the frame of the build."""

@@ -15,7 +15,7 @@ from ..errors import ExportError
 from ..version import APPLICATION
 
 if TYPE_CHECKING:
-    from ..common.triangles import Triangles
+    from ..common.arrays import Triangles
     from ..work import Work
 
 __all__ = ["ENDINGS", "SOLIDS", "MeshFormat", "check_format", "mesh_format", "write"]

@@ -15,9 +15,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import to_linear
-from ..common.files import read_bytes
-from ..common.triangles import (
+from ..common.arrays import (
     COPIES,
     DEEPEST,
     LARGEST,
@@ -27,7 +25,9 @@ from ..common.triangles import (
     concatenate,
     count,
     moved,
+    to_linear,
 )
+from ..common.files import read_bytes
 from ..errors import ExportError, MeshError
 from ..work import Work
 from . import MeshFormat

@@ -12,9 +12,8 @@ from typing import BinaryIO
 
 import numpy as np
 
-from ..common.files import read_bytes
-from ..common.packages import number_rows
-from ..common.triangles import Triangles, fans
+from ..common.arrays import Triangles, fans
+from ..common.files import number_rows, read_bytes
 from ..errors import MeshError
 from ..work import Work
 from . import MeshFormat

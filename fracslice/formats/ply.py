@@ -10,8 +10,8 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import Triangles, fans
 from ..common.files import read_bytes
-from ..common.triangles import Triangles, fans
 from ..errors import MeshError
 from ..work import Work
 from . import MeshFormat

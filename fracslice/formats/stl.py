@@ -13,9 +13,9 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import Triangles
 from ..common.files import read_bytes
 from ..common.messages import format_count
-from ..common.triangles import Triangles
 from ..errors import ExportError, MeshError
 from ..work import Work, ahead
 from . import MeshFormat

@@ -15,12 +15,23 @@ from typing import Any
 
 from ..common.parameters import Count, Number, Vector
 from ..expr.vocabulary import absolute, atan2, cos, exp, floor, log, maximum, rsqrt, sin, sqrt, where
-from ..fields.escape import enclosing_radius, farthest, stop
 from ..fields.growth import stays
-from ..fields.maps import LENGTHS, MAJORANTS, positive, turn
+from ..fields.maps import (
+    LENGTHS,
+    MAJORANTS,
+    calm_power,
+    enclosing_radius,
+    farthest,
+    positive,
+    power_length,
+    products,
+    square,
+    square_length,
+    stop,
+    turn,
+)
+from ..fields.maps import power as raised
 from ..fields.orbits import ITERATIONS, REPEAT, Stepped, orbit, orbit_step, rounds, steps
-from ..fields.powers import calm_power, power_length, products, square, square_length
-from ..fields.powers import power as raised
 from ..fields.registry import Fixed, Node
 
 ESCAPED = 1e4

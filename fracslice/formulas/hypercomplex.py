@@ -11,9 +11,8 @@ from typing import Any
 from ..common.parameters import Number, Vector
 from ..expr.vocabulary import any_of, maximum, orbit, sqrt, where
 from ..fields.box import Box
-from ..fields.escape import CORE, enclosing_radius, levels, potential_distance, stop
+from ..fields.maps import CORE, enclosing_radius, levels, potential_distance, square, stop
 from ..fields.orbits import ITERATIONS, REPEAT, Stepped, escape_sign, rounds, single
-from ..fields.powers import square
 from ..fields.registry import Fixed, Node, shape
 
 ESCAPED = 256.0

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..common.arrays import affine, inverse, product, stretches
 from ..common.parameters import REQUIRED, SMALLEST, Axis, Vector
 from ..expr.vocabulary import absolute
-from ..fields.algebra import affine, inverse, product, stretches
 from ..fields.box import Box
 from ..fields.registry import Fixed, Node, always_keeps_sign, domain_operator
 

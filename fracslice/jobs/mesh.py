@@ -22,18 +22,27 @@ from ..records import MeshJob
 from ..scene import Print, Scene
 from ..version import __version__
 from ..work import Work, ahead, in_background
-from . import surfaces
-from .mesh_steps import Checks, Executor, Finish, Local, surface_distances
+from . import mesh_steps
+from .mesh_steps import (
+    Checks,
+    Executor,
+    Finish,
+    Local,
+    Sized,
+    apply_edits,
+    in_mm,
+    plan_mesh,
+    surface_distances,
+)
 from .report import Clock, Placement, Report, Result, SurfaceError, SurfaceToMesh
-from .surfaces import Sized, apply_edits, in_mm, plan_mesh
 
 if TYPE_CHECKING:
     from ..mesh import Mesh
     from ..mesh.simplify import Simplified
     from ..volume import Plan, SignBricks
-    from ..volume.sizing import Sizing
+    from ..volume.amount import Sizing
+    from .mesh_steps import Surface
     from .shared import MeshRecipe
-    from .surfaces import Surface
 
 
 def make_mesh(
@@ -84,7 +93,7 @@ def noted(result: Result, coarse: Result) -> Result:
     return Result(report, result.place, result.planned, result.whole, result.work)
 
 
-LATER = "cleaning", "checks", "spatial", "tips"
+LATER = "cleaning", "checks", "tips"
 """Modules of meshes that follow contouring."""
 
 
@@ -113,7 +122,7 @@ class _Job:
     @cached_property
     def size(self) -> Sizing:
         """Size of the object."""
-        from ..volume.sizing import sizing
+        from ..volume.amount import sizing
 
         return sizing(self.scene, self.what.size, self.what.scale, self.clock.work)
 
@@ -173,11 +182,11 @@ class _Job:
         sized, how = plan_mesh(self.scene, self.what, self.size, self.clock), self.what.edits(self.scene)
         with in_mm(self.size):
             signs = self.signs(sized.planned, False)
-        thin = how.sorts and surfaces.has_thin_walls(signs)
+        thin = how.sorts and mesh_steps.has_thin_walls(signs)
         if again := thin and how.whole:
             sized = apply_edits(sized.planned, self.scene, self.what, self.size, self.clock)
             signs = self.signs(sized.planned, True)
-            thin = surfaces.has_thin_walls(signs)
+            thin = mesh_steps.has_thin_walls(signs)
         return replace(sized, left=replace(sized.left, keep="all")) if thin else sized, signs, again
 
     def recipe(self, again: bool) -> MeshRecipe:
@@ -191,11 +200,11 @@ class _Job:
         """Samples, by the pool of the work if there is one; a GPU samples here."""
         work = self.clock.work
         if work.cluster is None or work.device != "cpu":
-            return surfaces.sample_surface(planned, self.clock)
+            return mesh_steps.sample_surface(planned, self.clock)
         from .shared import by_pool
 
         job, evaluate = by_pool(self.recipe(again), planned, work.cluster, work)
-        signs = surfaces.sample_surface(planned, self.clock, evaluate)
+        signs = mesh_steps.sample_surface(planned, self.clock, evaluate)
         work.cluster.finished(job)
         return signs
 
@@ -205,7 +214,7 @@ class _Job:
         """
         from ..mesh.cleaning import HALO
         from ..mesh.contouring import layers
-        from ..mesh.pieces import Pieces
+        from ..mesh.shells import Pieces
         from .mesh_steps import Local, Sampled
 
         sized, signs, again = self.sampled()
@@ -217,33 +226,33 @@ class _Job:
 
                 shared, cuts = share_samples(self.recipe(again), planned, signs, pool, work)
                 stored = StoredPieces(pool.pieces, shared.job, halo)
-                return sized, surfaces.surface_of(of, cuts, stored, shared, self.clock), shared
+                return sized, mesh_steps.surface_of(of, cuts, stored, shared, self.clock), shared
             if not pool.first:
                 raise SharedError("the samples are made; shard 1 makes the mesh of them and writes the file")
         most, voxel = len(signs), self.size.longest / self.what.voxels(self.size.longest)
         try:
-            surfaces.refuse_what_does_not_fit(signs, voxel)
+            mesh_steps.refuse_what_does_not_fit(signs, voxel)
         except TooLargeError as error:
             for change in self.needing_all():
                 raise SceneError(f"{change} needs the whole mesh: {error}") from None
             if aside is None:
                 raise TooLargeError(f"{error}, and an .stl file is written piece after piece") from None
-            most = surfaces.BRICKS
+            most = mesh_steps.BRICKS
         pieces = Pieces(aside() if aside and most < len(signs) else None, halo)
-        return sized, surfaces.surface_of(of, layers(signs, most), pieces, executor, self.clock), executor
+        return sized, mesh_steps.surface_of(of, layers(signs, most), pieces, executor, self.clock), executor
 
     def result(self, sized: Sized, surface: Surface, executor: Executor) -> tuple[Result, int]:
         """Finished mesh and report, and the refinement of the samples that does not lose the object."""
         from ..fields.depth import shallower
         from ..mesh.shells import touching_note
-        from ..printing.thickness import thickness_note
+        from ..printing.walls import thickness_note
         from ..volume.amount import lost_size, mesh_amount
         from .mesh_steps import choose_bodies
 
         what, clock, scale, refined = self.what, self.clock, sized.scale, None
         planned, signs, thin = surface.planned, surface.signs, surface.thin
         if what.chord is not None:
-            surface, done = surfaces.refine_surface(surface, what.chord / scale, clock)
+            surface, done = mesh_steps.refine_surface(surface, what.chord / scale, clock)
             refined = done.scaled(scale)
         with clock("finishing"):
             how = what.edits(self.scene)
@@ -324,9 +333,8 @@ def make_implicit(
     `what`: the size, and the voxel that automatic depths follow from.
     """
     from ..common.files import check_target
-    from ..export.implicit import write_implicit
-    from ..fields.operations import operations
-    from ..volume.sizing import sizing
+    from ..export.implicit import operations, write_implicit
+    from ..volume.amount import sizing
 
     what, clock = what or MeshJob(), Clock(work or Work())
     _refuse(what.edits(scene))
@@ -433,7 +441,7 @@ class Writing:
 
     def _painted(self, meshes: Iterator[Mesh], finish: Finish) -> Iterator[Mesh]:
         """Colour the vertices. Edits that are no formulas have the colour of the object there."""
-        from ..rendering.painting import paint
+        from ..rendering.materials import paint
 
         assert self.what.colour is not None
         field: Any = finish.of.planned.root

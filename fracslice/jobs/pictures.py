@@ -22,7 +22,7 @@ from ..records import RenderJob
 from ..rendering import Pass, Renderer
 from ..rendering.accumulator import COUNT, COVER, GOAL, HostAccumulator, SampleRange
 from ..rendering.progressive import BYTES, MARGIN, Crop, layer, layers
-from ..rendering.units.pixel import UNKNOWN, squared_error
+from ..rendering.units.camera import UNKNOWN, squared_error
 from ..scene import Scene
 from ..scene.view import View
 from ..work import Work, chunks

@@ -21,31 +21,40 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cluster import PAGE, Contents, Files, Pool, ResultFolder, Shard, pack_arrays, unpack_arrays
-from ..common import packages as texts
+from ..common import files as texts
+from ..common.arrays import concatenate
 from ..common.cache import key, program
-from ..common.files import flushing, link_or_copy, replacing
+from ..common.files import Fragment, TextSum, combine_checksums, deflate, flushing, link_or_copy, replacing
 from ..common.messages import format_count
-from ..common.packages import Fragment, TextSum, combine_checksums, deflate
-from ..common.triangles import concatenate
 from ..errors import ClusterError, SharedError
 from ..formats import mesh_format, stl
 from ..formats._3mf import triangle_rows, vertex_rows, write_fragments
 from ..mesh.contouring import layers
 from ..mesh.model import Mesh
-from ..mesh.pieces import HEAD, TAIL, Pieces, Strip, strip_at
-from ..mesh.shells import groups, levels
+from ..mesh.shells import HEAD, TAIL, Pieces, Strip, groups, levels, strip_at
 from ..mesh.tips import by_tip
 from ..records import MeshJob
 from ..scene.reader import reads
 from ..store import Arrays
 from ..volume import Plan, SignBricks
+from ..volume.amount import sizing
 from ..volume.bricks import BRICK
 from ..volume.sampler import Evaluate, brick_signs
-from ..volume.sizing import sizing
 from ..work import Work, chunks
-from .mesh_steps import Checks, Contour, Executor, Finish, MeshStep, R, Sampled, Summary, joined_summary
+from .mesh_steps import (
+    Checks,
+    Contour,
+    Executor,
+    Finish,
+    MeshStep,
+    R,
+    Sampled,
+    Summary,
+    apply_edits,
+    joined_summary,
+    plan_mesh,
+)
 from .report import Clock
-from .surfaces import apply_edits, plan_mesh
 
 SAMPLES = "samples"
 """File of a job with its samples."""

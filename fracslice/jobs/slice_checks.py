@@ -11,7 +11,7 @@ from ..checks.problems import Limits
 from ..cluster import Contents, Files, Pool, Shard, pack_arrays, unpack_arrays
 from ..errors import SharedError
 from ..export.slice_run import RangeTask, SliceRun
-from ..slicing.runs import LayerComponents, Nodes, Runs
+from ..slicing.feature_graph import LayerComponents, Nodes, Runs
 from ..work import Work
 
 FORM = "checks"

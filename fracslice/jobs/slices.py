@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..export.layers import FORMATS
-from ..export.resins import Resin
 from ..export.slice_run import EPOCH, Encode, SliceRun
 from ..formulas import Node
 from ..records import COARSEST, RESOLUTION, MeshJob
@@ -19,8 +18,9 @@ from ..scene import Scene
 from ..scene.reader import reads
 from ..scene.view import Film, View
 from ..slicing import SliceJob, plan_layers
+from ..slicing.printers import Resin
 from ..slicing.raster import Screen
-from ..volume.sizing import orient_field, sizing
+from ..volume.amount import orient_field, sizing
 from ..work import Work
 
 if TYPE_CHECKING:

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from .. import _native
 from .._native import touching, turned
+from ..common.arrays import dot, length
 from ..errors import MeshError
-from ..fields.algebra import dot, length
 from ..volume.bricks import BRICK, SignBricks
 from .model import Mesh
-from .pieces import concatenate_at_seam, strip
+from .shells import concatenate_at_seam, strip
 
 Frame = tuple[float, tuple[float, float, float], float]
 """Placement of vertices: scale, translation, and height below which they are moved to the bed, z = 0."""

@@ -312,7 +312,7 @@ def extract(bricks: Bricks, threads: int = 0) -> Mesh:
 
     The mesh is a closed, oriented 2-manifold without self-intersections for any samples, also after its
     coordinates are rounded to float32. Marching cubes (Lorensen and Cline, 1987) with a table without holes
-    or self-intersections; `marching_cubes.h` has the proof.
+    or self-intersections; `contour.h` has the proof.
 
     `bricks` in scene units. Returns `Mesh` in scene units.
     """

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._native import surface_error as measured
-from ..fields.algebra import length
+from ..common.arrays import length
 from ..fields.box import Box
 from ..fields.field import Field
 from ..work import Work, chunks

@@ -19,17 +19,16 @@ from .. import _native
 from ..common.cache import Kept, cache_folder, key
 from ..common.files import open_regular
 from ..errors import MeshError, SceneError
-from ..expr.functions import InMemory
+from ..expr.language import InMemory
 from ..fields.box import Box
+from ..fields.devices import ArrayField
 from ..fields.field import Bounds, Device, Kernel, Precision
 from ..fields.node import TriangleMesh
 from ..fields.registry import Node, get
-from ..fields.tree import ArrayField
 from ..formats import ENDINGS, mesh_format
 from .checks import MeshReport, check_mesh
 from .cleaning import quantise_mesh
-from .model import Mesh
-from .spatial import build
+from .model import Mesh, build
 
 MOST, MOST_BYTES = 1 << 21, 1 << 27
 """Most triangles of a solid, and bytes of a file that is no format of meshes."""

@@ -17,8 +17,7 @@ from ..fields.field import Field
 from ..work import Work
 from .contouring import anywhere, project
 from .fit import OFF, UPRIGHT, Fit, Fitted
-from .model import Mesh
-from .spatial import self_intersecting_triangles
+from .model import Mesh, self_intersecting_triangles
 
 STEPS = 6
 NEAREST = 4e-3

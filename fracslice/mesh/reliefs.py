@@ -14,7 +14,7 @@ from .. import _native
 from ..common.cache import key
 from ..common.files import open_regular
 from ..errors import MeshError
-from ..expr.functions import InMemory
+from ..expr.language import InMemory
 from .models import require_unchanged
 
 LARGEST, MOST = 1 << 26, 1 << 22

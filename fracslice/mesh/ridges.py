@@ -23,10 +23,9 @@ from ..work import Work
 from .cleaning import quantise, used_vertices
 from .contouring import BLUNT, Piece
 from .fit import OFF, UPRIGHT, Fit
-from .model import Mesh, component_sizes
-from .pieces import Pieces, rows
+from .model import Mesh, Nearest, component_sizes, self_intersecting_triangles
 from .refine import Edges, edges_of, on_creases, on_three, split_edges, with_neighbours
-from .spatial import Nearest, self_intersecting_triangles
+from .shells import Pieces, rows
 from .tips import Cap, heights, replace_by_fans, spans, tips_to_end
 
 APART = 5e-5

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from ..expr.loops import WIDTH, field, load, loop, shares, store
-from ..expr.machine import constant
+from ..expr.runtime import constant
 from ..expr.vocabulary import absolute, any_of, maximum, minimum, rsqrt, where
 from ..fields.field import Device, Field, Precision
 

@@ -19,8 +19,7 @@ from .._native import Reduction, connected_components
 from ..common.parameters import AnyLength, Count, Number, parse_length, validate_value
 from ..errors import MeshError
 from ..work import Work, chunks
-from .model import Mesh, component_sizes, edge_topology
-from .spatial import Nearest, build, self_intersecting_triangles
+from .model import Mesh, Nearest, build, component_sizes, edge_topology, self_intersecting_triangles
 
 ROUNDS, PATIENT = 200, 40
 """Maximum rounds of verification and undo, and number of the first rounds in which new collapses may replace

@@ -19,9 +19,8 @@ from ..work import Work
 from .cleaning import quantise, used_vertices
 from .contouring import Piece
 from .fit import OFF, UPRIGHT, Fit
-from .model import Mesh
-from .pieces import NOTHING, Pieces, join_at_seam, near_plane, rows
-from .spatial import self_intersecting_triangles
+from .model import Mesh, self_intersecting_triangles
+from .shells import NOTHING, Pieces, join_at_seam, near_plane, rows
 
 ANGLES = 0.6, 0.3, 0.1
 """Minimum sines of the elevation of a tip above the planes of the triangles it replaces."""

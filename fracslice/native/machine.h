@@ -11,7 +11,7 @@
 namespace fracslice {
 
 // A loop that fracslice.expr compiled, and the arrays that it is always called with: a tuple of a
-// `fracslice.expr.machine.Function` and arrays of Real. Holds them; copied and let go with the interpreter's lock only.
+// `fracslice.expr.runtime.Function` and arrays of Real. Holds them; copied and let go with the interpreter's lock only.
 template <class Real>
 class Machine {
   public:

@@ -9,7 +9,7 @@ from ..work import Work
 
 if TYPE_CHECKING:
     from ..volume import Plan
-    from ..volume.sizing import Sizing
+    from ..volume.amount import Sizing
 
 __all__ = ["printable"]
 

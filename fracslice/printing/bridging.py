@@ -16,7 +16,7 @@ from ..fields.field import Kernel
 from ..volume import Bricks
 from ..volume.bricks import INSIDE, OUTSIDE, values_at
 from ..work import Work
-from .samples import Samples, SolidComponents, components_of, positions
+from .walls import Samples, SolidComponents, components_of, positions
 
 NONE = -1
 """Marks samples in no body and cells without an entry."""

@@ -13,18 +13,18 @@ import numpy as np
 
 from ..common.cache import key
 from ..fields.box import Box
+from ..fields.devices import ArrayField
 from ..fields.field import Bounds, Cells, Device, Field, Kernel, Precision
-from ..fields.tree import ArrayField
 from ..formulas import Node, cylinder, difference, intersection, transform, union
 from ..formulas import box as box_node
 from ..records import PIECES
 from ..volume import Bricks, Drain, Plan, extent
+from ..volume.amount import Sizing, box_of_the_rest
 from ..volume.bricks import from_grid, to_grid
-from ..volume.sizing import Sizing, box_of_the_rest
 from ..work import Work
 from .bridging import clusters, nearer
-from .samples import Samples, SolidComponents, components_of, positions
 from .thin_features import resolve_connectivity, sampled_object
+from .walls import Samples, SolidComponents, components_of, positions
 
 Does = Literal["cut", "add", "keep"]
 _FOLDED = {"cut": difference, "add": union, "keep": intersection}

@@ -20,15 +20,14 @@ from ..formulas import Box, box, plane, transform
 from ..records import DUST, PIECES
 from ..scene import Print
 from ..volume import Bricks, Plan, extent, sample_scene
+from ..volume.amount import Sizing
 from ..volume.bricks import values_at
-from ..volume.sizing import Sizing
 from ..work import Work
 from .edits import edited_field
-from .thickness import SLACK, ThinWalls
+from .walls import SLACK, ThinWalls
 
 if TYPE_CHECKING:
-    from .samples import Samples, SolidComponents
-    from .walls import Walls
+    from .walls import Samples, SolidComponents, Walls
 
 # Measuring needs SciPy, whose import takes as long as a small mesh: import where needed.
 
@@ -108,8 +107,8 @@ class Preparation:
 
     def connected(self) -> SolidComponents:
         """Components of samples that resolve connectivity; shared by cavities, bodies and bridges."""
-        from .samples import components_of
         from .thin_features import resolve_connectivity
+        from .walls import components_of
 
         if self.known is None:
             coarse = self.sampled()
@@ -123,7 +122,7 @@ class Preparation:
 
     def seen(self, length: float) -> Samples:
         """The samples of `sampled` as an interpolated field."""
-        from .samples import Samples
+        from .walls import Samples
 
         return Samples(self.sampled(length))
 
@@ -282,7 +281,7 @@ class _Edits(Preparation):
     def rejoined(self) -> Field:
         """Join the fragments of bodies that the voxels of the mesh break, and drop broken tips."""
         from .bridging import capsules, fragments, nearer
-        from .samples import components_of
+        from .walls import components_of
 
         known, voxel = self.known, max(self.planned.voxel, max(self.planned.box.size) / FINE)
         for _ in range(REPEATS if known or self.how.bridge else 0):
@@ -303,7 +302,7 @@ class _Edits(Preparation):
 
     def unsealed(self) -> Field:
         """Fill cavities that are sealed only at the sample spacing of the mesh."""
-        from .samples import components_of
+        from .walls import components_of
 
         fine, self.known = self.known, components_of(sample_scene(self.planned, self.work))
         filled = self.without(self.known.sealed(fine)) if fine else self.root
@@ -342,8 +341,8 @@ class _Edits(Preparation):
         Pores that this seals are filled.
         """
         from .bridging import Capsules, capsules, contacts
-        from .samples import components_of, together
         from .thin_features import all_walls
+        from .walls import components_of, together
 
         solid, least, root = self.seen(self.how.thickness), self.how.thickness / self.scale, self.root
         middle = all_walls(root, solid, least, self.work).middle
@@ -377,8 +376,7 @@ class _Edits(Preparation):
         of these alone.
         """
         self.spot = made.voxel * self.scale
-        from .samples import Samples, rows_of
-        from .walls import project_faces, walls
+        from .walls import Samples, project_faces, rows_of, walls
 
         least, rows = self.how.thickness / self.scale, None if added is None else rows_of(made, added)
         found = walls(Samples(made), least, self.work, rows=rows)

@@ -19,13 +19,23 @@ from ..common.arrays import Rows, weighted_quantiles
 from ..common.cache import key
 from ..errors import VolumeError
 from ..fields.box import Box
+from ..fields.devices import ArrayField
 from ..fields.field import Bounds, Device, Field, Kernel, Precision
-from ..fields.tree import ArrayField
 from ..volume import Bricks, Lattice, sample
 from ..volume.bricks import BRICK, values_at
 from ..work import Work
-from .samples import Samples
-from .walls import AT_ONCE, AWAY, OPPOSITE, Direction, Walls, edge_crossings, in_blocks, slopes, walls
+from .walls import (
+    AT_ONCE,
+    AWAY,
+    OPPOSITE,
+    Direction,
+    Samples,
+    Walls,
+    edge_crossings,
+    in_blocks,
+    slopes,
+    walls,
+)
 
 ROUNDS = 400
 """Maximum number of steps along a ray."""

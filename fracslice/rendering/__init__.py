@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from .accumulator import Accumulator, HostAccumulator
-from .film import develop, picture
+from .accumulator import Accumulator, HostAccumulator, develop, picture
 from .progressive import Pass, Renderer
 
 __all__ = ["Accumulator", "HostAccumulator", "Pass", "Renderer", "develop", "picture"]

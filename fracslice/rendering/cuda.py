@@ -33,12 +33,12 @@ from .accumulator import (
     grids,
     least_gain,
     next_choice,
+    shows_background,
     tile_order,
 )
-from .film import shows_background
 from .linking import Frame
 from .packets import BLOCK, SHIFTS, STEPS, WHOLE, loops
-from .units.pixel import UNKNOWN, encoded, filmic, linear, reinhard, squared_error
+from .units.camera import UNKNOWN, encoded, filmic, linear, reinhard, squared_error
 
 
 @loop("rn")

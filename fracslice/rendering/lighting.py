@@ -9,22 +9,21 @@ from typing import Any
 
 import numpy as np
 
-from ..expr import vectors
-from ..expr.vectors import upward
+from ..expr import vocabulary
+from ..expr.vocabulary import upward
 from ..fields.linker import FieldDialect, Linker, link_tree
 from ..fields.registry import Fixed, Node
 from ..scene.lights import KINDS, sky
 from ..scene.view import Camera, Fog, Light, View
-from . import glow
+from . import materials
 from .environments import PIXELS, Environment, environment, load_picture
-from .glow import Drawn
-from .materials import Look, opaque_part, write
+from .materials import Drawn, Look, opaque_part, write
 from .setup import Optics, ray_bound
-from .units import environment as units
-from .units import glossy, march, shade
-from .units.glossy import behind, highlight, mixed_weights, sun_density, sunshine, weights
-from .units.intrinsics import blocker, transparent
-from .units.pixel import linear
+from .units import march, shade
+from .units import shade as units
+from .units.camera import linear
+from .units.march import blocker, transparent
+from .units.shade import behind, highlight, mixed_weights, sun_density, sunshine, weights
 
 MIDPOINTS = 24
 """Points along each side of the unit square of random numbers."""
@@ -32,28 +31,28 @@ MIDPOINTS = 24
 
 @lru_cache(maxsize=1)
 def reflected_shares() -> np.ndarray:
-    """Return the table of `glossy.lost`, by the midpoint rule over the directions that `glossy.glossy` takes.
+    """Return the table of `shade.lost`, by the midpoint rule over the directions that `shade.glossy` takes.
 
     It is rounded, so that it is the same on any machine.
     """
-    grid = np.linspace(0, 1, int(glossy.CELLS) + 1)
+    grid = np.linspace(0, 1, int(shade.CELLS) + 1)
     points = (np.arange(MIDPOINTS) + 0.5) / MIDPOINTS
     rough, root, u, v = np.meshgrid(grid, grid, points, points, indexing="ij", sparse=True)
     z = np.maximum(root * root, 1e-4)
     none = 0.0 * z
     ray, normal = (np.sqrt(1 - z * z), none, -z), (none, none, 1 + none)
-    *_, weight, _ = glossy.glossy(*ray, *normal, rough, u, v)  # type: ignore[no-untyped-call]
+    *_, weight, _ = shade.glossy(*ray, *normal, rough, u, v)  # type: ignore[no-untyped-call]
     return np.asarray(weight.mean((2, 3)).round(5))
 
 
 def division_lines(linker: Linker, look: Look) -> list[str]:
     """Return the lines that divide a colour into what the surface reflects and what it scatters."""
-    for function in (shade.fresnel, glossy.tinted):
+    for function in (shade.fresnel, shade.tinted):
         linker.share(function)
     lines = ["facing = -(dx * nx + dy * ny + dz * nz)", *(f"e{c} = c{c}" for c in CHANNELS)]
     lines += [f"k{c} = reflect + metallic * (c{c} - reflect)" for c in CHANNELS]
     if look.rough:
-        linker.bind("lost_", glossy.lost, {"table": reflected_shares()})
+        linker.bind("lost_", shade.lost, {"table": reflected_shares()})
         lines.append("lost = lost_(facing, roughness, P)")
         lines += [
             f"again{c} = 1.0 + (k{c} + (1.0 - k{c}) / 21.0) * lost" for c in CHANNELS
@@ -66,7 +65,7 @@ def division_lines(linker: Linker, look: Look) -> list[str]:
             "share = mirrors / maximum(mirrors + scatters, 1e-6)",
         ]
     if look.bodies:
-        lines += glow.bind(linker, look.bodies)
+        lines += materials.bind(linker, look.bodies)
     return lines
 
 
@@ -91,7 +90,7 @@ def onward(linker: Linker, drawn: Drawn, look: Look, weighted: bool) -> list[str
     if look.paths:
         lines += _scatter_choice_lines(linker, drawn, look)
     if weighted and not look.bodies:
-        linker.share(glossy.density_onward)
+        linker.share(shade.density_onward)
         lines.append("eq = density_onward(chosen, nx, ny, nz, dx, dy, dz, ex, ey, ez, roughness, share)")
     if look.coated:
         lines += _lacquer_choice_lines(linker, drawn)
@@ -113,7 +112,7 @@ def _start_lines(linker: Linker, look: Look) -> list[str]:
 
 def _reflection_lines(linker: Linker, drawn: Drawn, look: Look) -> list[str]:
     """Lines for reflection by microfacets."""
-    for function in (glossy.width, glossy.hidden, vectors.frame, glossy.glossy):
+    for function in (shade.width, shade.hidden, vocabulary.frame, shade.glossy):
         linker.share(function)
     u, v = drawn.names(2)
     lines = [f"ex, ey, ez, weight, half = glossy(dx, dy, dz, nx, ny, nz, roughness, {u}, {v})", "es = side"]
@@ -124,7 +123,7 @@ def lacquer_lines(linker: Linker, colour: list[str]) -> list[str]:
     """Return the lines for the reflection of a light in a lacquer."""
     for function in (shade.dielectric, shade.lacquer):
         linker.share(function)
-    lines = [f"spark, slope = highlight(nx, ny, nz, dx, dy, dz, lx, ly, lz, {glossy.LACQUER})"]
+    lines = [f"spark, slope = highlight(nx, ny, nz, dx, dy, dz, lx, ly, lz, {shade.LACQUER})"]
     return lines + [
         f"glaze{c} = glaze{c} + power * {s} * spark * lacquer(slope, coat)"
         for c, s in zip(CHANNELS, colour, strict=True)
@@ -153,12 +152,12 @@ def _scatter_choice_lines(linker: Linker, drawn: Drawn, look: Look) -> list[str]
     One sample of both (Veach 1997), and Russian roulette with the probability of the throughput (Arvo and
     Kirk 1990).
     """
-    for function in (vectors.disc, vectors.upward):
+    for function in (vocabulary.disc, vocabulary.upward):
         linker.share(function)
     u, v, choice, life = drawn.names(4)
     lines = [f"wx, wy, wz = upward(nx, ny, nz, {u}, {v})"]
     if look.bodies:
-        lines += glow.scatter_lines(linker, drawn, u, v, choice, look.facets)
+        lines += materials.scatter_lines(linker, drawn, u, v, choice, look.facets)
     else:
         lines += [
             f"chosen = {choice} < share",
@@ -393,7 +392,7 @@ class Lighting:
             pane = "where((clear > 0.0) | (side < 0.0), 1.0, last)" if look.inside else "last"
             lines.append(f"free = {pane}")
         for k, light in enumerate(self.view.lights):
-            if light.kind == "environment" and (look.paths or light.shadows == "yes"):
+            if light.is_picture and (look.paths or light.shadows == "yes"):
                 lines += self.environment(light, look)
             elif not light.surrounds:
                 lines += self.light(k, light, look)
@@ -405,7 +404,7 @@ class Lighting:
     def weighted(self) -> bool:
         """True if lights are sampled by their own distribution and by the surface's; see `units.weights`."""
         paths = self.view.shading.paths == "yes" and self.view.shading.mode == "light"
-        return paths and any(x.kind == "environment" or seen_as_disc(x) for x in self.view.lights)
+        return paths and any(x.is_picture or seen_as_disc(x) for x in self.view.lights)
 
     def blocker(self) -> list[str]:
         """Lines of `units.intrinsics.blocker`."""
@@ -470,12 +469,12 @@ class Lighting:
         if look.bodies:
             self.linker.share(mixed_weights)
             return [
-                glow.density("likely", "l"),
+                materials.density("likely", "l"),
                 "scattered, reflected = mixed_weights(dense, likely, roughness, free)",
             ]
         self.linker.share(weights)
-        vectors = ", ".join(f"{v}{a}" for v in "ndl" for a in "xyz")
-        return [f"scattered, reflected = weights(dense, diffuse, {vectors}, roughness, share, free)"]
+        vocabulary = ", ".join(f"{v}{a}" for v in "ndl" for a in "xyz")
+        return [f"scattered, reflected = weights(dense, diffuse, {vocabulary}, roughness, share, free)"]
 
     def environment(self, light: Light, look: Look) -> list[str]:
         """Lines for light from a picture of the surroundings, sampled in proportion to its light."""
@@ -524,7 +523,7 @@ class Lighting:
 
     def bind_sky(self, light: Light) -> None:
         """Bind the unit of the sky, or of the light of an environment without shadows."""
-        if light.kind == "environment":
+        if light.is_picture:
             self.around.bind_irradiance("sky_", light)
             return
         names = {"zenith": light.colour, "horizon": light.horizon, "ground": light.ground}

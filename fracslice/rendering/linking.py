@@ -17,14 +17,12 @@ from ..expr.vocabulary import maximum, minimum
 from ..fields.linker import Linked, Linker
 from ..fields.registry import Fixed, Node
 from ..scene.view import Camera, View
-from .glow import Drawn, glowing_bodies, wholly_met
 from .lighting import Lighting, onward
-from .materials import Look, write
+from .materials import Drawn, Look, glowing_bodies, wholly_met, write
 from .setup import Optics, footprint, ray_bound
 from .units import camera as units
-from .units import glossy, march
-from .units.intrinsics import background, surface
-from .units.march import normal
+from .units import march, shade
+from .units.march import background, normal, surface
 
 Unit = tuple[Callable[..., Any], dict[str, Any]]
 
@@ -217,7 +215,7 @@ class _Frame:
         if mode == "light":
             lines += look.lines()
             if look.rough and self.lighting.weighted:
-                self.linker.share(glossy.dulled)
+                self.linker.share(shade.dulled)
                 lines.append("roughness = dulled(roughness, q)")
             lines += self.lighting.lines(look)
             if self.bounces:

@@ -1,4 +1,5 @@
-"""Materials in a render kernel: colours, palettes and orbit traps at a surface point.
+"""Materials: colours, palettes and orbit traps at a point of a surface, in pictures and on meshes;
+bodies that glow.
 
 The field's tree is compiled a second time, with every function returning (f, paint, tone). `paint` is the
 material's number, 0 for none. `tone` is the smallest abs(w) of the orbit (Pickover's and Carlson's orbit
@@ -8,13 +9,18 @@ traps; Carlson 1999). The result is evaluated once per hit.
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from ..expr import functions
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common.arrays import from_linear
+from ..expr import language
 from ..expr.frontend import FormulaReader, formula, source_function
-from ..expr.graph import FlowGraph, Function, Value, Writer, identified
+from ..expr.graph import ON_ARRAYS, Evaluator, FlowGraph, Function, Value, Writer, identified
 from ..expr.vocabulary import absolute, atan2, minimum, sqrt, where
 from ..fields.linker import (
     Arguments,
@@ -32,16 +38,135 @@ from ..fields.linker import (
 )
 from ..fields.registry import Fixed, Node
 from ..formulas.material import material, stops
+from ..work import Work, chunks
 from .environments import load_picture
-from .glow import glowing_bodies
+from .setup import Optics
 from .units import shade
-from .units.environment import triplanar
-from .units.pixel import linear
+from .units.camera import linear
+from .units.shade import highlight, triplanar
+
+
+@dataclass
+class Drawn:
+    """Random numbers of a bounce."""
+
+    count: int = 0  # numbers in use
+
+    def names(self, count: int) -> list[str]:
+        """Reserve random numbers."""
+        self.count += count
+        return [f"u[{k}]" for k in range(self.count - count, self.count)]
+
+
+MOST = 16
+"""Bodies of their own; more than that are one."""
+THINNEST = 1e-3
+"""Least side of a box, relative to its largest."""
+CHANNELS, AXES = "rgb", "xyz"
+
+
+def glowing_bodies(root: Node) -> list[tuple[float, ...]]:
+    """Return the bodies that glow."""
+    nodes = {id(n): n for n in root.walk() if n.formula.name == material.name and n["glow"]}
+    bodies = [_body(_only(root, node), node) for node in nodes.values()]
+    known = [body for body in bodies if body]
+    if len(known) <= MOST:
+        return known
+    low, high = (
+        [kind(b[a] + s * b[a + 3] for b in known) for a in range(3)] for kind, s in ((min, -1), (max, 1))
+    )
+    return [_numbers(low, high, sum(b[-1] for b in known))]
+
+
+def _only(node: Node, wanted: Node) -> Node | None:
+    """The tree without the members of its unions that do not hold a node; None if nothing holds it."""
+    if node is wanted:
+        return node
+    parts = [part for child in node.children if (part := _only(child, wanted))]
+    if node.formula.name == "union" or not parts:
+        return node.changed(tuple(parts)) if len(parts) > 1 else next(iter(parts), None)
+    return node.changed((parts[0],)) if len(node.children) == 1 else node
+
+
+def _body(part: Node | None, node: Node) -> tuple[float, ...]:
+    """Numbers of the body of a material; empty if it has no end."""
+    assert part
+    box = part.bounds.box
+    if not box.finite or min(box.size) <= 0:
+        return ()
+    x, y, z = box.size
+    return _numbers(box.lo, box.hi, node["glow"] * max(linear(stops(node))) * (x * y + y * z + z * x))
+
+
+def _numbers(low: Sequence[float], high: Sequence[float], power: float) -> tuple[float, ...]:
+    """Centre and half sides of a box, and a power."""
+    half = [(b - a) / 2 for a, b in zip(low, high, strict=True)]
+    least = THINNEST * max(half)
+    return (*((a + b) / 2 for a, b in zip(low, high, strict=True)), *(max(h, least) for h in half), power)
+
+
+def wholly_met(bodies: list[tuple[float, ...]], eye: Sequence[float], seen: Optics) -> float:
+    """Part of a pixel's width that is no wider than any body, at most 1: rays pass what is narrower."""
+    parts = [max(b[3:6]) / (seen.cone * math.dist(eye, b[:3]) + seen.least) for b in bodies]
+    return min([1.0, *parts])
+
+
+def bind(linker: Linker, bodies: list[tuple[float, ...]]) -> list[str]:
+    """Bind the units; return the lines for the start v of rays that continue and the share sent to
+    bodies.
+    """
+    values = {"bodies": tuple(bodies), "count": Fixed(len(bodies))}
+    for function in (shade.sent_share, shade.towards_body, shade.body_density):
+        linker.bind(f"{function.__name__}_", function, values)
+    linker.share(shade.mixed_density)
+    start = [f"v{a} = {a} + 0.1 * h * n{a}" for a in AXES]  # above bodies that end at the surface
+    return [*start, "sent = sent_share_(vx, vy, vz, nx, ny, nz, P)"]
+
+
+def density(name: str, to: str) -> str:
+    """Return the line for the density of rays that continue in a direction.
+
+    `to`: first letter of the direction's components.
+    """
+    ray = ", ".join(f"{to}{a}" for a in AXES)
+    beside = f"body_density_(vx, vy, vz, nx, ny, nz, {ray}, P)"
+    return f"{name} = mixed_density(sent, {beside}, nx, ny, nz, dx, dy, dz, {ray}, roughness, share)"
+
+
+def scatter_lines(linker: Linker, drawn: Drawn, u: str, v: str, choice: str, facets: str) -> list[str]:
+    """Return the lines that choose between a reflected ray, a scattered one and one to a body.
+
+    `facets`: reflectance of microfacets; the colour is left open.
+    """
+    linker.share(highlight)
+    (w,) = drawn.names(1)
+    lines = [
+        f"away = {choice} < sent",
+        f"chosen = ({choice} - sent) / (1.0 - sent) < share",
+        f"picked = {choice} / maximum(sent, 1e-6)",
+        f"px, py, pz = towards_body_(vx, vy, vz, nx, ny, nz, {u}, {v}, {w}, picked, P)",
+        *(f"e{a} = where(away, p{a}, where(chosen, e{a}, w{a}))" for a in AXES),
+        "sharp = where(away, 0.0, where(chosen & (roughness <= 0.0), 1.0, 0.0))",
+        density("eq", "e"),
+        "spot, half = highlight(nx, ny, nz, dx, dy, dz, ex, ey, ez, roughness)",
+        "cosine = maximum(nx * ex + ny * ey + nz * ez, 0.0)",
+    ]
+    for c in CHANNELS:
+        lines += [
+            f"shine = where(roughness > 0.0, spot * {facets.format(c)}, 0.0)",
+            f"t{c} = where(sharp > 0.5, t{c} / maximum(share * (1.0 - sent), 1e-6), "
+            f"(c{c} * cosine + shine) / ({math.pi} * maximum(eq, 1e-9)))",
+        ]
+    return [
+        *lines,
+        "eq = where(sharp > 0.5, 0.0, eq)",
+        "alive = where(away, 1.0, minimum(mirrors + scatters, 1.0))",
+    ]
 
 
 def write(linker: Linker, function: Callable[..., Any], lines: Sequence[str]) -> None:
     """Add a function of a scene, of some lines, with the name and the arguments of an intrinsic."""
-    linker.write(function.__name__, functions.parameters(function), lines)
+    linker.write(function.__name__, language.parameters(function), lines)
 
 
 @dataclass
@@ -422,3 +547,73 @@ class Look:
             for k, (_, values) in enumerate(options[1:], 1):
                 lines.append(f"{name} = where(paint > {k - 0.5}, {values[i]}, {name})")
         return lines
+
+
+MATERIAL, PALETTE = "material", "viridis"
+
+COUNT = 1 << 14
+"""Points that are evaluated at a time."""
+
+_FUNCTION = "colour"
+
+
+@dataclass(frozen=True)
+class Paint:
+    """Colours of points."""
+
+    colours: NDArray[np.uint8]  # sRGB
+    # property of the orbit, by the name of the trap, or "trap" where materials choose it; and the number of
+    # the material, "material", 0 for none
+    scalars: Mapping[str, NDArray[np.float32]]
+
+
+def paint(root: Node, points: NDArray[np.float64], shown: str, work: Work) -> Paint:
+    """Evaluate the colours of a scene.
+
+    `points`: float64 (n, 3), scene units.
+    """
+    if shown != MATERIAL:
+        root = material(_plain(root), palette=PALETTE, trap=shown)
+    functions, parameters = _link_painting(root)
+    evaluator = Evaluator(ON_ARRAYS, functions)
+    values = np.empty((5, len(points)))
+
+    def evaluate(rows: slice) -> None:
+        with np.errstate(all="ignore"):
+            values[:, rows] = np.broadcast_arrays(
+                *evaluator(functions[_FUNCTION], *points[rows].T, parameters)
+            )
+
+    work.map(evaluate, chunks(len(points), COUNT))
+    tone = {"trap" if shown == MATERIAL else shown: values[4].astype(np.float32)}
+    number = {MATERIAL: values[3].astype(np.float32)} if shown == MATERIAL else {}
+    return Paint(_encode_srgb(values[:3].T), {**tone, **number})
+
+
+def _plain(node: Node) -> Node:
+    """The tree without its materials."""
+    if node.formula is material:
+        return _plain(node.children[0])
+    return node.changed(tuple(map(_plain, node.children))) if node.children else node
+
+
+def _link_painting(root: Node) -> tuple[Mapping[str, Function], NDArray[np.float64]]:
+    """Functions and parameters of the function of linear red, green and blue, material number and tone."""
+    linker = Linker()
+    look = Look(linker, root)
+    dialect = TraceDialect(linker, materials=look.paints, traps=traps(root))
+    colours = [look.colour(k, node) for k, node in enumerate(look.all)]
+    lines = [
+        f"_, paint, tone = {link_tree(linker, root, dialect)}",
+        "t = 0.0 * x",
+        *look.chosen(colours, ("cr", "cg", "cb")),
+        "return cr, cg, cb, paint, tone",
+    ]
+    linker.write(_FUNCTION, ("x", "y", "z", "P"), lines)
+    return linker.functions, np.array(linker.parameters or [0.0])
+
+
+def _encode_srgb(light: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Linear light in sRGB."""
+    colours: NDArray[np.uint8] = np.rint(255 * from_linear(light.clip(0.0, 1.0))).astype(np.uint8)
+    return colours

@@ -25,16 +25,15 @@ from enum import IntEnum
 import numpy as np
 
 from ..errors import Cancelled
-from ..expr.host import lane_count
 from ..expr.loops import WIDTH, Loop, load, loop, shares, store, together
-from ..expr.machine import constant
+from ..expr.runtime import constant, lane_count
 from ..expr.vocabulary import any_of, where
 from ..fields.cpu import load_functions
 from ..work import Work, chunks
 from .accumulator import CHANNELS, COUNT, COVER, GOAL, PassPlan, SampleRange
 from .linking import Frame
-from .units.intrinsics import background, camera_ray, span_box, step_cone, step_ray, surface
-from .units.pixel import brightness, centred, clamped, sample
+from .units.camera import brightness, centred, clamped, sample
+from .units.march import background, camera_ray, span_box, step_cone, step_ray, surface
 
 Row = IntEnum(
     "Row", "ox oy oz dx dy dz start end side path t steps status r g b tr tg tb cover dense px py", start=0

@@ -23,8 +23,7 @@ from ..fields.registry import Node
 from ..scene import Scene, reads, to_xml
 from ..scene.view import Camera, Film, View
 from ..work import Work
-from .accumulator import CHANNELS, COARSE, Accumulator, HostAccumulator, PassPlan, SampleRange, grids
-from .film import picture
+from .accumulator import CHANNELS, COARSE, Accumulator, HostAccumulator, PassPlan, SampleRange, grids, picture
 from .linking import Frame, link_frame
 from .packets import CpuTracer
 from .setup import clip_scene, optics, prepare

@@ -56,7 +56,7 @@ def ray_bound(root: Node) -> float:
     """Return the Lipschitz bound that rays step by.
 
     Half of the guaranteed bound of a fractal with a potential is for sets like a needle, by Koebe's theorem.
-    Its field estimates the distance (`fields.escape`), and rays step by that: a ray that steps too far
+    Its field estimates the distance (`fields.maps`), and rays step by that: a ray that steps too far
     comes to lie inside the solid and returns. No other field has such a half: not that of folds, of a hybrid
     with them, or of a fractal beside other shapes.
     """

@@ -323,9 +323,14 @@ class Light(Part):
         """True if rays that miss the scene show it."""
         return KINDS[self.kind].surrounds
 
+    @property
+    def is_picture(self) -> bool:
+        """True if its light is that of a file."""
+        return KINDS[self.kind].is_picture
+
     def validate(self) -> None:
         """Raise `SceneError` unless an environment, and nothing else, has a file."""
-        if (self.kind == "environment") != bool(self.file):
+        if self.is_picture != bool(self.file):
             wanted = "is only for an environment" if self.file else "expected a picture of the surroundings"
             raise self.fail(f'file="{self.file or ""}": {wanted}')
 

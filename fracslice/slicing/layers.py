@@ -34,21 +34,19 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 import numpy as np
 
 from .._slices import BorderError, Encoding, Memory, ProbeBounds, Slab
-from ..common.arrays import quantile
+from ..common.arrays import dot, quantile
 from ..common.parameters import Length, validate_value
 from ..errors import SliceError
-from ..fields.algebra import dot
 from ..fields.box import Box
 from ..fields.field import Bounds, Field, Kernel
 from ..records import SliceJob
-from ..volume.amount import Completeness, compare_volumes
-from ..volume.sizing import Sizing
+from ..volume.amount import Completeness, Sizing, compare_volumes
 from ..work import Work
 from .contours import Contours, contours
 from .stack import Stack, plan_stack
 
 if TYPE_CHECKING:
-    from .runs import Runs
+    from .feature_graph import Runs
 
 
 LIKELY = 0.06, 0.015
@@ -219,7 +217,7 @@ class Layer:
     @cached_property
     def runs(self) -> Runs:
         """Solid pixels, at least half covered."""
-        from .runs import Runs
+        from .feature_graph import Runs
 
         rows, runs, area, cut = self.slab.runs(self.place, self.stack.shape)
         self._painted = area, cut

@@ -13,7 +13,7 @@ from ..fields.field import Field
 from ..printing import printable
 from ..records import SliceJob
 from ..volume import Drain, plan
-from ..volume.sizing import Sizing, orient_field
+from ..volume.amount import Sizing, orient_field
 from ..work import Work
 
 MOST_LAYERS = 100_000

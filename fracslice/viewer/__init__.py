@@ -1,8 +1,6 @@
 """Windows and pictures of meshes and scenes. No other package imports pyvista."""
 
-from .canvas import previewed
-from .picture import need_pyvista, picture
-from .viewer import fly
-from .window import need_screen, show
+from .viewer import fly, previewed
+from .window import need_pyvista, need_screen, picture, show
 
 __all__ = ["fly", "need_pyvista", "need_screen", "picture", "previewed", "show"]

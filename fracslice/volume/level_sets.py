@@ -18,7 +18,7 @@ from ..common.cache import Kept, cache_folder, key
 from ..common.files import replacing, temporary_folder
 from ..common.parameters import Choice, Count, Number, Vector, short_repr, validate_value
 from ..errors import VolumeError
-from ..expr.functions import InMemory
+from ..expr.language import InMemory
 from ..fields.box import Box
 from ..fields.registry import Node, get
 from .bricks import Bricks, to_grid, write_grid

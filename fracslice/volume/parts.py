@@ -11,8 +11,8 @@ from ..formulas import difference, infill, intersection, names, plane
 from ..formulas.lattices import STRUTS
 from ..work import Work
 from . import with_depths
+from .amount import sizing
 from .extent import extent
-from .sizing import sizing
 
 if TYPE_CHECKING:
     from ..scene import Scene

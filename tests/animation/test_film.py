@@ -17,7 +17,7 @@ from PIL import Image, ImageSequence
 
 from fracslice import read, reads
 from fracslice.animation import FilmJob, Timeline, encode, write_frames
-from fracslice.animation.encode import CODECS
+from fracslice.animation.film import CODECS
 from fracslice.common.files import locked_folder
 from fracslice.errors import Cancelled, ExportError, RenderError
 from fracslice.rendering import Renderer, develop
@@ -299,7 +299,9 @@ def test_films(ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     for k in range(4):
         frames.append(tmp_path / f"f{k}.png")
         Image.new("RGB", (33, 17), (60 * k, 0, 200)).save(frames[-1])
-    encode(frames, tmp_path / f"film{ending}", 8.0, Work(1))
+    for name in ("film", "again"):
+        encode(frames, tmp_path / f"{name}{ending}", 8.0, Work(1))
+    assert (tmp_path / f"film{ending}").read_bytes() == (tmp_path / f"again{ending}").read_bytes()
     count, seconds = imageio_ffmpeg.count_frames_and_secs(str(tmp_path / f"film{ending}"))
     assert (count, seconds) == (4, pytest.approx(0.5))
     film = imageio_ffmpeg.read_frames(str(tmp_path / f"film{ending}"))

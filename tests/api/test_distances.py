@@ -7,7 +7,7 @@ import pytest
 
 from fracslice import bounds, box, mandelbulb, repeat, sphere
 from fracslice.errors import SceneError
-from fracslice.fields.reference import reference
+from fracslice.fields.devices import reference
 from fracslice.volume import with_depths
 
 SHAPE = (box() - sphere(0.6)).twist(40) + (0.1, 0, 0)

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 
 from fracslice import box, difference, intersection, sphere, torus, transform, union
 from fracslice.errors import SceneError
-from fracslice.fields.reference import reference
+from fracslice.fields.devices import reference
 from fracslice.formulas import Node, get, names
 from tests.examples import EXAMPLES, stamped
 from tests.formulas.test_bounds import TREES

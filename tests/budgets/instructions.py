@@ -9,8 +9,8 @@ import json
 import re
 from collections.abc import Sequence
 
-from fracslice.expr.host import REGISTERS
 from fracslice.expr.loops import Loop, points
+from fracslice.expr.runtime import REGISTERS
 from fracslice.fields.linker import Linked, link
 
 from .workloads import WORKLOADS
@@ -35,23 +35,23 @@ def instructions() -> dict[str, int]:
 
 def assembly(linked: Linked, bits: int, loops: Sequence[Loop] = (points,)) -> list[str]:
     """The lines of a scene's loops: labels and instructions."""
-    from fracslice.expr import compiler
+    from fracslice.expr import emitter
 
     class Text:
         """In the place of LLVM's target machine: gives assembly where an object file is asked for."""
 
-        def __init__(self, target: compiler.Target) -> None:
+        def __init__(self, target: emitter.Target) -> None:
             self.machine = machine(target)
 
         def emit_object(self, module: object) -> bytes:
             return str(self.machine.emit_assembly(module)).encode()
 
-    machine, compiler._machine = compiler._machine, Text
+    machine, emitter._machine = emitter._machine, Text
     try:
-        target = compiler.Target(bits, LANES[bits], REGISTERS, CPU, FEATURES)
-        text = compiler.compile_object(linked.program, target, loops).decode()
+        target = emitter.Target(bits, LANES[bits], REGISTERS, CPU, FEATURES)
+        text = emitter.compile_object(linked.program, target, loops).decode()
     finally:
-        compiler._machine = machine
+        emitter._machine = machine
     return [line for line in text.splitlines() if _LABEL.match(line) or re.match(r"^\t[a-z]", line)]
 
 

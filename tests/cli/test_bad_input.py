@@ -158,7 +158,7 @@ def test_command_lines(arguments, message, folder, capfd):
 
 
 def test_a_voxel_count_that_does_not_fit_in_memory(folder, capfd, monkeypatch):
-    monkeypatch.setattr("fracslice.jobs.surfaces.available_bytes", lambda: 1 << 28)
+    monkeypatch.setattr("fracslice.jobs.mesh_steps.available_bytes", lambda: 1 << 28)
     line = refused(capfd, folder, "mesh", "ball.xml", "-o", "out/x.3mf", "--resolution", "800")
     assert "GB of memory" in line
     assert line.endswith("mm fits, and an .stl file is written piece after piece")
@@ -176,7 +176,7 @@ def test_a_lack_of_memory_is_one_line(error, folder, capfd, monkeypatch):
     def lacking(*_):
         raise error
 
-    monkeypatch.setattr("fracslice.jobs.surfaces.sample_surface", lacking)
+    monkeypatch.setattr("fracslice.jobs.mesh_steps.sample_surface", lacking)
     assert run(["mesh", "ball.xml", "-o", "out/x.stl", "--resolution", "24"]) == 1
     assert capfd.readouterr().err.startswith("fracslice: out of memory: a coarser voxel")
 

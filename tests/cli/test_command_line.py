@@ -61,7 +61,7 @@ def test_quiet_layers_print_nothing_at_exit_either(ball, tmp_path):
 
 def test_a_mesh_larger_than_memory_goes_to_stl(ball, tmp_path, capfd, monkeypatch):
     model, report = tmp_path / "ball.stl", tmp_path / "ball.json"
-    monkeypatch.setattr("fracslice.jobs.surfaces.available_bytes", lambda: 1 << 20)
+    monkeypatch.setattr("fracslice.jobs.mesh_steps.available_bytes", lambda: 1 << 20)
     assert fracslice("mesh", ball, "-o", model, "--resolution", 400, "--report", report) == 0
     reported = json.loads(report.read_text())
     assert (reported["printable"], reported["components"], reported["genus"]) == (True, 1, 0)
@@ -328,6 +328,7 @@ def listens(pid: int) -> bool:
 @pytest.mark.parametrize(
     ("module", "command"),
     [
+        ("typing", "mesh"),
         ("click", "mesh"),
         ("fracslice.common.memory", "mesh"),
         ("fracslice.cli.mesh", "mesh"),

@@ -167,6 +167,47 @@ def test_fix_writes_what_it_made(tmp_path: Path, capfd: pytest.CaptureFixture[st
     assert severity_of(report["after"]) < severity_of(report["before"])
 
 
+def bowl() -> trimesh.Trimesh:
+    """A suction cup, unless it lies on a side."""
+    hole = box((12, 12, 10), 2)
+    return box((20, 20, 10)).difference(hole)
+
+
+def test_fix_turns_a_model_and_writes_it(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    source, made = tmp_path / "bowl.stl", tmp_path / "made.stl"
+    bowl().export(source)
+    command = ["check", str(source), *COARSE, "--size", "30mm", "--fix", "--json", "-o", str(made)]
+    assert run(command) == 0
+    layers = json.loads(capfd.readouterr().out)["layers"]
+    assert [problem["kind"] for problem in layers["before"]["problems"]] == ["cups"]
+    assert layers["flags"] == "--up 1 0 0" and layers["after"]["problems"] == []
+    assert layers["after"]["size"] == pytest.approx((15, 30, 30))
+    solid = trimesh.load_mesh(made)
+    assert solid.extents == pytest.approx((15, 30, 30), abs=1e-4)
+    assert solid.volume == pytest.approx(bowl().volume * 1.5**3, rel=1e-4)
+
+
+def test_fix_keeps_a_direction_that_was_asked_for(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    bowl().export(tmp_path / "bowl.stl")
+    source, made = tmp_path / "bowl.stl", tmp_path / "made.stl"
+    for more, size in (
+        (["--up", "0", "1", "0"], (20, 10, 20)),
+        (["--scale", "100%,100%,110%"], (20, 20, 11)),
+    ):
+        run(["check", str(source), *COARSE, "--fix", *more, "-o", str(made)])
+        assert "with --up" not in capfd.readouterr().out
+        assert trimesh.load_mesh(made).extents == pytest.approx(size, abs=1e-4)
+
+
+def test_fix_says_what_it_did_not_write(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    torn, made = box(PLATE), tmp_path / "made.stl"
+    torn.update_faces([True] * 11 + [False])
+    torn.export(tmp_path / "torn.stl")
+    assert run(["check", str(tmp_path / "torn.stl"), *COARSE, "--fix", "-o", str(made)]) == 1
+    assert f"{made}: not written; fracslice repair" in capfd.readouterr().out
+    assert not made.exists()
+
+
 def severity_of(report: dict[str, Any]) -> int:
     return sum(int(problem["count"]) for problem in report["problems"])
 

@@ -147,7 +147,6 @@ def test_a_file_that_cannot_be_read(wrong: Path, capfd, monkeypatch) -> None:
         ("mesh ball.xml -o out/x.vdb --chord 1mm", "--chord: only for meshes"),
         ("check ball.xml --store out", "--store: only with --layer"),
         ("check ball.xml -o out/x.stl", "--output: only with --fix"),
-        ("check whole.stl --fix -o out/x.stl", "--output: only for scenes"),
         *((f"check ball.xml --layer 5mm --{o} 1", f"--{o}: only for") for o in ("voxel", "dust", "chord")),
         ("check ball.xml --layer 5mm --proved", "--proved: only for meshes"),
         ("check whole.stl --proved", "--proved: only for scenes"),

@@ -16,7 +16,7 @@ import pytest
 from fracslice.cli.main import run as command
 
 from fracslice.animation import FilmJob, Timeline, write_frames
-from fracslice.cluster import ResultFolder, Workers, connect, connection, workers
+from fracslice.cluster import ResultFolder, Workers, connect, workers
 from fracslice.cluster.workers import Identity
 from fracslice.errors import Cancelled, ClusterError, FracsliceWarning
 from fracslice.export.layers import write_slices
@@ -279,7 +279,7 @@ thread.join()"""
 @pytest.mark.skipif(sys.platform != "linux", reason="of glibc")
 def test_workers_reuse_freed_memory() -> None:
     """Dask's nanny starts them with a setting that returns each array to the system; threads have heaps."""
-    arenas = str(connection.SETTINGS["distributed.nanny.pre-spawn-environ.MALLOC_ARENA_MAX"])
+    arenas = str(workers.SETTINGS["distributed.nanny.pre-spawn-environ.MALLOC_ARENA_MAX"])
     given = {**os.environ, "MALLOC_TRIM_THRESHOLD_": "65536", "MALLOC_ARENA_MAX": arenas}
     done = subprocess.run(
         [sys.executable, "-c", ARRAYS], env=given, capture_output=True, text=True, check=True

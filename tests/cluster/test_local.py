@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fracslice.cluster import connect, connection
+from fracslice.cluster import connect, workers
 from fracslice.errors import ClusterError
 
 pytest.importorskip("distributed")
@@ -30,7 +30,7 @@ def test_local_workers_that_do_not_start(tmp_path: Path, monkeypatch: pytest.Mon
     failing = pytest.raises(ClusterError, match="local:1: no worker started: No module named 'nobodys'")
     with config.set({"distributed.worker.preload": ["nobodys"]}), failing, connect("local:1", "x"):
         pass
-    monkeypatch.setattr(connection, "START", 0.1)
+    monkeypatch.setattr(workers, "START", 0.1)
     late = pytest.raises(ClusterError, match=r"local:1: no worker started within 0\.1 s")
     with late, connect("local:1", "x"):
         pass

@@ -12,7 +12,7 @@ import pytest
 from fracslice.cli.main import run as command
 
 from fracslice.cluster import ResultFolder, Shard
-from fracslice.common import files, packages
+from fracslice.common import files
 from fracslice.errors import ClusterError, SharedError
 from fracslice.export.layers import write_slices
 from fracslice.export.slice_run import RangeTask
@@ -150,12 +150,12 @@ def test_other_formats_are_joined(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 def test_a_3mf_file_is_concatenated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """By two shards; vertices at seams and at a tip's triangles, which come last, are numbered once."""
     monkeypatch.setattr(shared, "LEAST", 1)
-    monkeypatch.setattr(packages, "ROWS", 256)
+    monkeypatch.setattr(files, "ROWS", 256)
     monkeypatch.setattr(shared, "BLOCKS", 2)
     monkeypatch.setattr(shared, "joined_pieces", None)
     turned = scene(cone(radius=0.5, height=2.0).rotate(70.0, (0.0, 1.0, 0.2)), size="20mm")
     shards = [Shard(ResultFolder(str(tmp_path / "pieces")), number, 2, patience=600) for number in (1, 2)]
-    files, made = {number: tmp_path / f"{number}.3mf" for number in (0, 1, 2)}, list[str]()
+    targets, made = {number: tmp_path / f"{number}.3mf" for number in (0, 1, 2)}, list[str]()
     encode = shared.Encode.result
     monkeypatch.setattr(
         shared.Encode,
@@ -165,19 +165,19 @@ def test_a_3mf_file_is_concatenated(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
     def made_by(shard: Shard) -> str:
         try:
-            make_mesh(turned, MeshJob(resolution=32), Work(1, cluster=shard), files[shard.number])
+            make_mesh(turned, MeshJob(resolution=32), Work(1, cluster=shard), targets[shard.number])
         except SharedError as error:
             return str(error)
         return ""
 
     with ThreadPoolExecutor(2) as pool:
         first, second = pool.map(made_by, shards)
-    make_mesh(turned, MeshJob(resolution=32), Work(1), files[0])
+    make_mesh(turned, MeshJob(resolution=32), Work(1), targets[0])
     assert first == "" and second.startswith("this shard made ") and "pieces; shard 1 writes" in second
-    assert files[1].read_bytes() == files[0].read_bytes()
-    assert not files[2].exists()
+    assert targets[1].read_bytes() == targets[0].read_bytes()
+    assert not targets[2].exists()
     assert len(made) == len(set(made)) > 8
-    with zipfile.ZipFile(files[1]) as archive:
+    with zipfile.ZipFile(targets[1]) as archive:
         assert archive.testzip() is None
         assert archive.read("3D/3dmodel.model").count(b"<vertex ") > 4 * 256
 

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fracslice.common import packages
-from fracslice.common.triangles import concatenate
+from fracslice.common import files
+from fracslice.common.arrays import concatenate
 from fracslice.errors import ExportError, MeshError
 from fracslice.formats import ENDINGS, write
 from fracslice.mesh import Mesh
@@ -97,7 +97,7 @@ def test_blocks_of_a_3mf_model_are_joined(is_large: bool) -> None:
     """Deflated by themselves, as tasks of a cluster do; also with the header of one of more than 2 GiB."""
     texts = [b"<model>", b"", bytes(range(256)) * 999, b"</model>"]
     file = io.BytesIO()
-    packages.join(file, (partial(packages.append, packages.deflate(text)) for text in texts), is_large)
+    files.join(file, (partial(files.append, files.deflate(text)) for text in texts), is_large)
     with zipfile.ZipFile(file) as archive:
         assert archive.testzip() is None
         assert archive.read("3D/3dmodel.model") == b"".join(texts)

@@ -13,9 +13,9 @@ from fracslice.cli.main import run
 
 from fracslice.common.parameters import AUTO
 from fracslice.errors import KernelError, MeshError, SceneError
+from fracslice.export import implicit as graphs
 from fracslice.export.implicit import write_implicit
-from fracslice.fields import operations as graphs
-from fracslice.fields.reference import reference
+from fracslice.fields.devices import reference
 from fracslice.formulas import Node, mandelbulb, menger, sphere, transform, twist, union
 from fracslice.jobs.mesh import make_implicit
 from fracslice.mesh.models import read_mesh

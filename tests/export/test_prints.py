@@ -27,13 +27,12 @@ from fracslice.export.layers import (
     slice_format,
     write_slices,
 )
-from fracslice.export.resins import Resin
 from fracslice.export.slice_run import SliceRun
 from fracslice.formulas import difference, menger, sphere
 from fracslice.jobs.slices import StackModel
 from fracslice.scene import scene
 from fracslice.slicing import SliceJob, Slicer, adapted, plan_stack
-from fracslice.slicing.printers import PRINTERS, Printer
+from fracslice.slicing.printers import PRINTERS, Printer, Resin
 from fracslice.slicing.raster import Screen
 from fracslice.work import Work
 from tests.examples import stamped

@@ -9,9 +9,8 @@ import pytest
 
 from fracslice.errors import ExportError, SliceError
 from fracslice.export.layers import ENDINGS, printers_file, slice_format
-from fracslice.export.resins import Resin, default_resin, resin
 from fracslice.slicing import printers
-from fracslice.slicing.printers import PRINTERS, printer
+from fracslice.slicing.printers import PRINTERS, Resin, default_resin, printer, resin
 
 OWN = """
 title = "Mine"

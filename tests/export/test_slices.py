@@ -26,14 +26,13 @@ from PIL import Image
 from fracslice.errors import Cancelled, ExportError, FracsliceWarning
 from fracslice.export import images, layer_formats, resuming
 from fracslice.export.layers import FORMATS, slice_format, write_slices
-from fracslice.export.resins import Resin
 from fracslice.export.resuming import Journal, journal, resumable_folder
 from fracslice.export.slice_run import SliceRun
 from fracslice.formulas import Node, difference, menger, sphere
 from fracslice.jobs.slices import StackModel
 from fracslice.scene import scene
 from fracslice.slicing import SliceJob, Slicer, plan_stack
-from fracslice.slicing.printers import Printer
+from fracslice.slicing.printers import Printer, Resin
 from fracslice.slicing.raster import Screen
 from fracslice.work import Work
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from fracslice._native import text_rows
-from fracslice.common import packages
-from fracslice.common.packages import number_rows
+from fracslice.common import files
+from fracslice.common.files import number_rows
 from fracslice.formats import write
 from fracslice.work import Work
 from tests.mesh.shapes import sphere
@@ -29,7 +29,7 @@ def test_numbers_are_as_short_as_reads_back() -> None:
 
 def test_blocks_follow_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = np.arange(-7, 23).reshape(10, 3)
-    monkeypatch.setattr(packages, "ROWS", 4)
+    monkeypatch.setattr(files, "ROWS", 4)
     blocks = [make() for make in number_rows(("<", ",", ","), ">", whole)]
     assert [block.count(b">") for block in blocks] == [4, 4, 2]
     assert b"".join(blocks) == b"".join(b"<%d,%d,%d>" % tuple(row) for row in whole.tolist())
@@ -45,6 +45,6 @@ def test_a_text_for_each_column() -> None:
 def test_same_bytes_for_any_number_of_threads(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str
 ) -> None:
-    monkeypatch.setattr(packages, "ROWS", 50)
+    monkeypatch.setattr(files, "ROWS", 50)
     paths = [write(sphere(5), tmp_path / f"{n}{ending}", work=Work(n)) for n in (1, 3)]
     assert paths[0].read_bytes() == paths[1].read_bytes()

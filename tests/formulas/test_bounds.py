@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fracslice.fields.reference import reference
+from fracslice.fields.devices import reference
 from fracslice.formulas import (
     Node,
     bend,

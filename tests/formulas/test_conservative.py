@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from fracslice.fields.cpu import compile_scene
-from fracslice.fields.escape import sure_distance
+from fracslice.fields.devices import reference
 from fracslice.fields.field import Precision
 from fracslice.fields.linker import link
-from fracslice.fields.reference import reference
+from fracslice.fields.maps import sure_distance
 from fracslice.formulas import Node, julia, mandelbulb, sphere, transform, union
 from tests.examples import EXAMPLES
 

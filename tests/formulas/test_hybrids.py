@@ -7,9 +7,9 @@ import pytest
 
 from fracslice.errors import SceneError
 from fracslice.fields.cpu import compile_scene
+from fracslice.fields.devices import reference
 from fracslice.fields.linker import link
 from fracslice.fields.orbits import growth_of
-from fracslice.fields.reference import reference
 from fracslice.formulas import (
     Node,
     bristorbrot,

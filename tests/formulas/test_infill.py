@@ -7,7 +7,7 @@ import pytest
 
 from fracslice import make_mesh, reads
 from fracslice.errors import SceneError
-from fracslice.fields.reference import reference
+from fracslice.fields.devices import reference
 from fracslice.formulas import Node, box, get, gyroid, infill, mandelbulb, schwarz_p, shell, sphere, struts
 from fracslice.formulas.lattices import STRUTS
 

@@ -11,13 +11,12 @@ from fracslice.fields import maps as verbs
 from fracslice.fields import orbit_code
 from fracslice.fields.cpu import compile_scene
 from fracslice.fields.depth import resolve_depths
+from fracslice.fields.devices import reference
 from fracslice.fields.growth import image
 from fracslice.fields.linker import link
-from fracslice.fields.maps import ball, fold, positive, turn
+from fracslice.fields.maps import ball, fold, positive, power, turn
 from fracslice.fields.node import FORMULAS
 from fracslice.fields.orbits import growth_of, orbit, steps
-from fracslice.fields.powers import power
-from fracslice.fields.reference import reference
 from fracslice.fields.steps import trace
 from fracslice.formulas import Number, Vector, bristorbrot, julia, mandelbox, quaternion_mandelbrot
 from tests.benchmarks.formulas.steps import SCENES

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fracslice.fields.escape import sure_distance
+from fracslice.fields.devices import reference
 from fracslice.fields.growth import image
+from fracslice.fields.maps import by_angles, sure_distance, triplex
 from fracslice.fields.orbit_code import function_of_text
 from fracslice.fields.orbits import growth_of, steps
-from fracslice.fields.powers import by_angles, triplex
-from fracslice.fields.reference import reference
 from fracslice.formulas import (
     Node,
     abox,

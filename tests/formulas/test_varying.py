@@ -13,7 +13,7 @@ from fracslice.common.parameters import Number
 from fracslice.errors import SceneError
 from fracslice.expr.frontend import formula
 from fracslice.fields.box import Box
-from fracslice.fields.reference import reference
+from fracslice.fields.devices import reference
 from fracslice.fields.varying import Variable, Varying
 from fracslice.formulas import Node, box, gyroid, infill, mandelbulb, shell, sphere, struts, union
 from fracslice.scene import scene, to_xml

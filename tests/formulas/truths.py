@@ -11,8 +11,8 @@ from PIL import Image
 from scipy.ndimage import map_coordinates
 
 from fracslice import formulas as f
+from fracslice.fields.devices import reference
 from fracslice.fields.orbits import growth_of
-from fracslice.fields.reference import reference
 from fracslice.formulas import Node
 from fracslice.formulas.bulbs import DIAGONAL, DIAGONAL_AXIS
 from tests.examples import EXAMPLES, HILLS

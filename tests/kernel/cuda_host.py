@@ -15,7 +15,7 @@ import pytest
 from fracslice.expr import cuda_driver
 from fracslice.expr.graph import Program
 from fracslice.expr.loops import OWN, Loop, element_type, is_array
-from fracslice.expr.machine import CompiledFunction
+from fracslice.expr.runtime import CompiledFunction
 from fracslice.fields import cpu as lanes
 from fracslice.fields import cuda
 from fracslice.fields.field import Precision

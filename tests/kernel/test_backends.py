@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fracslice.fields.cpu import compile_scene
+from fracslice.fields.devices import reference
 from fracslice.fields.linker import FIELD, link
-from fracslice.fields.reference import reference
 from fracslice.formulas import mandelbulb, sphere
 from tests.examples import DEFINED, EXAMPLES, stamped
 
@@ -98,7 +98,7 @@ def test_second_process_compiles_nothing(tmp_path, monkeypatch) -> None:  # type
     script = (
         "import sys; from fracslice.formulas import julia; from fracslice.fields.cpu import compile_scene;"
         "compile_scene(julia(iterations=5)).points([0.1], [0.2], [0.3]);"
-        "print('fracslice.expr.compiler' in sys.modules, 'numba' in sys.modules)"
+        "print('fracslice.expr.emitter' in sys.modules, 'numba' in sys.modules)"
     )
     runs = [
         subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout

@@ -17,13 +17,13 @@ import pytest
 
 from fracslice.errors import KernelError
 from fracslice.expr import cuda_driver
-from fracslice.expr.compiler import compile_ptx
+from fracslice.expr.emitter import compile_ptx
 from fracslice.expr.loops import bricks, points
 from fracslice.fields import cuda
+from fracslice.fields.devices import reference
 from fracslice.fields.field import Precision
 from fracslice.fields.linker import link
 from fracslice.fields.node import FORMULAS
-from fracslice.fields.reference import reference
 from fracslice.formulas import Node, sphere
 from fracslice.mesh.roots import LOOPS, Roots
 from tests.examples import DEFINED, EXAMPLES, OF_FILES, STRUCTURES, stamped

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from fracslice.errors import KernelError
-from fracslice.expr import compiler, cuda_driver
+from fracslice.expr import cuda_driver, emitter
 from fracslice.expr.graph import NOTHING, Program
 from fracslice.expr.loops import loop, shares
 from fracslice.fields import cuda
@@ -168,7 +168,7 @@ class TestLaunches:
             made.append(b"")
             return b""
 
-        monkeypatch.setattr(compiler, "compile_ptx", compiled)
+        monkeypatch.setattr(emitter, "compile_ptx", compiled)
         assert [len(made) for _ in range(2) if self.function()] == [1, 1]
         assert [len(made) for _ in range(2) if self.function(link(sphere()).program)] == [2, 2]
         assert [len(made) for _ in range(2) if self.function(precision="float64")] == [3, 3]

@@ -9,9 +9,8 @@ import pytest
 
 from fracslice.errors import KernelError
 from fracslice.expr.graph import NOTHING
-from fracslice.expr.host import lane_count
 from fracslice.expr.loops import Loop
-from fracslice.expr.machine import load_object
+from fracslice.expr.runtime import lane_count, load_object
 from fracslice.fields.cpu import object_code
 
 N = 7

@@ -9,7 +9,7 @@ import pytest
 
 from fracslice.expr.intervals import Interval
 from fracslice.fields.box import proved_half
-from fracslice.fields.reference import enclosure, reference
+from fracslice.fields.devices import enclosure, reference
 from fracslice.fields.registry import Node
 from fracslice.formulas import (
     bristorbrot,

@@ -8,8 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fracslice.fields.escape_radius import constant_stretch, least_size
-from fracslice.fields.growth import _prove_growth, arguments, compose_steps, image, norm
+from fracslice.fields.growth import (
+    _prove_growth,
+    arguments,
+    compose_steps,
+    constant_stretch,
+    image,
+    least_size,
+    norm,
+)
 from fracslice.fields.maps import modulo
 from fracslice.fields.orbit_code import Code
 from fracslice.fields.orbits import growth_of, orbit_select, steps

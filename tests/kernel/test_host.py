@@ -6,10 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from fracslice.expr import host
+from fracslice.expr import runtime
 from fracslice.fields import devices
 
-CPU = "processor\t: 0\n" + "".join(f"{line}\t: 1\n" for line in sorted(host.DESCRIBED)) + "\nprocessor\t: 1\n"
+LINES = "".join(f"{line}\t: 1\n" for line in sorted(runtime.DESCRIBED))
+CPU = f"processor\t: 0\n{LINES}\nprocessor\t: 1\n"
 
 
 @pytest.fixture
@@ -23,30 +24,30 @@ def asked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[int]:
 
     (tmp_path / "cpuinfo").write_text(CPU)
     monkeypatch.setenv("FRACSLICE_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(host, "_ask_llvm", answer)
-    monkeypatch.setattr(host, "PROCESSORS", tmp_path / "cpuinfo")
+    monkeypatch.setattr(runtime, "_ask_llvm", answer)
+    monkeypatch.setattr(runtime, "PROCESSORS", tmp_path / "cpuinfo")
     return questions
 
 
 def described() -> tuple[str, str, str]:
-    return host.description.__wrapped__()
+    return runtime.description.__wrapped__()
 
 
 def test_llvm_is_asked_once_for_a_processor(asked: list[int]) -> None:
     assert described() == described() == ("znver4", "+avx,-amx", "15.0.7")
     assert len(asked) == 1
-    host.PROCESSORS.write_text(CPU.replace("flags\t: 1", "flags\t: 2"))
+    runtime.PROCESSORS.write_text(CPU.replace("flags\t: 1", "flags\t: 2"))
     described()
     assert len(asked) == 2
-    host.PROCESSORS.write_text(CPU.replace("processor\t: 0", "processor\t: 5"))
+    runtime.PROCESSORS.write_text(CPU.replace("processor\t: 0", "processor\t: 5"))
     described()
     assert len(asked) == 2, "the first processor again"
 
 
 def test_other_systems_ask_llvm_each_time(asked: list[int]) -> None:
-    host.PROCESSORS.write_text(CPU.replace("flags", "Features"))
+    runtime.PROCESSORS.write_text(CPU.replace("flags", "Features"))
     described()
-    host.PROCESSORS.unlink()
+    runtime.PROCESSORS.unlink()
     described()
     assert len(asked) == 2
 

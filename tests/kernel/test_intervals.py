@@ -13,10 +13,9 @@ from fracslice.expr.loops import enclosures
 from fracslice.fields.box import Box
 from fracslice.fields.cpu import compile_loops, compile_scene
 from fracslice.fields.depth import resolve_depths
+from fracslice.fields.devices import Enclosures, enclosure
 from fracslice.fields.field import Precision
 from fracslice.fields.linker import FIELD, link
-from fracslice.fields.reference import enclosure
-from fracslice.fields.tree import Enclosures
 from fracslice.formulas import Node, gyroid, mandelbox, mandelbulb, menger, sphere
 from tests.examples import EXAMPLES, OF_FILES, stamped
 

@@ -7,7 +7,7 @@ from types import ModuleType
 
 import pytest
 
-from fracslice.expr import emitter, frontend, graph, host
+from fracslice.expr import emitter, frontend, graph, runtime
 from fracslice.fields import depth, growth, linker, orbit_code, steps
 
 
@@ -15,6 +15,6 @@ from fracslice.fields import depth, growth, linker, orbit_code, steps
 def test_what_makes_texts_is_in_their_key(module: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     """Another version of it must not read what this one has kept."""
     read = list[Path]()
-    monkeypatch.setattr(host, "texts", lambda *files: read.extend(files) or "")
-    host.toolchain.__wrapped__()
+    monkeypatch.setattr(runtime, "texts", lambda *files: read.extend(files) or "")
+    runtime.toolchain.__wrapped__()
     assert module.__file__ and Path(module.__file__) in read

@@ -11,8 +11,8 @@ import pytest
 
 from fracslice.errors import FracsliceError, SceneError
 from fracslice.fields.cpu import compile_scene
+from fracslice.fields.devices import reference
 from fracslice.fields.node import FORMULAS
-from fracslice.fields.reference import reference
 from tests.kernel.idioms import HEAD, SAME, P, X, Y, Z, imported
 
 

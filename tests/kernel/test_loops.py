@@ -17,11 +17,11 @@ from fracslice.expr import frontend
 from fracslice.expr import loops as intrinsics
 from fracslice.expr.frontend import loop_function
 from fracslice.expr.graph import NOTHING, Width, text
-from fracslice.expr.host import lane_count
 from fracslice.expr.loops import Loop, load, loop, store
+from fracslice.expr.runtime import lane_count
 from fracslice.fields.cpu import load_functions
+from fracslice.fields.devices import ArrayField
 from fracslice.fields.field import Kernel, Precision
-from fracslice.fields.tree import ArrayField
 from fracslice.formulas import box
 from fracslice.mesh import roots
 from fracslice.rendering import packets
@@ -181,7 +181,7 @@ def test_the_identity_of_a_loop_follows_what_it_sees(monkeypatch: pytest.MonkeyP
 def test_the_identity_of_a_function_is_the_same_in_every_process() -> None:
     """And follows every number that it or a function that it calls uses."""
     code = (
-        "from fracslice.rendering.packets import tile; from fracslice.expr.functions import identity; "
+        "from fracslice.rendering.packets import tile; from fracslice.expr.language import identity; "
         "print(identity(tile.function))"
     )
     one, other = (

@@ -17,9 +17,9 @@ import pytest
 import fracslice
 from fracslice._native import RootLoops
 from fracslice._slices import Memory, ProbeBounds, Slab
-from fracslice.expr import machine
+from fracslice.expr import runtime
 from fracslice.expr.loops import bricks, points
-from fracslice.expr.machine import Image, UnsupportedError
+from fracslice.expr.runtime import Image, UnsupportedError
 from fracslice.fields.cpu import CpuKernel
 from fracslice.fields.linker import link
 from fracslice.formulas import box, mandelbulb, sphere
@@ -76,7 +76,7 @@ def test_arrays_become_addresses_in_one_place() -> None:
     }
     own = {"viewer/window.py"}  # names X11's result type
     driver = {"fields/cuda.py", "expr/cuda_driver.py"}  # which returns when it has copied
-    assert result == {"expr/machine.py"} | own | driver
+    assert result == {"expr/runtime.py"} | own | driver
 
 
 def test_a_file_that_the_loader_does_not_know_is_left_to_llvm(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -84,7 +84,7 @@ def test_a_file_that_the_loader_does_not_know_is_left_to_llvm(monkeypatch: pytes
     points = np.random.default_rng(0).uniform(-1, 1, (3, 1000))
     linked = link(mandelbulb(power=8, iterations=4))
     own = CpuKernel(linked)
-    monkeypatch.setattr(machine, "KIND", b"")
+    monkeypatch.setattr(runtime, "KIND", b"")
     other = CpuKernel(linked)
     assert isinstance(own._points._engine, Image)
     assert not isinstance(other._points._engine, Image)
@@ -126,6 +126,6 @@ def test_relocations_of_both_code_models(model: str) -> None:
 
 
 def test_a_damaged_or_foreign_file_is_refused_before_anything_runs() -> None:
-    for code in (b"", b"MZ" * 64, machine.MAGIC + bytes(100)):
+    for code in (b"", b"MZ" * 64, runtime.MAGIC + bytes(100)):
         with pytest.raises(UnsupportedError):
             Image(code)

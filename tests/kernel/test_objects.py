@@ -14,10 +14,10 @@ from pathlib import Path
 import pytest
 
 from fracslice.errors import FracsliceWarning
-from fracslice.expr import compiler
+from fracslice.expr import emitter
 from fracslice.expr.graph import Program
-from fracslice.expr.host import toolchain
 from fracslice.expr.loops import Loop, points
+from fracslice.expr.runtime import toolchain
 from fracslice.fields.cpu import object_code
 from fracslice.fields.linker import link
 from fracslice.formulas import sphere, torus
@@ -36,11 +36,11 @@ def compiled(monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
     """What was compiled: a stand-in for machine code, another one each time."""
     made: list[bytes] = []
 
-    def compile_object(program: Program, target: compiler.Target, loops: Sequence[Loop]) -> bytes:
+    def compile_object(program: Program, target: emitter.Target, loops: Sequence[Loop]) -> bytes:
         made.append(b"code %d" % len(made))
         return made[-1]
 
-    monkeypatch.setattr(compiler, "compile_object", compile_object)
+    monkeypatch.setattr(emitter, "compile_object", compile_object)
     return made
 
 

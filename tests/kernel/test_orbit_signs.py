@@ -7,8 +7,8 @@ import pytest
 
 from fracslice.expr.intervals import ARRAYS, Interval
 from fracslice.fields.cpu import compile_scene
+from fracslice.fields.devices import enclosure, reference
 from fracslice.fields.field import Precision
-from fracslice.fields.reference import enclosure, reference
 from fracslice.formulas import (
     Node,
     burning_ship,

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from fracslice.errors import SceneError
-from fracslice.expr import compiler
-from fracslice.expr.host import REGISTERS, host
+from fracslice.expr import emitter
 from fracslice.expr.loops import points
+from fracslice.expr.runtime import REGISTERS, host
 from fracslice.expr.values import Lanes
 from fracslice.fields.cpu import compile_scene
+from fracslice.fields.devices import reference
 from fracslice.fields.linker import link
-from fracslice.fields.reference import reference
 from fracslice.formulas import (
     Node,
     bounds,
@@ -53,12 +53,12 @@ def nested(depth: int) -> Node:
 
 def instructions(root: Node) -> int:
     """Of LLVM's, in the kernel."""
-    target = compiler.Target(32, 32, REGISTERS, *host())
+    target = emitter.Target(32, 32, REGISTERS, *host())
     lanes = Lanes(target.bits, target.width, target.registers)
     module = llvm.parse_assembly(
-        compiler._text(link(root).program, lanes, llvm.get_process_triple(), [points])
+        emitter._text(link(root).program, lanes, llvm.get_process_triple(), [points])
     )
-    compiler._optimise(module, compiler._target_machine(target))
+    emitter._optimise(module, emitter._target_machine(target))
     return sum(1 for f in module.functions for b in f.blocks for _ in b.instructions)
 
 

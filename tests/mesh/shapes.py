@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fracslice.common.triangles import concatenate
+from fracslice.common.arrays import concatenate
 from fracslice.mesh import Mesh
 
 CUBE = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]

@@ -14,13 +14,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fracslice._native import connected_components, side_of_line, side_of_plane
-from fracslice.common.triangles import concatenate
+from fracslice.common.arrays import concatenate
 from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
 from fracslice.mesh.checks import check_mesh
-from fracslice.mesh.model import component_sizes, edge_topology
+from fracslice.mesh.model import build, component_sizes, edge_topology, self_intersecting_triangles
 from fracslice.mesh.shells import nesting
-from fracslice.mesh.spatial import build, self_intersecting_triangles
 from tests.examples import stamped
 
 from .shapes import BAD, GOOD, cube, inverted, sphere, torus, with_moved

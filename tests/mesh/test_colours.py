@@ -12,7 +12,7 @@ from fracslice import make_mesh
 from fracslice.errors import SceneError
 from fracslice.formulas import julia, mandelbox, material, sphere, transform, union
 from fracslice.mesh import Mesh
-from fracslice.rendering.painting import paint
+from fracslice.rendering.materials import paint
 from fracslice.work import Work
 
 RED, BLUE = (0.9, 0.1, 0.2), (0.1, 0.2, 0.8)

@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from fracslice.common.triangles import concatenate
+from fracslice.common.arrays import concatenate
 from fracslice.errors import MeshError
 from fracslice.formulas import sphere as ball
 from fracslice.mesh import Mesh
@@ -15,8 +15,7 @@ from fracslice.mesh import shells as surveys
 from fracslice.mesh.checks import check_mesh
 from fracslice.mesh.contouring import Piece, contour_pieces
 from fracslice.mesh.model import Removed, Shells, choose
-from fracslice.mesh.pieces import Pieces
-from fracslice.mesh.shells import WholeShells, survey
+from fracslice.mesh.shells import Pieces, WholeShells, survey
 from fracslice.volume import SignBricks
 
 from .shapes import cube, inverted, sphere

@@ -13,10 +13,9 @@ from scipy.spatial.transform import Rotation
 
 from fracslice._native import Cells, Contouring
 from fracslice.errors import MeshError
+from fracslice.fields.devices import ArrayField, reference
 from fracslice.fields.field import Bounds, Device, Kernel, Precision
 from fracslice.fields.node import FORMULAS
-from fracslice.fields.reference import reference
-from fracslice.fields.tree import ArrayField
 from fracslice.formulas import (
     Node,
     Number,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fracslice._native import Cells
-from fracslice.fields.reference import reference
+from fracslice.fields.devices import reference
 from fracslice.formulas import box, difference, mandelbulb, sphere, torus, transform, union
 from fracslice.mesh.contouring import Refiner
 from fracslice.volume import Bricks, plan, sample_scene

@@ -14,7 +14,7 @@ from fracslice._native import Cells, marching_cubes, open_edges
 from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
 from fracslice.mesh.contouring import extract, minimum_edge_parameter
-from fracslice.mesh.spatial import self_intersecting_triangles
+from fracslice.mesh.model import self_intersecting_triangles
 from fracslice.volume.bricks import INSIDE, OUTSIDE, Bricks
 from tests.fields import blobs, bricks_of, grid_points, noise
 

@@ -8,8 +8,8 @@ import trimesh
 
 from fracslice.formulas import box, sphere
 from fracslice.mesh import Mesh
+from fracslice.mesh.model import Nearest
 from fracslice.mesh.models import MeshField
-from fracslice.mesh.spatial import Nearest
 from fracslice.volume import plan
 
 

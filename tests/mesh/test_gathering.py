@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fracslice.mesh.pieces import gather_rows
+from fracslice.mesh.shells import gather_rows
 
 
 @pytest.mark.parametrize("size", [1, 5, 1 << 17])
 @pytest.mark.parametrize("shape", [(0,), (23,), (7, 6)])
 def test_gathering_is_indexing(size: int, shape: tuple[int, ...], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fracslice.mesh.pieces.ROWS", size)
+    monkeypatch.setattr("fracslice.mesh.shells.ROWS", size)
     rng = np.random.default_rng(1)
     table, rows = rng.random((9, 3)), rng.integers(9, size=shape).astype(np.int32)
     for values in (table, table[:, 0] > 0.5):

@@ -15,13 +15,12 @@ import pytest
 import trimesh
 
 from fracslice import from_trimesh, make_mesh
-from fracslice.common.triangles import concatenate
+from fracslice.common.arrays import concatenate
 from fracslice.errors import FracsliceWarning, MeshError, SceneError
 from fracslice.expr.intervals import ARRAYS, Interval
 from fracslice.fields import cpu
-from fracslice.fields.devices import for_field
+from fracslice.fields.devices import enclosure, for_field, reference
 from fracslice.fields.linker import link
-from fracslice.fields.reference import enclosure, reference
 from fracslice.formulas import Node, box, model, shell, sphere, transform, twist, union
 from fracslice.mesh import Mesh, models
 from fracslice.scene import read, reads, to_xml
@@ -189,6 +188,7 @@ def test_one_code_serves_all_models_and_keeps_theirs_alive(tmp_path: Path) -> No
     assert alive() is not None
     assert made.points(np.array([5.0]), np.array([5.0]), np.array([5.0]))[0] == -5
     made.__dict__.clear()
+    del other
     gc.collect()
     assert alive() is None
 

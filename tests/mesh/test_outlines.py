@@ -16,9 +16,9 @@ from shapely.geometry import Point, Polygon
 from fracslice import make_mesh
 from fracslice.errors import SceneError
 from fracslice.expr.intervals import ARRAYS, Interval
-from fracslice.fields.reference import enclosure, reference
+from fracslice.fields.devices import enclosure, reference
 from fracslice.formulas import Node, cylinder, extrude, revolve, shell, twist
-from fracslice.mesh import outlines, svg
+from fracslice.mesh import outlines
 from fracslice.scene import read, reads, scene, to_xml
 
 pytestmark = pytest.mark.once
@@ -35,7 +35,7 @@ def drawn(inside: str, path: Path, root: str = "width='100mm' height='80mm' view
 
 def area(inside: str, tmp_path: Path, **root: str) -> shapely.Geometry:
     """What elements fill, mm."""
-    return outlines.area_of(svg.read_svg(drawn(inside, tmp_path / "area.svg", **root)))
+    return outlines.area_of(outlines.read_svg(drawn(inside, tmp_path / "area.svg", **root)))
 
 
 def star(count: int, inner: float, outer: float, at: complex = 0) -> Polygon:

@@ -21,12 +21,11 @@ from fracslice._native import (
     surroundings,
     touching,
 )
-from fracslice.common.triangles import concatenate
+from fracslice.common.arrays import concatenate
 from fracslice.mesh import Mesh
 from fracslice.mesh.cleaning import place_and_round, quantise
-from fracslice.mesh.model import component_sizes
+from fracslice.mesh.model import component_sizes, self_intersecting_triangles
 from fracslice.mesh.shells import nesting
-from fracslice.mesh.spatial import self_intersecting_triangles
 
 from .shapes import cube, inverted
 

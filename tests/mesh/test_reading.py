@@ -134,7 +134,7 @@ TENFOLD, CHAIN = (
         ({"build": ""}, "asks to build nothing"),
         ({"build": '<item objectid="9"/>'}, "no such object: 9"),
         ({"build": '<item objectid="1" transform="1 2 3"/>'}, "not a valid 3MF"),
-        (second('<components><component objectid="2"/></components>'), "no such object"),
+        (second('<components><component objectid="2"/></components>'), "nested more than 32 deep"),
         (second(NO_VERTICES), "does not exist"),
         (second(TWICE), "names a vertex twice"),
         (second(NO_NUMBER), "not a valid 3MF"),
@@ -147,7 +147,7 @@ TENFOLD, CHAIN = (
         ),
         (
             {"more": CHAIN, "build": "".join(f'<item objectid="{k}"/>' for k in range(1, 99))},
-            "no such object",
+            "nested more than 32 deep",
         ),
         ({"build": '<item objectid="1"/>' * (1 << 16)}, "more than 65536 objects and parts"),
         (

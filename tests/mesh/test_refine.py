@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from fracslice import MeshJob, make_mesh
-from fracslice.fields.reference import reference
+from fracslice.fields.devices import reference
 from fracslice.formulas import (
     Node,
     box,

@@ -15,7 +15,7 @@ from PIL import Image
 
 from fracslice import make_mesh
 from fracslice.errors import SceneError
-from fracslice.fields.reference import reference
+from fracslice.fields.devices import reference
 from fracslice.formulas import Node, box, heightmap, lithophane, relief
 from fracslice.mesh.reliefs import grey
 from fracslice.scene import read, reads, scene, to_xml

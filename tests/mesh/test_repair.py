@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from fracslice.cli.main import run
 
-from fracslice.common.triangles import concatenate
+from fracslice.common.arrays import concatenate
 from fracslice.mesh import Mesh
+from fracslice.mesh.checks import repair
 from fracslice.mesh.cleaning import quantise_mesh
 from fracslice.mesh.models import faults, read_mesh
-from fracslice.mesh.repair import repair
 
 from . import shapes
 

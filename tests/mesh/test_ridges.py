@@ -14,10 +14,10 @@ from fracslice.mesh.checks import check_mesh
 from fracslice.mesh.cleaning import quantise_mesh
 from fracslice.mesh.contouring import contour_whole
 from fracslice.mesh.fit import Fit
-from fracslice.mesh.pieces import Pieces
+from fracslice.mesh.model import Nearest
 from fracslice.mesh.refine import on_creases
 from fracslice.mesh.ridges import with_ridges
-from fracslice.mesh.spatial import Nearest
+from fracslice.mesh.shells import Pieces
 from fracslice.mesh.tips import pointed_in, with_tips
 from fracslice.volume import plan, sample_scene
 from fracslice.work import Work

@@ -14,9 +14,8 @@ from fracslice.mesh import Mesh
 from fracslice.mesh.checks import check_mesh
 from fracslice.mesh.cleaning import quantise_mesh
 from fracslice.mesh.contouring import contour
-from fracslice.mesh.model import edge_topology
+from fracslice.mesh.model import Nearest, edge_topology, self_intersecting_triangles
 from fracslice.mesh.simplify import Collapse, simplify, simplify_to
-from fracslice.mesh.spatial import Nearest, self_intersecting_triangles
 from fracslice.volume import plan, sample_scene
 from fracslice.work import Work
 

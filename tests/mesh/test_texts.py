@@ -17,7 +17,7 @@ from fontTools.ttLib import TTFont
 
 from fracslice import make_mesh
 from fracslice.errors import SceneError
-from fracslice.fields.reference import reference
+from fracslice.fields.devices import reference
 from fracslice.formulas import text
 from fracslice.mesh import outlines
 from fracslice.scene import read, reads, scene, to_xml

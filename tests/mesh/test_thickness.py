@@ -12,9 +12,9 @@ from fracslice.formulas import Node, box, cylinder, gyroid, intersection, sphere
 from fracslice.jobs.mesh_steps import Checks, Finish
 from fracslice.mesh import Mesh
 from fracslice.mesh.checks import Tally
-from fracslice.mesh.spatial import build
+from fracslice.mesh.model import build
 from fracslice.mesh.tips import Late
-from fracslice.printing.thickness import MeshSurface, ThinWalls, thickness_note, thin_walls
+from fracslice.printing.walls import MeshSurface, ThinWalls, thickness_note, thin_walls
 from fracslice.scene import Print, scene
 from tests.mesh import shapes
 

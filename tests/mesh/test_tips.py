@@ -12,7 +12,7 @@ from fracslice.mesh import Mesh
 from fracslice.mesh.checks import check_mesh
 from fracslice.mesh.cleaning import quantise_mesh
 from fracslice.mesh.contouring import Piece, contour
-from fracslice.mesh.pieces import Pieces
+from fracslice.mesh.shells import Pieces
 from fracslice.mesh.tips import pointed_in, with_tips
 from fracslice.scene import scene
 from fracslice.volume import plan, sample_scene

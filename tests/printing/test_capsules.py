@@ -8,7 +8,7 @@ import pytest
 from fracslice.fields.cpu import compile_scene
 from fracslice.formulas import sphere
 from fracslice.printing.bridging import capsules
-from fracslice.printing.samples import positions
+from fracslice.printing.walls import positions
 from fracslice.volume import Bricks, Lattice, sample
 from tests.examples import stamped
 

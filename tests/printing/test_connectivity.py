@@ -13,11 +13,11 @@ from fracslice.printing import bridging, printable
 from fracslice.printing import thin_features as connectivity
 from fracslice.printing.edits import EditedField
 from fracslice.printing.preparation import COARSE
-from fracslice.printing.samples import SolidComponents, components_of, thin_share
 from fracslice.printing.thin_features import resolve_connectivity, thin_features
+from fracslice.printing.walls import SolidComponents, components_of, thin_share
 from fracslice.scene import Print, scene
 from fracslice.volume import Lattice, Plan, plan, sample, sample_scene_signs
-from fracslice.volume.sizing import Sizing
+from fracslice.volume.amount import Sizing
 from fracslice.work import Work
 from tests.examples import stamped
 

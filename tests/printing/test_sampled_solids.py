@@ -15,9 +15,17 @@ from fracslice.errors import VolumeError
 from fracslice.fields.cpu import compile_scene
 from fracslice.formulas import Node, box, mandelbulb, shell, sphere, transform, union
 from fracslice.printing.bridging import capsules, nearer
-from fracslice.printing.samples import Samples, components_of, thin_share, together
 from fracslice.printing.thin_features import thin_features
-from fracslice.printing.walls import Measure, edge_crossings, project_faces, walls_of
+from fracslice.printing.walls import (
+    Measure,
+    Samples,
+    components_of,
+    edge_crossings,
+    project_faces,
+    thin_share,
+    together,
+    walls_of,
+)
 from fracslice.volume import Bricks, Lattice, sample
 from fracslice.volume.bricks import INSIDE, OUTSIDE
 from fracslice.work import Work

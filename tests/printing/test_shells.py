@@ -10,8 +10,8 @@ import pytest
 from fracslice.checks.problems import Limits
 from fracslice.checks.solid_checks import SolidReport, check_object
 from fracslice.formulas import Node, box, difference, julia, shell, sphere, transform, union
-from fracslice.printing.samples import components_of
 from fracslice.printing.thin_features import resolve_connectivity, sampled_object
+from fracslice.printing.walls import components_of
 from fracslice.volume import plan
 from fracslice.work import Work
 

@@ -37,14 +37,13 @@ from fracslice.formulas import (
 )
 from fracslice.printing import printable
 from fracslice.printing.edits import frame_bodies
-from fracslice.printing.samples import Samples, components_of
-from fracslice.printing.walls import Widths, walls
+from fracslice.printing.walls import Samples, Widths, components_of, walls
 from fracslice.scene import Print, scene
 from fracslice.slicing import SliceJob, plan_stack
 from fracslice.slicing.layers import Slicer
 from fracslice.volume import Drain, Plan, plan, sample_scene
+from fracslice.volume.amount import Sizing
 from fracslice.volume.bricks import from_grid, to_grid
-from fracslice.volume.sizing import Sizing
 from fracslice.work import Work
 
 pytestmark = pytest.mark.once

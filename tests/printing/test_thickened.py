@@ -12,11 +12,10 @@ from scipy.spatial.transform import Rotation
 from fracslice.formulas import Node, box, cylinder, difference, julia, shell, sphere, transform, union
 from fracslice.printing import preparation, printable
 from fracslice.printing.bridging import contacts
-from fracslice.printing.samples import Samples, SolidComponents, components_of, together
-from fracslice.printing.walls import walls
+from fracslice.printing.walls import Samples, SolidComponents, components_of, together, walls
 from fracslice.scene import Print
 from fracslice.volume import Plan, plan, sample_scene
-from fracslice.volume.sizing import Sizing
+from fracslice.volume.amount import Sizing
 from fracslice.work import Work
 
 pytestmark = pytest.mark.once

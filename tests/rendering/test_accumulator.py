@@ -20,7 +20,7 @@ from fracslice.rendering.accumulator import (
     least_gain,
     tile_order,
 )
-from fracslice.rendering.units.pixel import squared_error
+from fracslice.rendering.units.camera import squared_error
 from fracslice.scene.view import View
 from fracslice.work import Work
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from fracslice.expr import cuda_driver
-from fracslice.expr.compiler import compile_ptx
+from fracslice.expr.emitter import compile_ptx
 from fracslice.expr.graph import NOTHING
 from fracslice.rendering.accumulator import CHANNELS, HostAccumulator, PassPlan, tile_order
 from fracslice.rendering.cuda import LOOPS, CudaAccumulator, CudaTracer

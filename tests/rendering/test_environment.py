@@ -15,9 +15,9 @@ from fracslice.export.images import write_image
 from fracslice.formulas import Node, material, plane, sphere
 from fracslice.rendering import Pass, Renderer, lighting
 from fracslice.rendering.environments import Environment, LinearImage, load_picture
-from fracslice.rendering.units import environment as units
-from fracslice.rendering.units.glossy import facet_density, glossy, highlight
-from fracslice.rendering.units.pixel import linear
+from fracslice.rendering.units import shade as units
+from fracslice.rendering.units.camera import linear
+from fracslice.rendering.units.shade import facet_density, glossy, highlight
 from fracslice.scene import reads
 from fracslice.scene.view import Camera, Light, Shading, View
 from fracslice.work import Work
@@ -105,6 +105,7 @@ def test_hostile_pictures_are_one_line(tmp_path: Path, recwarn, capfd) -> None: 
     (tmp_path / "thin.hdr").write_bytes(HEAD + b"-Y 4 +X 0\n")
     (tmp_path / "huge.hdr").write_bytes(HEAD + b"-Y 999999 +X 999999\n\2\2\0\0")
     Image.new("1", (10_000, 10_000)).save(tmp_path / "large.png")
+    Image.new("1", (20_000, 10_000)).save(tmp_path / "larger.png")
     write_image(tmp_path / "cut.exr", light := sky(), light)
     data = (tmp_path / "cut.exr").read_bytes()
     (tmp_path / "cut.exr").write_bytes(data[: len(data) * 2 // 3])
@@ -115,6 +116,7 @@ def test_hostile_pictures_are_one_line(tmp_path: Path, recwarn, capfd) -> None: 
         ("thin.hdr", "0 x 4 pixels"),
         ("huge.hdr", "999999 x 999999 pixels: expected at most 67108864"),
         ("large.png", "10000 x 10000 pixels: expected at most 67108864"),
+        ("larger.png", "too many pixels: expected at most 67108864"),
         ("cut.exr", "not a picture"),
         ("pipe.png", "expected a file, found a pipe"),
         ("pipe.exr", "expected a file, found a pipe"),
@@ -143,7 +145,7 @@ def test_a_picture_that_cannot_be_read_is_named(tmp_path: Path) -> None:
         ("a.hdr", "it ends too early"),
         ("b.exr", ""),
         ("c.hdr", "No such file or directory"),
-        ("d.png", "exceeds limit of 178956970 pixels"),
+        ("d.png", "too many pixels: expected at most 67108864 of them"),
     ):
         read = reads(text.format(f'file="{tmp_path / name}"'))
         with pytest.raises(SceneError, match=f"(?s)^scene:2: <light> .*{name}.*{message}.*; expected a .hdr"):

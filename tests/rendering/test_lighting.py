@@ -12,7 +12,7 @@ from PIL import Image
 from fracslice.errors import RenderError, SceneError
 from fracslice.formulas import Node, box, difference, material, plane, repeat, sphere, transform, union
 from fracslice.rendering import Pass, Renderer, develop, progressive
-from fracslice.rendering.units.pixel import linear
+from fracslice.rendering.units.camera import linear
 from fracslice.rendering.units.shade import dielectric, goes_on, height_fog, lacquer
 from fracslice.scene.lights.sky import sky
 from fracslice.scene.view import Camera, Film, Fog, Light, Shading, View

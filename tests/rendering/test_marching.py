@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fracslice.fields.cpu import compile_scene
-from fracslice.fields.reference import reference
+from fracslice.fields.devices import reference
 from fracslice.formulas import (
     Node,
     box,

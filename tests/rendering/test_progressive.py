@@ -14,7 +14,7 @@ from fracslice.errors import Cancelled, RenderError
 from fracslice.formulas import material, menger, sphere, union
 from fracslice.rendering import Renderer, packets, progressive
 from fracslice.rendering.accumulator import CHANNELS, COUNT, COVER, GOAL
-from fracslice.rendering.units.pixel import sample
+from fracslice.rendering.units.camera import sample
 from fracslice.scene import library, read
 from fracslice.scene.view import Camera, Film, Light, View
 from fracslice.work import Work

@@ -9,11 +9,10 @@ import pytest
 
 from fracslice.formulas import Node, box, difference, mandelbulb, material, plane, sphere, transform, union
 from fracslice.rendering import Renderer, materials
-from fracslice.rendering.glow import glowing_bodies
 from fracslice.rendering.lighting import reflected_shares
-from fracslice.rendering.units.glossy import glossy, highlight, lost
-from fracslice.rendering.units.pixel import linear
-from fracslice.rendering.units.shade import varied
+from fracslice.rendering.materials import glowing_bodies
+from fracslice.rendering.units.camera import linear
+from fracslice.rendering.units.shade import glossy, highlight, lost, varied
 from fracslice.scene.view import Camera, Light, Shading, View
 from fracslice.work import Work
 from tests.examples import stamped

@@ -9,7 +9,7 @@ import pytest
 
 from fracslice.rendering.accumulator import DIMENSIONS
 from fracslice.rendering.accumulator import points as sequence
-from fracslice.rendering.units.pixel import centred, sample
+from fracslice.rendering.units.camera import centred, sample
 
 
 def points(pixel: int, count: int, dimensions: int = 2, first: object = sample) -> np.ndarray:

@@ -11,7 +11,7 @@ from PIL import Image
 from fracslice.errors import SceneError
 from fracslice.formulas import box, material
 from fracslice.rendering import Renderer
-from fracslice.rendering.units.pixel import linear
+from fracslice.rendering.units.camera import linear
 from fracslice.scene import reads
 from fracslice.scene.view import Camera, Shading, View
 from fracslice.work import Work

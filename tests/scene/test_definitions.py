@@ -17,7 +17,7 @@ from fracslice.errors import SceneError
 from fracslice.fields.cpu import compile_scene
 from fracslice.fields.definitions import definitions
 from fracslice.fields.depth import resolve_depths
-from fracslice.fields.reference import reference
+from fracslice.fields.devices import reference
 from fracslice.formulas import get, mandelbox, orbit
 from fracslice.scene import Scene, read, reads, to_xml
 from fracslice.scene.manual import OPEN, PATH

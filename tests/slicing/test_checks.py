@@ -26,9 +26,16 @@ from fracslice.formulas import (
 )
 from fracslice.scene import Print
 from fracslice.slicing import SliceJob, Slicer, plan_stack
-from fracslice.slicing.feature_graph import Graph, farthest, unsupported_pixels
+from fracslice.slicing.feature_graph import (
+    Graph,
+    Runs,
+    farthest,
+    layer_components,
+    overlaps,
+    unsupported_pixels,
+    widths,
+)
 from fracslice.slicing.printers import PRINTERS
-from fracslice.slicing.runs import Runs, layer_components, overlaps, widths
 from fracslice.volume import extent
 from fracslice.work import Work
 

@@ -9,7 +9,7 @@ import pytest
 from scipy import ndimage
 
 from fracslice import _slices
-from fracslice.slicing.runs import Runs, _largest_near, layer_components, overlaps
+from fracslice.slicing.feature_graph import Runs, _largest_near, layer_components, overlaps
 
 from .test_checks import runs_of
 

@@ -11,7 +11,7 @@ from PIL import Image
 
 from fracslice.formulas import box, transform, union
 from fracslice.slicing import SliceJob, Slicer, plan_stack
-from fracslice.slicing.preview import animation, contact_sheet, thumbnail, worst_layers
+from fracslice.slicing.raster import animation, contact_sheet, thumbnail, worst_layers
 
 PLATE = union(box(size=(4, 2, 0.5)), transform(box(size=(1, 1, 1)), translate=(1.5, 0.5, 0.5)))
 """Its tower is at the right, at the back."""

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from fracslice.fields.cpu import compile_scene
+from fracslice.fields.devices import reference
 from fracslice.fields.field import Precision
-from fracslice.fields.reference import reference
 from fracslice.formulas import Node
 
 from .extremes import extreme_versions, hostile_points

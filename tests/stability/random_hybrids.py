@@ -9,8 +9,8 @@ import numpy as np
 from fracslice.common.parameters import REQUIRED, Choice, Count, Number, Vector
 from fracslice.errors import SceneError, VolumeError
 from fracslice.fields.cpu import compile_scene
+from fracslice.fields.devices import reference
 from fracslice.fields.orbits import ITERATIONS
-from fracslice.fields.reference import reference
 from fracslice.formulas import Formula, Node, orbit, transform
 from fracslice.scene.layout import formulas
 from fracslice.volume import Plan, plan, sample_scene

@@ -11,7 +11,7 @@ import numpy as np
 
 from fracslice.common.parameters import AUTO, REQUIRED, Axis, Choice, Count, Number, Vector
 from fracslice.errors import FracsliceError
-from fracslice.fields.reference import reference
+from fracslice.fields.devices import reference
 from fracslice.formulas import Formula, Node, bounds, orbit
 from fracslice.scene.layout import formulas
 from tests.examples import OF_FILES

@@ -14,8 +14,8 @@ from fracslice._native import Sides
 from fracslice.errors import Cancelled, SceneError
 from fracslice.fields.box import Box
 from fracslice.fields.cpu import compile_scene
+from fracslice.fields.devices import ArrayField
 from fracslice.fields.field import Bounds, Device, Kernel, Precision
-from fracslice.fields.tree import ArrayField
 from fracslice.formulas import (
     Node,
     box,

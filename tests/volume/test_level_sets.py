@@ -15,7 +15,7 @@ from fracslice import from_grid, from_vdb, make_mesh, read, sphere, write_vdb
 from fracslice._vdb import Grid
 from fracslice.errors import ExportError, FracsliceError, MeshError, SceneError, VolumeError
 from fracslice.expr.intervals import ARRAYS, Interval
-from fracslice.fields.reference import enclosure, reference
+from fracslice.fields.devices import enclosure, reference
 from fracslice.formulas import Node, box, cylinder, difference, gyroid, shell, twist, union
 from fracslice.mesh import Mesh
 from fracslice.mesh.models import read_mesh

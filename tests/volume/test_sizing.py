@@ -24,8 +24,8 @@ from fracslice.jobs.mesh import make_mesh as mesh_of
 from fracslice.records import MeshJob
 from fracslice.scene import Print, Scene, reads, scene, to_xml
 from fracslice.volume import extent
+from fracslice.volume.amount import Sizing, sizing
 from fracslice.volume.extent import _kept
-from fracslice.volume.sizing import Sizing, sizing
 from tests.examples import stamped
 
 pytestmark = pytest.mark.once

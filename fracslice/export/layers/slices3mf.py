@@ -8,7 +8,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from ...common.packages import package, rows
+from ...common.files import package, rows
 from ...errors import ExportError
 from ...slicing import Layer
 from ..layer_formats import FileFormat

@@ -10,10 +10,8 @@
 #include "input.h"
 #include "quantise.h"
 #include "predicates.h"
-#include "selection.h"
-#include "thin_walls.h"
-#include "tree.h"
 #include "export.h"
+#include "tree.h"
 
 namespace fracslice::mesh {
 namespace {

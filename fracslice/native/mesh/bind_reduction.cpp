@@ -1,7 +1,6 @@
 // Fewer triangles, how far they are, a mesh as a field, outlines and reliefs: classes of fracslice._native that keep the arrays they look into.
 #include "../unlocked.h"
 #include "input.h"
-#include "mesh_field.h"
 #include "outline.h"
 #include "reduction.h"
 #include "relief.h"

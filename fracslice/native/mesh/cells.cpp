@@ -5,7 +5,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
-#include "blocks.h"
+#include "triangles.h"
 
 namespace fracslice::mesh {
 namespace {

@@ -9,9 +9,8 @@
 #include <utility>
 
 #include "../disjoint_sets.h"
-#include "blocks.h"
-#include "predicates.h"
 #include "triangles.h"
+#include "predicates.h"
 
 namespace fracslice::mesh {
 namespace {

@@ -6,7 +6,6 @@
 #include <type_traits>
 
 #include "../numpy.h"
-#include "blocks.h"
 #include "triangles.h"
 
 namespace fracslice::mesh {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "../compiler.h"
-#include "blocks.h"
+#include "triangles.h"
 #include "topology.h"
 
 namespace fracslice::mesh {

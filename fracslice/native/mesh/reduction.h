@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "../array.h"
-#include "distance.h"
+#include "nearest.h"
 #include "topology.h"
 
 // The triangles around a vertex, and what they become when it moves to one of its neighbours.

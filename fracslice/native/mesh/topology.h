@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "../array.h"
-#include "blocks.h"
 #include "triangles.h"
 
 namespace fracslice::mesh {

@@ -1,4 +1,4 @@
-// A sampled field, interpolated between its samples, and rays through it: `fracslice.printing.samples`, `fracslice.printing.walls`.
+// A sampled field, interpolated between its samples, and rays through it: `fracslice.printing.walls`, `fracslice.printing.walls`.
 #pragma once
 #include <array>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "../array.h"
-#include "../volume/bricks.h"
+#include "../volume/signs.h"
 
 namespace fracslice::printing {
 

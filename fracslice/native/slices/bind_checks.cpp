@@ -30,7 +30,7 @@ nb::object pixels(const Image<From>& image) {
     return to_numpy<T>(image.pixels, {size_t(image.height), size_t(image.width)});
 }
 
-// An object of fracslice.slicing.runs.Runs.
+// An object of fracslice.slicing.feature_graph.Runs.
 class RunsArrays {
   public:
     explicit RunsArrays(const nb::object& runs)
@@ -50,7 +50,7 @@ class RunsArrays {
     Vector<int32_t> rows_, begin_, end_;
 
   public:
-    Runs view;
+    LayerRuns view;
 };
 
 void require_like(const RunsArrays& one, const RunsArrays& other) {

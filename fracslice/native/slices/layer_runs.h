@@ -1,4 +1,4 @@
-// Layers as runs of pixels: components, overlaps and what nothing supports; `fracslice.slicing.runs`.
+// Layers as runs of pixels: components, overlaps and what nothing supports; `fracslice.slicing.feature_graph`.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -8,7 +8,7 @@
 namespace fracslice::slices {
 
 // Row y has the runs rows[y] to rows[y + 1] - 1, each of the pixels from its begin to its end, which is excluded.
-struct Runs {
+struct LayerRuns {
     std::span<const int32_t> rows, begin, end;
     int width;
 
@@ -23,7 +23,7 @@ struct OwnedRuns {
 };
 
 // The runs between runs.
-OwnedRuns gaps(const Runs& runs);
+OwnedRuns gaps(const LayerRuns& runs);
 
 struct RunComponents {
     std::vector<int64_t> label;                 // of each run
@@ -33,14 +33,14 @@ struct RunComponents {
 };
 
 // Connects runs that overlap, or at `reach` 1 touch at a corner.
-RunComponents components(const Runs& runs, int reach);
+RunComponents components(const LayerRuns& runs, int reach);
 
 // Components of two layers, of the same rows, that share a pixel: pairs in ascending order.
-std::vector<std::array<int64_t, 2>> overlaps(const Runs& below, std::span<const int64_t> labels_below, const Runs& above,
+std::vector<std::array<int64_t, 2>> overlaps(const LayerRuns& below, std::span<const int64_t> labels_below, const LayerRuns& above,
                                              std::span<const int64_t> labels_above);
 
 // Pixels of a layer farther than `reach` pixels from all of the layer below.
-OwnedRuns unsupported(const Runs& below, const Runs& above, double reach);
+OwnedRuns unsupported(const LayerRuns& below, const LayerRuns& above, double reach);
 
 // Rows of pixels.
 template <class T>
@@ -62,13 +62,13 @@ struct ImageView {
 };
 
 // Pixels of runs in each coarse pixel, which is `times` pixels across.
-Image<int32_t> count_pixels(const Runs& runs, int times);
+Image<int32_t> count_pixels(const LayerRuns& runs, int times);
 
 // Coarse pixels with a row or a column that is solid, or in gaps empty, for at most `longest` pixels along x and y.
-Image<uint8_t> narrow_pixels(const Runs& runs, bool gaps, int times, const std::array<int64_t, 2>& longest);
+Image<uint8_t> narrow_pixels(const LayerRuns& runs, bool gaps, int times, const std::array<int64_t, 2>& longest);
 
 // The part of a layer from row `top` and column `left` on.
-Image<uint8_t> painted(const Runs& runs, int top, int left, int height, int width);
+Image<uint8_t> painted(const LayerRuns& runs, int top, int left, int height, int width);
 
 // Distance of each pixel to the nearest one that is not of the region, 0 there; infinite if all are. Exact, between centres of
 // pixels of this height and width.

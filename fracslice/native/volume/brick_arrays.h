@@ -1,7 +1,7 @@
 // Views of the NumPy arrays of fracslice.volume.bricks.Bricks.
 #pragma once
 #include "../numpy.h"
-#include "bricks.h"
+#include "signs.h"
 
 namespace fracslice::volume {
 

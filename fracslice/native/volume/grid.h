@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "../array.h"
-#include "bricks.h"
+#include "signs.h"
 
 namespace fracslice::volume {
 

@@ -31,6 +31,7 @@ class Kind:
     is_soft: Callable[[Light], bool] = lambda light: light.size > 0  # whether its unit reads u and v
     # false if the surfaces in view never block it; then fog does not scatter it
     is_blocked: bool = True
+    is_picture: bool = False  # whether its light is that of a file
     # whether rays that continue meet a light with a size, which has `disc_values`
     is_disc: bool = False
     # factor on its strength, by the eye and the point that it looks at

@@ -4,4 +4,4 @@ from __future__ import annotations
 
 from . import Kind
 
-KIND = Kind("a picture of the surroundings")
+KIND = Kind("a picture of the surroundings", is_picture=True)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ...expr.vectors import TURN
-from ...expr.vocabulary import cos, maximum, rsqrt, sin, sqrt
+from ...expr.vocabulary import TURN, cos, maximum, rsqrt, sin, sqrt
 from . import Kind, Point, Unit
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from ...expr.vectors import disc, frame, normalised
+from ...expr.vocabulary import disc, frame, normalised
 from . import Kind, Point, Unit
 
 if TYPE_CHECKING:

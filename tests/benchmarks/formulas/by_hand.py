@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import Any
 
 from fracslice.expr.vocabulary import absolute, any_of, maximum, minimum, ratio, sqrt, where
-from fracslice.fields.escape import CORE, potential_distance
+from fracslice.fields.maps import CORE, potential_distance
 from fracslice.fields.orbits import orbit_arguments
 from fracslice.formulas import Formula, Node
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from fracslice import make_mesh
 from fracslice.fields.cpu import compile_scene
-from fracslice.fields.reference import reference
+from fracslice.fields.devices import reference
 from fracslice.formulas import Formula, Node
 from fracslice.scene.layout import formulas
 from tests.examples import EXAMPLES

@@ -17,7 +17,7 @@ from fracslice.expr import frontend
 from fracslice.formulas import Node, julia, mandelbulb, menger, plane, transform, union
 from fracslice.rendering import Renderer, packets
 from fracslice.rendering.accumulator import CHANNELS, COUNT, GOAL, PassPlan, tile_order
-from fracslice.rendering.units.pixel import hashed
+from fracslice.rendering.units.camera import hashed
 from fracslice.scene.view import Camera, Light, View
 from fracslice.work import Work
 

@@ -21,7 +21,7 @@ from fracslice.formulas import Node, box, material, transform
 from fracslice.rendering import Renderer
 from fracslice.rendering.accumulator import SampleRange
 from fracslice.rendering.progressive import layer
-from fracslice.rendering.units.pixel import linear
+from fracslice.rendering.units.camera import linear
 from fracslice.scene.view import Camera, Light, Shading, View
 from fracslice.work import Work
 

@@ -13,7 +13,7 @@ from itertools import product
 
 import numpy as np
 
-from fracslice.fields.reference import reference
+from fracslice.fields.devices import reference
 from fracslice.formulas import Node, julia, mandelbulb, menger, sphere
 
 from ..runner import Row, Run

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fracslice.fields import cuda
-from fracslice.fields.reference import reference
+from fracslice.fields.devices import reference
 from fracslice.formulas import Node
 from tests.examples import EXAMPLES
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fracslice.fields.reference import reference
+from fracslice.fields.devices import reference
 from fracslice.formulas import Node, box, julia, menger, sphere, torus, transform
 from fracslice.mesh.contouring import contour, extract
 from fracslice.mesh.refine import refine

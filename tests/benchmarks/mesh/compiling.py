@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import partial
 
-from fracslice.expr import compiler
-from fracslice.expr.host import REGISTERS, host, lane_count
+from fracslice.expr import emitter
 from fracslice.expr.loops import bricks, points
+from fracslice.expr.runtime import REGISTERS, host, lane_count
 from fracslice.fields.linker import link
 from fracslice.formulas import Node, bounds, box, sphere, transform, union
 
@@ -48,8 +48,8 @@ SCENES = {
 
 
 def compiled(root: Node) -> None:
-    target = compiler.Target(32, lane_count(32), REGISTERS, *host())
-    compiler.compile_object(link(root).program, target, (points, bricks))
+    target = emitter.Target(32, lane_count(32), REGISTERS, *host())
+    emitter.compile_object(link(root).program, target, (points, bricks))
 
 
 def rows(run: Run, scenes: tuple[str, ...] = tuple(SCENES)) -> Iterator[Row]:

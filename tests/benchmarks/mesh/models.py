@@ -67,8 +67,7 @@ def wrong(root: Node, mesh: Mesh, edge: float, points: int) -> int:
     tried = np.concatenate([near, anywhere])
     return int(
         (
-            (root.distance(tried) < 0)
-            != (MeshField(mesh).native.points(*np.ascontiguousarray(tried.T), False) < 0)
+            (root.distance(tried) < 0) != (MeshField(mesh).native.points(*np.ascontiguousarray(tried.T)) < 0)
         ).sum()
     )
 

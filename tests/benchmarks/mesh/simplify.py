@@ -16,9 +16,8 @@ from fracslice.mesh import Mesh
 from fracslice.mesh.checks import check_mesh
 from fracslice.mesh.cleaning import quantise_mesh
 from fracslice.mesh.contouring import contour
-from fracslice.mesh.model import to_manifold
+from fracslice.mesh.model import Nearest, to_manifold
 from fracslice.mesh.simplify import simplify
-from fracslice.mesh.spatial import Nearest
 from fracslice.volume import plan, sample_scene
 from fracslice.work import Work
 

@@ -12,13 +12,12 @@ from functools import partial
 from pathlib import Path
 
 from fracslice.export.layers import write_slices
-from fracslice.export.resins import Resin
 from fracslice.export.slice_run import SliceRun
 from fracslice.formulas import mandelbulb
 from fracslice.jobs.slices import StackModel
 from fracslice.scene import scene
 from fracslice.slicing import SliceJob, plan_stack
-from fracslice.slicing.printers import Printer
+from fracslice.slicing.printers import Printer, Resin
 from fracslice.slicing.raster import Screen
 from fracslice.work import Work
 

@@ -15,9 +15,9 @@ import numpy as np
 
 from fracslice.expr.loops import enclosures
 from fracslice.fields.cpu import compile_loops, compile_scene
+from fracslice.fields.devices import Enclosures
 from fracslice.fields.field import Cells
 from fracslice.fields.linker import link
-from fracslice.fields.tree import Enclosures
 from fracslice.formulas import (
     Node,
     bounds,
