@@ -40,6 +40,8 @@ def test_there_are_at_least_ten_and_they_show_what_there_is():
         "offset",
         "material",
         "noise",
+        "infill",
+        "relief",
     }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import reduce
 from typing import Any
@@ -150,8 +151,12 @@ for _operator in SHARP:
 @union.bounds
 def union_bounds(node: Node) -> Box:
     sharp, smooth = reduce(Box.__or__, (c.bounds.box for c in node.children)), node["smooth"]
-    width = max(smooth.most(sharp), 0.0) if isinstance(smooth, Varying) else smooth
-    return sharp.grown((len(node.children) - 1) * width / 4)
+    seams = len(node.children) - 1
+    if not isinstance(smooth, Varying):
+        return sharp.grown(seams * smooth / 4)
+    # Where seams reach beyond the box, they are wider by the slope times the way to a corner.
+    width, wider = max(smooth.most(sharp), 0.0), seams * math.sqrt(3) * smooth.slope / 4
+    return sharp.grown(seams * width / 4 / (1 - wider) if wider < 1 else math.inf)
 
 
 @intersection.bounds

@@ -100,6 +100,13 @@ def test_a_constant_width_is_the_same_seam() -> None:
     np.testing.assert_allclose(reference(sharp)(*POINTS), reference(union(*BALLS))(*POINTS), atol=1e-12)
 
 
+def test_seams_that_widen_beyond_the_elements_are_in_the_box() -> None:
+    root = union(box(), box().translate((1.1, 0, 0)), smooth="0.5+0.8*z")
+    x, y, z = RNG.uniform((-0.5, -0.5, 0.5), (1.6, 0.5, 1.2), (200_000, 3)).T
+    top = z[reference(root)(x, y, z) < 0].max()
+    assert 0.5 + (0.5 + 0.8 * 0.5) / 4 < top < root.bounds.box.hi[2]
+
+
 def test_functions_of_points_are_expressions() -> None:
     known = gyroid(thickness="(0.1 + (0.2 * abs(z)))")
     assert gyroid(thickness=lambda p: 0.1 + 0.2 * abs(p[2])) == known

@@ -97,6 +97,17 @@ def test_fields_keep_their_slope_and_box(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", SHAPES)
+def test_enclosures_hold_all_values(name: str) -> None:
+    root, half, rng = EXAMPLES[name], 0.05, np.random.default_rng(5)
+    centres = rng.uniform(-1, 1, (3, 300))
+    within = centres[:, :, None] + rng.uniform(-half, half, (3, 300, 50))
+    values = reference(root)(*within)
+    low, high = root.cells("float64").bounds(centres, half)
+    assert (low[:, None] <= values).all() and (values <= high[:, None]).all()
+    assert (low > 0).any()
+
+
+@pytest.mark.parametrize("name", SHAPES)
 def test_meshes_are_closed(name: str) -> None:
     mesh = make_mesh(EXAMPLES[name], resolution=65)
     assert mesh.is_watertight and mesh.volume > 0
