@@ -39,10 +39,7 @@ def test_no_two_public_classes_have_one_name(trees: dict[Path, ast.Module]) -> N
     assert [name for name, count in public.items() if count > 1] == []
 
 
-TWINS = {
-    "camera", "cuda", "environment", "film", "machine", "model", "models",
-    "outlines", "reliefs",
-}  # fmt: skip
+TWINS = {"camera", "cuda", "model", "models", "outlines", "reliefs"}
 """Modules of one name in two packages: mostly two sides of one thing, such as a formula and its kernel."""
 
 

@@ -2,7 +2,7 @@
 and places, fills to one area, and signed distances.
 
 After "Scalable Vector Graphics (SVG) 2", W3C 2018: paths and basic shapes with transforms, groups, symbols,
-`use` and nested `svg`; fills and fill rules by attributes, `style` and the simple selectors of style sheets.
+uses and nested drawings; fills and fill rules by attributes, `style` and the simple selectors of style sheets.
 Strokes, clipping and masks are left out. Entities, texts that are no paths, and malformed values are refused.
 """
 
@@ -297,7 +297,7 @@ def _declared(text: str) -> dict[str, str]:
 
 
 def _viewport(element: SvgElement, given: dict[str, str]) -> Affine:
-    """Map of the user units of an `svg` or `symbol` to the pixels around it.
+    """Map of the user units of a drawing or a symbol to the pixels around it.
 
     `given`: its place, and its size where that is another than its own.
     """

@@ -407,7 +407,7 @@ class Lighting:
         return paths and any(x.is_picture or seen_as_disc(x) for x in self.view.lights)
 
     def blocker(self) -> list[str]:
-        """Lines of `units.intrinsics.blocker`."""
+        """Lines of `units.march.blocker`."""
         opaque = opaque_part(self.root)
         if opaque is self.root:
             return ["return field(x, y, z, P)"]
@@ -536,7 +536,7 @@ class Lighting:
         return [] if fog is None or fog.density == 0 else fog_lines(self, fog, onward)
 
     def background(self) -> list[str]:
-        """Lines of `units.intrinsics.background`: the sky, else the colour of the fog, else of the film."""
+        """Lines of `units.march.background`: the sky, else the colour of the fog, else of the film."""
         view = self.view
         lit = view.shading.mode == "light"
         around = next((light for light in view.lights if lit and light.surrounds), None)

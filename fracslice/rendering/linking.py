@@ -205,7 +205,7 @@ class _Frame:
         return not (camera.aperture or camera.stereo or camera.kind == "orthographic")
 
     def surface(self, look: Look) -> list[str]:
-        """Lines of `units.intrinsics.surface`."""
+        """Lines of `units.march.surface`."""
         mode = self.view.shading.mode
         lines = ["h = width_at(path + t, P)"]
         if mode in ("light", "normal") or (mode == "albedo" and look.textured):

@@ -492,7 +492,7 @@ class Look:
         return [f"_, paint, tone = {link_tree(self.linker, self.root, dialect)}"]
 
     def transparent(self) -> list[str]:
-        """Return the lines of `units.intrinsics.transparent`."""
+        """Return the lines of `units.march.transparent`."""
         part = transparent_part(self.root)
         assert part
         dialect = TraceDialect(self.linker, materials=self.paints, traps=traps(self.root))
