@@ -2,7 +2,7 @@
 and places, fills to one area, and signed distances.
 
 After "Scalable Vector Graphics (SVG) 2", W3C 2018: paths and basic shapes with transforms, groups, symbols,
-uses and nested drawings; fills and fill rules by attributes, `style` and the simple selectors of style sheets.
+uses and nested drawings; fills and fill rules by attributes, `style` and simple selectors of style sheets.
 Strokes, clipping and masks are left out. Entities, texts that are no paths, and malformed values are refused.
 """
 
