@@ -79,6 +79,9 @@ factor by which it grows.
 MOST, RINGS, TURNS, RETRIES = 64, 6, 6, 8
 """Maximum triangles that a fan replaces, and their distance from a bad one; rounds of fans, and attempts."""
 
+MANY, FEWER = 1 << 13, 3
+"""Missed points above which there are fewer attempts, of some seconds each."""
+
 RIM = 20
 """Maximum corners of a rim that is triangulated anew."""
 
@@ -328,13 +331,31 @@ class _Sharpened:
 
     def caps(self) -> list[Cap]:
         """What is replaced by what; connected parts apart."""
+        gone, of_old, of_new = self._replaced()
+        corners = self.mesh.corners[self.parents < 0]
+        return [Cap(gone[of_old == one], corners[of_new == one]) for one in np.unique(of_old)]
+
+    def restored(self, some: NDArray[np.int64]) -> _Sharpened:
+        """The same with the old triangles in place of the connected parts that some new ones are in."""
+        gone, of_old, of_new = self._replaced()
+        new = np.flatnonzero(self.parents < 0)
+        bad = np.unique(of_new[np.isin(new, some)])
+        keep = np.ones(len(self.parents), bool)
+        keep[new[np.isin(of_new, bad)]] = False
+        back = gone[np.isin(of_old, bad)]
+        triangles = np.concatenate([self.mesh.triangles[keep], self.old.triangles[back]])
+        parents = np.concatenate([self.parents[keep], back])
+        rest = _Sharpened.plain(self.old, Mesh(self.mesh.vertices, triangles), parents)
+        rest.measured[: keep.sum()] = self.measured[keep]
+        return rest
+
+    def _replaced(self) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.int32]]:
+        """Old triangles that are replaced, their connected parts, and those of the new triangles."""
         new = self.mesh.triangles[self.parents < 0]
         gone = np.setdiff1d(np.arange(len(self.old.triangles)), self.parents)
         both = np.concatenate([new, self.old.triangles[gone]])
         labels, _ = connected_components(both, len(self.mesh.vertices))
-        of_new, of_old = labels[new[:, 0]], labels[self.old.triangles[gone, 0]]
-        corners = self.mesh.vertices[new]
-        return [Cap(gone[of_old == one], corners[of_new == one]) for one in np.unique(of_old)]
+        return gone, labels[self.old.triangles[gone, 0]], labels[new[:, 0]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -365,7 +386,7 @@ class _Sharpening:
         self._fixed[there] = True
         banned, reach, given = np.empty((0, 3)), NEAR * self._voxel, None
         stays, before = np.ones(len(corners), bool), math.inf
-        for _ in range(RETRIES):
+        for attempt in range(1, RETRIES + 1):
             self._work.check()
             if given is None or not stays[given.corners].all():
                 given = self._given(hosts, corners, np.flatnonzero(stays))
@@ -379,6 +400,8 @@ class _Sharpening:
             fewer, before = len(wrong) < before, len(wrong)
             if before >= ROUGH * len(result.new_vertices()):
                 return None
+            if attempt == RETRIES or (attempt == FEWER and len(given.missed.edges) > MANY):
+                return self._sound(result, wrong, fixed)
             at = np.unique(result.mesh.triangles[wrong])
             new = result.mesh.vertices[at[at >= len(mesh.vertices)]]
             spots = np.concatenate([new, result.mesh.corners[wrong].mean(axis=1)])
@@ -390,6 +413,18 @@ class _Sharpening:
             reach *= GROWTH
             stays = _away(corners, banned, reach)
         return None
+
+    def _sound(
+        self, state: _Sharpened, wrong: NDArray[np.int64], fixed: NDArray[np.bool_]
+    ) -> _Sharpened | None:
+        """The part with its old triangles where new ones are wrong; None if all are."""
+        while len(wrong):
+            self._work.check()
+            state = state.restored(wrong)
+            if not len(state.new_vertices()):
+                return None
+            wrong = self._wrong(state)
+        return self._patched(state, fixed)
 
     def _given(
         self, hosts: NDArray[np.int64], corners: NDArray[np.float64], which: NDArray[np.int64]

@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 from scipy.spatial import HalfspaceIntersection
 
-from fracslice.formulas import Node, difference, intersection, mandelbulb, menger, plane, sphere, transform
+from fracslice.formulas import (
+    Node,
+    difference,
+    heightmap,
+    intersection,
+    mandelbulb,
+    menger,
+    plane,
+    sphere,
+    transform,
+)
 from fracslice.mesh import Mesh
 from fracslice.mesh.checks import check_mesh
 from fracslice.mesh.cleaning import quantise_mesh
@@ -17,7 +29,7 @@ from fracslice.mesh.fit import Fit
 from fracslice.mesh.model import Nearest
 from fracslice.mesh.refine import on_creases
 from fracslice.mesh.ridges import with_ridges
-from fracslice.mesh.shells import Pieces
+from fracslice.mesh.shells import Pieces, rows
 from fracslice.mesh.tips import pointed_in, with_tips
 from fracslice.volume import plan, sample_scene
 from fracslice.work import Work
@@ -163,6 +175,15 @@ def test_the_rim_of_a_lens() -> None:
     before, sharp, voxel = made(transform(intersection(*balls), rotate=TURN), 48)
     assert off(before, turned(rim, TURN), voxel).max() > 0.3
     assert off(sharp, turned(rim, TURN), voxel).max() < 0.03
+    assert check_mesh(quantise_mesh(sharp)).printable
+
+
+def test_where_some_edges_fail_the_others_are_sharp(tmp_path: Path) -> None:
+    """All of them were left blunt, after the last attempt, for a few triangles."""
+    rough = np.random.default_rng(1).integers(0, 256, (10, 10), dtype=np.uint8)
+    Image.fromarray(rough).save(tmp_path / "rough.png")
+    blunt, sharp, _ = made(heightmap(str(tmp_path / "rough.png"), size=1, height=0.4, base=0.1), 32)
+    assert len(np.setdiff1d(rows(sharp.vertices), rows(blunt.vertices))) > 500
     assert check_mesh(quantise_mesh(sharp)).printable
 
 
