@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from itertools import chain, combinations, pairwise, product
+from itertools import chain, combinations, islice, pairwise, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -190,6 +190,9 @@ FAN = -2
 
 Disk = tuple[list[int], list[tuple[int, int, int]]]
 """Triangles, and the fan that may replace them."""
+
+Costs = dict[tuple[int, ...], float]
+"""Of triangles, by the places of their corners on a rim."""
 
 
 @dataclass(frozen=True)
@@ -522,45 +525,38 @@ class _Sharpening:
         taken = set(edges_of(mesh.triangles[with_neighbours(mesh, some)]).keys.tolist())
         pairs = edges_of(mesh.triangles[off]).beside.astype(np.int32)
         of, count = connected_components(pairs[:, [0, 1, 1]], len(off))
+        rims: list[tuple[list[int], list[int]]] = []
+        order = np.argsort(of, kind="stable")
+        starts = np.searchsorted(of[order], np.arange(count))
+        for old in (part.tolist() for part in np.split(off[order], starts)[1:]):
+            rim = _rim(mesh.triangles[old].tolist(), fixed)
+            if rim is not None and len(rim) <= RIM:
+                rims.append((old, rim))
         patches: list[Disk] = []
-        for old in (off[of == number].tolist() for number in range(count)):
-            triangles = mesh.triangles[old].tolist()
-            rim = _rim(triangles, fixed)
-            if rim is None or len(rim) > RIM:
-                continue
+        for (old, rim), costs in zip(rims, self._costs(mesh.vertices, [rim for _, rim in rims]), strict=True):
             own = edges_of(mesh.triangles[old])
-            inner = own.keys[own.sides.ravel()[own.pairs[:, 0]]].tolist()
-            patch = self._best(mesh.vertices, rim, taken.difference(inner))
+            inner = set(own.keys[own.sides.ravel()[own.pairs[:, 0]]].tolist())
+            patch = _best(rim, costs, taken, inner)
             if patch:
                 patches.append((old, patch))
                 taken.update(edges_of(np.array(patch, np.int32)).keys.tolist())
         return patches
 
-    def _best(
-        self, vertices: NDArray[np.float64], rim: list[int], taken: set[int]
-    ) -> list[tuple[int, int, int]] | None:
-        """Triangulation of a rim that is off the surface by least in total; without edges that are taken."""
-        count = len(rim)
-        ways = list(combinations(range(count), 3))
-        corners = vertices[np.array(rim)[np.array(ways)]]
+    def _costs(self, vertices: NDArray[np.float64], rims: list[list[int]]) -> list[Costs]:
+        """Distances from the surface of the triangles between any three corners of rims; infinite for those
+        that face elsewhere, are too far off or too thin.
+        """
+        ways = [list(combinations(range(len(rim)), 3)) for rim in rims]
+        if not ways:
+            return []
+        corners = vertices[
+            np.concatenate([np.array(r)[np.array(w)] for r, w in zip(rims, ways, strict=True)])
+        ]
         measured = self._fit.triangles(corners)
         good = (measured[:, UPRIGHT] > UP) & (measured[:, OFF] <= LOOSE * self._voxel)
         good &= heights(corners) >= THIN * self._voxel
-        costs = dict(zip(ways, np.where(good, measured[:, OFF], math.inf).tolist(), strict=True))
-        best = {(i, i + 1): (0.0, -1) for i in range(count - 1)}
-        for i, k in ((i, i + gap) for gap in range(2, count) for i in range(count - gap)):
-            low, high = sorted((rim[i], rim[k]))
-            free = k - i == count - 1 or (low << 32 | high) not in taken
-            split = min((best[i, j][0] + best[j, k][0] + costs[i, j, k], j) for j in range(i + 1, k))
-            best[i, k] = split if free else (math.inf, -1)
-        result, left = [], [(0, count - 1)]
-        while left and best[0, count - 1][0] < math.inf:
-            i, k = left.pop()
-            j = best[i, k][1]
-            if j >= 0:
-                result.append((rim[i], rim[j], rim[k]))
-                left += [(i, j), (j, k)]
-        return result or None
+        off = iter(np.where(good, measured[:, OFF], math.inf).tolist())
+        return [dict(zip(own, islice(off, len(own)), strict=True)) for own in ways]
 
     def _fanned(
         self, state: _Sharpened, fixed: NDArray[np.bool_], bad: NDArray[np.int64]
@@ -571,8 +567,8 @@ class _Sharpening:
         apex = fixed.copy()
         apex[len(state.old.vertices) :] = True
         near = bad[np.argsort(~fixed[mesh.triangles[bad]].any(axis=1), kind="stable")].tolist()
-        ways = [(t, v) for t in near for v in sorted(mesh.triangles[t].tolist(), key=lambda v: not fixed[v])]
-        found = [disk for t, v in ways if apex[v] and (disk := disks.grown(t, v))]
+        ways = (v for t in near for v in sorted(mesh.triangles[t].tolist(), key=lambda v: not fixed[v]))
+        found = [disk for v in dict.fromkeys(ways) if apex[v] and (disk := disks.grown(v))]
         found = list({(*old, fan[0][2]): (old, fan) for old, fan in found}.values())
         if not found:
             return None
@@ -614,22 +610,20 @@ class _Disks:
         measured = state.measured[self._which, :3].ravel()
         self._normals, self._alike = measured.tolist(), np.round(measured, 3).tolist()
 
-    def grown(self, first: int, apex: int) -> Disk | None:
-        """A disk with a triangle and the star of a vertex, grown until the fan around that vertex faces as
-        the disk does: its triangles and the fan. None if there is no such disk or it would swallow a corner.
+    def grown(self, apex: int) -> Disk | None:
+        """A disk with the star of a vertex, grown until the fan around that vertex faces as the disk does:
+        its triangles and the fan. None if there is no such disk or it would swallow a corner.
         """
-        found = self._grown(
-            int(np.searchsorted(self._which, first)), int(np.searchsorted(self._vertices, apex))
-        )
+        found = self._grown(int(np.searchsorted(self._vertices, apex)))
         if found is None:
             return None
         disk, fan = found
         fans = self._vertices[np.array(fan)].tolist()
         return self._which[disk].tolist(), [(a, b, c) for a, b, c in fans]
 
-    def _grown(self, first: int, apex: int) -> Disk | None:
+    def _grown(self, apex: int) -> Disk | None:
         """The same in numbers of this class."""
-        more = {first, *(self._order[self._starts[apex] : self._starts[apex + 1]] // 3).tolist()}
+        more = set((self._order[self._starts[apex] : self._starts[apex + 1]] // 3).tolist())
         disk, normals = set[int](), dict[tuple[float, ...], list[float]]()
         while more and len(disk) + len(more) <= MOST:
             disk |= more
@@ -670,6 +664,30 @@ class _Disks:
         if loop is None or any(self._fixed[v] for v in {*chain(*triangles)} - {*loop, apex}):
             return None
         return disk, [(here, there, apex) for here, there in pairwise([*loop, loop[0]])]
+
+
+def _best(
+    rim: list[int], costs: Costs, taken: set[int], inner: set[int]
+) -> list[tuple[int, int, int]] | None:
+    """Triangulation of a rim that is off the surface by least in total; without edges that are taken but for
+    those inside.
+    """
+    count = len(rim)
+    best = {(i, i + 1): (0.0, -1) for i in range(count - 1)}
+    for i, k in ((i, i + gap) for gap in range(2, count) for i in range(count - gap)):
+        low, high = sorted((rim[i], rim[k]))
+        split = min((best[i, j][0] + best[j, k][0] + costs[i, j, k], j) for j in range(i + 1, k))
+        edge = low << 32 | high
+        free = k - i == count - 1 or edge in inner or edge not in taken
+        best[i, k] = split if free else (math.inf, -1)
+    result, left = [], [(0, count - 1)]
+    while left and best[0, count - 1][0] < math.inf:
+        i, k = left.pop()
+        j = best[i, k][1]
+        if j >= 0:
+            result.append((rim[i], rim[j], rim[k]))
+            left += [(i, j), (j, k)]
+    return result or None
 
 
 def _rim(triangles: list[list[int]], fixed: NDArray[np.bool_]) -> list[int] | None:
