@@ -6,8 +6,8 @@ copy before they return. Code and arrays are kept alive by the call, or by the n
 (`fracslice/native/machine.h`), so neither can be freed while in use.
 
 "System V Application Binary Interface", AMD64 supplement: the sections and relocations of LLVM's large and
-small code models, without unwinding tables and without data that is written. `machine` leaves all other files
-to LLVM.
+small code models, without unwinding tables and without data that is written. All other files are left to
+LLVM.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-"""Steps of a mesh job, made piece by piece, from contouring to finished triangles in mm, and what makes them:
-this process, or the pool of `shared`.
+"""From a scene to finished triangles in mm: the plan with its edits for printing, its samples, and the steps
+from contouring on, made piece by piece by this process, or by the pool of `shared`.
 """
 
 from __future__ import annotations

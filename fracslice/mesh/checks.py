@@ -1,4 +1,5 @@
-"""Repair of triangle models that are no solid, by MeshLab's filters: what is done, and what changed.
+"""Checks of a mesh: counts of defects, sums over its pieces, distances, what of the surface it lacks, and a
+verdict; repair of models that are no solid, by MeshLab's filters.
 
 Bodies that overlap are united, and triangles that cut each other replaced, by the winding number (Zhou,
 Grinspun, Zorin and Jacobson, "Mesh Arrangements for Solid Geometry", 2016).

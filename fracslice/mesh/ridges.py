@@ -12,6 +12,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import chain, combinations, islice, pairwise, product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -335,8 +336,9 @@ class _Sharpened:
     def caps(self) -> list[Cap]:
         """What is replaced by what; connected parts apart."""
         gone, of_old, of_new = self._replaced()
-        corners = self.mesh.corners[self.parents < 0]
-        return [Cap(gone[of_old == one], corners[of_new == one]) for one in np.unique(of_old)]
+        corners, (ones, numbers) = self.mesh.corners[self.parents < 0], np.unique(of_old, return_inverse=True)
+        parts = _parted(gone, numbers), _parted(corners, np.searchsorted(ones, of_new))
+        return [Cap(old, fan) for old, fan in zip(*parts, strict=True)]
 
     def restored(self, some: NDArray[np.int64]) -> _Sharpened:
         """The same with the old triangles in place of the connected parts that some new ones are in."""
@@ -404,7 +406,7 @@ class _Sharpening:
             if before >= ROUGH * len(result.new_vertices()):
                 return None
             if attempt == RETRIES or (attempt == FEWER and len(given.missed.edges) > MANY):
-                return self._sound(result, wrong, fixed)
+                break
             at = np.unique(result.mesh.triangles[wrong])
             new = result.mesh.vertices[at[at >= len(mesh.vertices)]]
             spots = np.concatenate([new, result.mesh.corners[wrong].mean(axis=1)])
@@ -415,7 +417,7 @@ class _Sharpening:
             banned = np.concatenate([banned, spots])
             reach *= GROWTH
             stays = _away(corners, banned, reach)
-        return None
+        return self._sound(result, wrong, fixed)
 
     def _sound(
         self, state: _Sharpened, wrong: NDArray[np.int64], fixed: NDArray[np.bool_]
@@ -524,11 +526,9 @@ class _Sharpening:
         some[off] = True
         taken = set(edges_of(mesh.triangles[with_neighbours(mesh, some)]).keys.tolist())
         pairs = edges_of(mesh.triangles[off]).beside.astype(np.int32)
-        of, count = connected_components(pairs[:, [0, 1, 1]], len(off))
+        of, _ = connected_components(pairs[:, [0, 1, 1]], len(off))
         rims: list[tuple[list[int], list[int]]] = []
-        order = np.argsort(of, kind="stable")
-        starts = np.searchsorted(of[order], np.arange(count))
-        for old in (part.tolist() for part in np.split(off[order], starts)[1:]):
+        for old in (part.tolist() for part in _parted(off, of)):
             rim = _rim(mesh.triangles[old].tolist(), fixed)
             if rim is not None and len(rim) <= RIM:
                 rims.append((old, rim))
@@ -664,6 +664,13 @@ class _Disks:
         if loop is None or any(self._fixed[v] for v in {*chain(*triangles)} - {*loop, apex}):
             return None
         return disk, [(here, there, apex) for here, there in pairwise([*loop, loop[0]])]
+
+
+def _parted(values: NDArray[Any], of: NDArray[np.integer]) -> list[NDArray[Any]]:
+    """Rows of an array by the parts that they are of, numbered from 0 on; of negative ones none."""
+    order = np.argsort(of, kind="stable")
+    starts = np.searchsorted(of[order], np.arange(of.max(initial=-1) + 1))
+    return np.split(values[order], starts)[1:]
 
 
 def _best(

@@ -502,9 +502,7 @@ class ThinWalls(Rows):
 
     width: np.ndarray
     area: np.ndarray  # surface that each represents
-    middle: (
-        np.ndarray
-    )  # float64 [n, 3], from the middle of the object along x and y, and above its lowest point
+    middle: np.ndarray  # float64 [n, 3], from the middle of the object along x and y, above its lowest point
 
     def note(self, least: float, spot: float) -> tuple[str, ...]:
         """A note on them: the number of places, and the thinnest one.

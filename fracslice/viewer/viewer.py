@@ -1,6 +1,6 @@
 """Interactive window to fly through a scene while its picture refines and its file is edited.
 
-It is VTK's own window: pyvista's installs an interactor style with keys and gestures of its own.
+The window is VTK's own: pyvista's installs an interactor style with keys and gestures of its own.
 """
 
 from __future__ import annotations

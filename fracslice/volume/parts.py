@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..errors import VolumeError
+from ..fields.box import Box
 from ..fields.registry import Node, get
 from ..formulas import difference, infill, intersection, names, plane
 from ..formulas.lattices import STRUTS
@@ -57,7 +58,8 @@ def filled(
     VolumeError
         For a solid without an end, or an empty one.
     """
-    unit = _unit(scene, size, work)
+    sized = sizing(scene, size, work=work)
+    unit = sized.unit or sized.scale(_box(scene, work))
     formula, kind = (get(lattice), {}) if lattice in WALLS else (get("struts"), {"kind": lattice})
     filler = formula(period=period / unit, volume_fraction=fraction, **kind)
     return _of(scene, infill(scene.root, filler, shell=wall / unit), unit)
@@ -86,8 +88,8 @@ def cut(
     VolumeError
         If the plane misses the solid, or that is empty or without an end.
     """
-    unit = _unit(scene, size, work)
-    box = extent(with_depths(scene.root, work), work).box
+    sized, box = sizing(scene, size, work=work), _box(scene, work)
+    unit = sized.unit or sized.scale(box)
     origin = box.lo[2] if axis == 2 else box.centre[axis]  # as meshes are placed
     low, high = (unit * (corner[axis] - origin) for corner in (box.lo, box.hi))
     if not low < height < high:
@@ -99,10 +101,9 @@ def cut(
     return _of(scene, intersection(scene.root, half), unit), _of(scene, difference(scene.root, half), unit)
 
 
-def _unit(scene: Scene, size: float | None, work: Work | None) -> float:
-    """Millimetres of a scene unit."""
-    sized = sizing(scene, size, work=work)
-    return sized.unit or sized.scale(extent(with_depths(scene.root, work), work).box)
+def _box(scene: Scene, work: Work | None) -> Box:
+    """Box that the solid reaches, scene units."""
+    return extent(with_depths(scene.root, work), work).box
 
 
 def _of(scene: Scene, root: Node, unit: float) -> Scene:

@@ -5,11 +5,12 @@ The table of light holds red, green and blue of each pixel. The tables of probab
 function of the rows, then that of the columns of each row, every one from 0 to 1 (Pharr, Jakob and Humphreys
 2016, "Physically Based Rendering", 13.6.7 and 14.2.4).
 
-Trowbridge and Reitz 1975 (GGX of Walter et al. 2007), with Smith's height-correlated shadowing and masking.
+Microfacets are those of Trowbridge and Reitz 1975 (GGX of Walter et al. 2007), with Smith's height-correlated
+shadowing and masking.
 
-The power heuristic of Veach and Guibas 1995, "Optimally Combining Sampling Techniques for Monte Carlo
-Rendering". Each ray carries the density with which the surface took its direction; 0 for a ray of the camera,
-a mirror or glass, for which no light is sampled.
+Samples of lights and of surfaces are weighted by the power heuristic of Veach and Guibas 1995, "Optimally
+Combining Sampling Techniques for Monte Carlo Rendering". Each ray carries the density with which the surface
+took its direction; 0 for a ray of the camera, a mirror or glass, for which no light is sampled.
 
 A ray is sent to a body, or as the surface reflects and scatters. Its light is divided by the density of all
 together: the balance heuristic of Veach and Guibas 1995, "Optimally Combining Sampling Techniques for Monte
