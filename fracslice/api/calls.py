@@ -445,10 +445,6 @@ FILM = Film(width=640, height=480, samples=16)
 """Film of a shape without a scene, for a quick picture."""
 
 
-FORMATS = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG", ".webp": "WEBP"}
-"""Pillow's names of the formats of pictures."""
-
-
 class Picture(np.ndarray):
     """A picture, uint8 [height, width, 3], sRGB, that notebooks display."""
 
@@ -470,10 +466,12 @@ class Picture(np.ndarray):
         ExportError
             For another extension, an array that is no picture, or a file that cannot be written.
         """
-        ending = Path(path).suffix.lower()
-        if ending not in FORMATS:
-            raise ExportError(f"{path}: unknown kind of file; known are {', '.join(FORMATS)}")
-        data = self._encoded(FORMATS[ending])
+        from ..export.images import LOSSY
+
+        kinds, ending = (".png", *LOSSY), Path(path).suffix.lower()
+        if ending not in kinds:
+            raise ExportError(f"{path}: unknown kind of file; known are {', '.join(kinds)}")
+        data = self._encoded(ending)
         if data is None:
             raise ExportError(
                 f"{path}: expected uint8 [height, width, 3], found {self.dtype} {list(self.shape)}"
@@ -483,16 +481,15 @@ class Picture(np.ndarray):
         return Path(path)
 
     def _repr_png_(self) -> bytes | None:
-        return self._encoded("PNG")
+        return self._encoded(".png")
 
-    def _encoded(self, form: str) -> bytes | None:
-        from PIL import Image
+    def _encoded(self, ending: str) -> bytes | None:
+        from ..export.images import encoded_image
 
         if self.dtype != np.uint8 or self.ndim != 3 or self.shape[2] != 3:
             return None  # a slice of a picture need not be a picture
-        file = io.BytesIO()
-        Image.fromarray(np.asarray(self)).save(file, form, quality=95)
-        return file.getvalue()
+        shown = np.asarray(self) / 255
+        return encoded_image(ending, shown, shown)
 
 
 def page(shape: Node) -> str:
