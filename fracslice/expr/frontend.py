@@ -16,7 +16,7 @@ import operator
 import re
 import textwrap
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, is_dataclass, replace
 from functools import lru_cache, reduce
 from types import FunctionType
 from typing import Any, NoReturn
@@ -74,7 +74,8 @@ class Source:
     place: str  # file and kind, for errors, with braces for the line
     tree: Callable[[], ast.FunctionDef]
     scope: Callable[[], Mapping[str, Any]]
-    is_written: bool = False  # whether it is written for a kernel, by code
+    is_own: bool = False  # whether it is code of a kernel, which may use records, and is no formula of a user
+    known: Fixed = ()  # arguments that are known
 
     @classmethod
     def of(cls, function: Callable[..., Any], kind: str, *known: Any) -> Source:
@@ -129,6 +130,12 @@ def formula(function: Callable[..., Any] | Function, fixed: Fixed = ()) -> Funct
     return _function(FormulaReader, function, fixed, function.__name__, _mark(function, fixed))
 
 
+def kernel_function(function: Callable[..., Any], fixed: Fixed) -> Function:
+    """Return a function of a kernel with some arguments fixed, such as records of what it does."""
+    source = Source.of(function, "kernel", *(value for _, value in fixed))
+    return source_function(FormulaReader, replace(source, is_own=True), fixed)
+
+
 def loop_function(loop: Loop) -> Function:
     """Return the function of a loop."""
     return _function(Reader, loop.function, loop.fixed, loop.name, _mark(loop.function, loop.fixed))
@@ -160,8 +167,9 @@ def source_function(kind: type[Reader], source: Source, fixed: Fixed, **given: A
 
     `kind`: its reader, which takes what is `given`, of text identities.
     """
-    known = dict(fixed)
+    known = {**dict(source.known), **dict(fixed)}
     names = tuple(name for name in source.names if name not in known)
+    source = replace(source, known=tuple(known.items()))
 
     def read(width: Width) -> FlowGraph:
         reader = kind(width, source=source, fixed=known, **given)
@@ -258,6 +266,10 @@ class Reader(Writer):
             case ast.IfExp(test, yes, no):
                 test = self.known(test)
                 return _UNKNOWN if not _decides(test) else self.known(yes if test else no)
+            case ast.BoolOp(op, operands):
+                decided = [self.known(operand) for operand in operands]
+                if all(map(_decides, decided)):
+                    return (all if isinstance(op, ast.And) else any)(decided)
         return _UNKNOWN
 
     def folded(self, op: ast.AST, *operands: ast.expr) -> Any:
@@ -413,11 +425,13 @@ class Reader(Writer):
     def unrolled_tuple(self, node: ast.Call, element: ast.expr, generator: ast.comprehension) -> Value:
         """A tuple of known length."""
         match generator:
-            case ast.comprehension(ast.Name(counter), ast.Call(ast.Name("range"), [limit]), []):
-                count = self.known(limit)
-                if type(count) is int:
-                    return self.add("tuple", *(self.with_known({counter: k}, element) for k in range(count)))
-        self.fail(node, "expected a range that is known when the loop is compiled")
+            case ast.comprehension(ast.Name(counter), iterated, []):
+                values = self.known(iterated)
+                if isinstance(iterated, ast.Call) and type(count := self.known(iterated.args[0])) is int:
+                    values = range(count)
+                if isinstance(values, (tuple, range)):
+                    return self.add("tuple", *(self.with_known({counter: v}, element) for v in values))
+        self.fail(node, "expected a range or a tuple that is known when the loop is compiled")
 
     def with_known(self, values: Mapping[str, Any], node: ast.expr) -> Value:
         outer, self.fixed = self.fixed, {**self.fixed, **values}
@@ -582,6 +596,13 @@ def _decides(value: Any) -> bool:
     return isinstance(value, (int, float, tuple))
 
 
+def is_record(value: Any) -> bool:
+    """Return True for a record, or a tuple of records, that is known when a function is read."""
+    if type(value) is tuple:
+        return bool(value) and all(map(is_record, value))
+    return is_dataclass(value) and not isinstance(value, (type, Function))
+
+
 def _plain(value: Any) -> Any:
     """Convert a number of any library to Python's own."""
     if isinstance(value, tuple):
@@ -614,7 +635,7 @@ class FormulaReader(Reader):
 
     def read(self) -> FlowGraph:
         source = self.source
-        self.points = set() if source.is_written else check(source.tree(), source.scope(), source.error)
+        self.points = set() if source.is_own else check(source.tree(), source.scope(), source.error)
         return super().read()
 
     def binary(self, node: ast.expr, op: str, a: Value, b: Value) -> Value:
@@ -632,7 +653,11 @@ class FormulaReader(Reader):
         return intrinsic_name(called)
 
     def call_function(self, called: Callable[..., Any], arguments: list[ast.expr]) -> Value:
-        return self.call_counted(formula(called), list(map(self.value, arguments)))
+        """A call of a function from outside; records that are known are fixed in it."""
+        pairs = list(zip(parameters(called), map(self.known, arguments), strict=False))
+        fixed = tuple((name, value) for name, value in pairs if is_record(value))
+        given = [self.value(a) for a in arguments if not is_record(self.known(a))]
+        return self.call_counted(kernel_function(called, fixed) if fixed else formula(called), given)
 
     def expression(self, node: ast.expr) -> None:
         """The mark of a step of an orbit, which only some readers use."""

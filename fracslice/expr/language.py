@@ -119,6 +119,8 @@ class _Described:
                 self.add(item, names)
         elif isinstance(value, (ModuleType, type)):
             self.add_named({name: getattr(value, name) for name in names if hasattr(value, name)}, names)
+        elif known := getattr(value, "identity", None):
+            self.lines.append(known)
         elif isinstance(value, tuple) or is_dataclass(value):
             self.records.append(value)
 

@@ -31,7 +31,7 @@ from .box import Box, Triple
 from .cpu import compile_scene
 from .devices import reference
 from .maps import NAMES as VERBS
-from .orbit_code import Code, function_of_text
+from .orbit_code import Code, stages
 from .orbits import HOOKS, LIPSCHITZ, OWN, growth_of, orbit_select, orbit_step, steps
 from .registry import Formula, Hook, Node, get, names
 
@@ -322,7 +322,7 @@ def _try(made: Defined) -> None:
     if definition.kind == "step":
         kinds = dict(definition.parameters).items()
         sizes = tuple((name, len(k.default) if isinstance(k.default, tuple) else 1) for name, k in kinds)
-        Code(made.function, sizes).traced(0)
+        stages((Code(made.function, sizes),))
         return
     value = reference(made())(*np.full((3, 1), 0.3))
     if value.dtype != np.float64 or value.shape != (1,):
@@ -453,18 +453,14 @@ def _proofs(root: Node) -> str:
 
 def _derivative(root: Node, points: np.ndarray) -> tuple[bool, str]:
     """Comparison of a step's stretch with the distances of its images."""
-    taken, values = steps(root)
-    code = taken[0]
-    made, names = code.traced(0), code.arguments(0)
-    image = f"return ({', '.join(made.point)}), {made.stretch[0]}"
-    body = [*code.before(0, ("px", "py", "pz")), *made.lines, image]
-    step = function_of_text(taken, ["x", "y", "z", "px", "py", "pz", *names], body)
-    given = [values[name] for name in names]
+    (code, *_), (given, *_) = steps(root)
+    step, v, constant = code.stage.step, given[0], tuple(points)
     offset = np.random.default_rng(1).normal(size=points.shape)
     offset *= NEAR / np.linalg.norm(offset, axis=0)
     with np.errstate(all="ignore"):
-        here, stretch = step(*points, *points, *given)
-        there, _ = step(*(points + offset), *points, *given)
+        ready = step.prepared(constant, v)
+        here, stretch, _ = step.taken(constant, constant, v, ready)
+        there = step.image(tuple(points + offset), constant, v, ready)
         moved = np.linalg.norm(np.array(np.broadcast_arrays(*there)) - np.broadcast_arrays(*here), axis=0)
         broken = float((moved > NEAR * (1.001 * np.asarray(stretch) + 1e-3)).mean())
     return broken < CREASES, f"derivative of the step: too small at {broken:.1%} of the points"

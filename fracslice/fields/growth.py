@@ -9,22 +9,19 @@ grows with every round: for all constants up to |w| if rounds grow by a power, a
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, reduce
 from itertools import accumulate, islice, product
 from operator import mul
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 
-from ..expr import language
-from ..expr.graph import Function
 from ..expr.intervals import ARRAYS, Interval, evaluate_on_cells
-from . import orbit_code
 from .box import Box, Corners, possible_cells, proved_half, undecided_cells
 from .maps import CORE, levels
-from .orbit_code import R2, Code, Form, Round, field, function_of_text, indent_lines, mapped
+from .orbit_code import Form, Given, Round, constant_of, field, sign, size, stage_image, stages
 
 MOST, LEVELS, MARGIN = 1 << 15, 12, 1e-9
 """Cells of a level, beyond which the radius is enlarged; levels of cells; least relative growth, more than
@@ -36,14 +33,6 @@ BESIDE = 4e-290
 plane; on the plane itself they are limits of these.
 """
 
-ADDED = [
-    "reach = reach + size",
-    "r = maximum(absolute(sqrt(r2) - size), minimum(sqrt(r2) + size, sqrt(x * x + y * y + z * z)))",
-    "r2 = r * r",
-]
-"""Lines that add constants to the ball and to the squared distance from the origin."""
-
-BOX, BALL = ("x", "y", "z"), ("mx", "my", "mz", "reach")
 UNIT = Interval(np.full(1, -1.0), np.full(1, 1.0), ARRAYS)
 
 
@@ -78,18 +67,17 @@ def escape_radius(
 
 
 def least_size(
-    steps: Round, first: int, values: Mapping[str, Any], size: float | None
+    steps: Round, first: int, given: Sequence[Given], stops: Sequence[float], constants: float | None
 ) -> Callable[[Corners, Corners, np.ndarray], np.ndarray]:
     """Return a function of cells, and the size of their farthest points, that bounds the last |w| from below.
 
-    `values`: those of the arguments of the steps, and squares of the radii where orbits stop.
-    The bound is huge where all orbits stop.
+    `stops`: squares of the radii where orbits stop; `constants`: size of the constants, or None for that of
+    the points. The bound is huge where all orbits stop.
     """
-    function = _last_size(steps, first)
-    given = [values[name] for name in function.parameters[9:]]
+    function = size(steps, first)
 
     def least(lo: Corners, hi: Corners, far: np.ndarray) -> np.ndarray:
-        constants = Interval.at(far if size is None else np.full_like(far, size), ARRAYS)
+        sizes = Interval.at(far if constants is None else np.full_like(far, constants), ARRAYS)
         box = (
             Interval(np.where(a == 0, BESIDE, a), np.where(b == 0, -BESIDE, b), ARRAYS)
             for a, b in zip(lo, hi, strict=True)
@@ -97,55 +85,24 @@ def least_size(
         middle = (Interval.at(m, ARRAYS).outward() for m in (lo + hi) / 2)
         reach = Interval.at(np.sqrt(((hi - lo) ** 2).sum(0)) / 2, ARRAYS).outward(4)
         with np.errstate(all="ignore"):
-            bound = evaluate_on_cells(function, *box, *middle, reach, constants, UNIT, *given)
+            bound = evaluate_on_cells(function, *box, *middle, reach, sizes, UNIT, given, stops)
         return np.broadcast_to(bound.lo, far.shape)
 
     return least
 
 
-def constant_stretch(steps: Round, first: int, values: Mapping[str, Any]) -> float | None:
+def constant_stretch(steps: Round, given: Sequence[Given]) -> float | None:
     """Return a bound of the stretch of steps whose stretch is the same at all points."""
-    product = 1.0
-    for place, code in list(enumerate(steps))[first:]:
-        step, names = code.traced(place), code.arguments(place)
-        if not step.is_steady or not code.is_fixed(place):
+    product, origin = 1.0, (0.0, 0.0, 0.0)
+    for stage, own in zip(stages(steps), given, strict=True):
+        if not stage.step.is_steady or not stage.is_fixed:
             return None
-        before = code.before(place, ("0.0",) * 3)
-        body = [*before, *step.needed(step.stretch[0]), f"return {step.stretch[0]}"]
-        spread = values[f"spread{place}"] if code.moved else 1.0
-        product *= spread * float(function_of_text(steps, names, body)(*(values[name] for name in names)))
+        constant = constant_of(origin, own, stage)
+        with np.errstate(all="ignore"):
+            ready = stage.step.prepared(constant, own[0])
+            _, by_w, _ = stage.step.taken(origin, constant, own[0], ready)
+        product *= (own[2][2] if stage.moved else 1.0) * float(by_w)
     return product * (1 + MARGIN)
-
-
-def _last_size(steps: Round, first: int) -> Function:
-    """Write the function of |w| at the end of a round, from a box and a ball around w.
-
-    The box x, y, z is the image by intervals. The ball around mx, my, mz grows by the stretch over the box;
-    if a step may tear space, the box takes its place. Constants that are added move w by their size.
-    """
-    given, body, added = [], ["alive = x == x", R2], False
-    for place, code in list(enumerate(steps))[first:]:
-        if place > first:
-            given.append(f"stop{place - 1}")
-            body += [f"{v} = {v} + size * unit" for v in "xyz" if added]
-            body += [*ADDED] if added else []
-            body += [f"alive = alive & (r2 < stop{place - 1})"]
-        step = code.traced(place)
-        added = step.is_added and not code.julia
-        given += code.arguments(place)
-        start = ("0.0" if added else "size * unit",) * 3
-        spread = f"spread{place} * " if code.moved else ""
-        body += code.before(place, start)
-        if step.is_torn:
-            body += [*code.boxed(place), "mx, my, mz, reach = x, y, z, 0.0 * reach"]
-        else:
-            body += ["bx, by, bz = x, y, z", "x, y, z = mx, my, mz", *code.image(place)]
-            body += ["mx, my, mz = x, y, z", "x, y, z = bx, by, bz"]
-            body += code.boxed(place, [f"reach = {spread}{step.stretch[0]} * reach"])
-        body += [R2] if step.length is None else []
-    ball, reach = "sqrt(mx * mx + my * my + mz * mz) - reach", " - size" if added else ""
-    body.append(f"return where(alive, maximum(sqrt(r2), {ball}){reach}, 1e200)")
-    return function_of_text(steps, [*BOX, *BALL, "size", "unit", *given], body)
 
 
 def _farthest(lo: Corners, hi: Corners) -> np.ndarray:
@@ -252,30 +209,29 @@ def norm(w: np.ndarray) -> np.ndarray:
     return length
 
 
-def image(steps: Round, place: int, values: Mapping[str, Any]) -> Image:
+def image(steps: Round, place: int, given: Sequence[Given]) -> Image:
     """Return a step on arrays.
 
     Returns function of points [3, n] and constants, [3, n] or [3], that returns their images [3, n].
     """
-    code = steps[place]
-    names = code.arguments(place)
-    body = [*code.before(place, ("px", "py", "pz")), *code.image(place)]
-    function = function_of_text(steps, ["x", "y", "z", "px", "py", "pz", *names], [*body, "return x, y, z"])
-    given = [values[name] for name in names]
+    stage, own = steps[place].stage, given[place]
 
     def taken(w: np.ndarray, c: np.ndarray) -> np.ndarray:
-        constant = c if c.ndim == 2 else c[:, None]
+        start = tuple(c if c.ndim == 2 else c[:, None])
         with np.errstate(all="ignore"):
-            values = np.array(np.broadcast_arrays(*function(*w, *constant, *given), w[0])[:3])
+            constant = constant_of(start, own, stage)
+            ready = stage.step.prepared(constant, own[0])
+            moved = stage_image(tuple(w), constant, own, ready, stage)
+            values = np.array(np.broadcast_arrays(*moved, w[0])[:3])
         finite: np.ndarray = np.nan_to_num(values, nan=1e300, posinf=1e300, neginf=-1e300)
         return finite.clip(-1e170, 1e170)
 
     return taken
 
 
-def stays(steps: Round, values: Mapping[str, Any], rounds: int, radius: float, outer: float) -> bool:
+def stays(steps: Round, given: Sequence[Given], rounds: int, radius: float, outer: float) -> bool:
     """Return True if the orbit that starts at the origin is within a radius after some rounds."""
-    step, start = compose_steps([image(steps, k, values) for k in range(len(steps))]), np.zeros((3, 1))
+    step, start = compose_steps([image(steps, k, given) for k in range(len(steps))]), np.zeros((3, 1))
     w = start
     for _ in range(rounds):
         w = step(w, start)
@@ -398,9 +354,9 @@ class Growth:
         That of a hybrid stays below twice the sure distance, too, for critical points may be outside. Without
         majorants, neither is known: outside of a hybrid with tears it is then 0.
         """
-        made = [code.traced(place) for place, code in enumerate(steps)]
-        bent = orbit_code.has_majorants(made)
-        torn = self.torn and conservative and bent and orbit_code.is_torn(made)
+        made = [stage.step for stage in stages(steps)]
+        bent = all(step.majorant is not None for step in made)
+        torn = self.torn and conservative and bent and any(step.has_tear for step in made)
         hybrid = len(steps) > 1 or steps[0].moved
         blind = conservative and hybrid and not bent and any(step.is_torn for step in made)
         sure = self.by_power and (self.connected is False or (hybrid and bent and conservative))
@@ -416,20 +372,19 @@ class Growth:
 
 
 @lru_cache(maxsize=256)
-def growth(steps: Round, values: tuple[tuple[str, Any], ...], iterations: int) -> Growth | None:
+def growth(steps: Round, given: tuple[Given, ...], iterations: int) -> Growth | None:
     """Sample the growth of an orbit.
 
     Returns None if orbits do not escape.
     """
-    known = dict(values)
-    images = [image(steps, place, known) for place in range(len(steps))]
+    images = [image(steps, place, given) for place in range(len(steps))]
     whole = compose_steps(images)
     rays, origin = directions(), np.zeros(3)
     if not norm(whole(rays * 1e4, origin)).min() > 1.02e4:
         return None
     rates = [step_power(step, rays, origin) for step in images]
     points = (rays[:, :, None] * RADII).reshape(3, -1)
-    fixed = all(code.is_fixed(k) for k, code in enumerate(steps))
+    fixed = all(stage.is_fixed for stage in stages(steps))
     radius = bounded = sampled_radius(whole, points, ROUNDS, FARTHEST)
     for _ in range(2):  # thin tips of the solid fall between samples; that of a few rounds has thicker ones
         radius = max(sampled_escape(whole, points, 0.0 if fixed else bounded), 0.0 if fixed else bounded)
@@ -439,29 +394,29 @@ def growth(steps: Round, values: tuple[tuple[str, Any], ...], iterations: int) -
         sampled_escape(compose_steps([*images[k:], *images[:k]]), points, size) for k in range(1, len(steps))
     ]
     powers, factors = zip(*rates, strict=True)
-    bound = Growth(powers, factors, (*escapes, radius), stretch=constant_stretch(steps, 0, known))
-    bound = _prove_growth(steps, bound, known, size)
+    bound = Growth(powers, factors, (*escapes, radius), stretch=constant_stretch(steps, given))
+    bound = _prove_growth(steps, bound, given, size)
     if not bound.proved:
         bound = replace(bound, escapes=widened_escapes(images, bound.escapes, size))
-        bound = _prove_growth(steps, bound, known, size)
+        bound = _prove_growth(steps, bound, given, size)
     reach, thick = (
         sampled_radius(whole, points, n, bound.escape) for n in (iterations, min(iterations, THICK))
     )
     reach = max(1.5 * reach, thick, 1.02 * bound.surface if bound.by_power else 0.0)
     bound = replace(bound, half=(reach, reach, reach))
-    return replace(bound, half=_half(steps, bound, known, iterations)) if bound.fits else bound
+    return replace(bound, half=_half(steps, bound, given, iterations)) if bound.fits else bound
 
 
-def _prove_growth(steps: Round, bound: Growth, values: Mapping[str, Any], size: float) -> Growth:
+def _prove_growth(steps: Round, bound: Growth, given: Sequence[Given], size: float) -> Growth:
     """Growth with radii of escape that are proved; the same if they cannot be."""
     tried, constants = bound, None if size and bound.by_power else size
     for _ in range(TRIES if bound.fits else 0):
-        own = {**values, **arguments(steps, tried, 1)}
+        stops = [own[0] for own in numbers(steps, tried)]
         radii = [
             escape_radius(
-                least_size(steps, first, own, constants),
+                least_size(steps, first, given, stops, constants),
                 tried.escapes[first - 1],
-                math.sqrt(own[f"stop{(first - 1) % len(steps)}"]),
+                math.sqrt(stops[first - 1]),
                 None if constants is None and first == 0 else tried.surface,
             )
             for first in range(len(steps))
@@ -474,129 +429,62 @@ def _prove_growth(steps: Round, bound: Growth, values: Mapping[str, Any], size: 
     return bound
 
 
-def _half(
-    steps: Round, bound: Growth, values: Mapping[str, Any], iterations: int
-) -> tuple[float, float, float]:
+def _half(steps: Round, bound: Growth, given: Sequence[Given], iterations: int) -> tuple[float, float, float]:
     """Half sizes of a box around the cells that the field does not prove to be empty; the search begins with
     one half more than the samples reach.
     """
     function = field(steps, Form(bound.by_power, bound.scaled))
-    own = {**arguments(steps, bound, iterations), **values}
-    given = [own[name] for name in function.parameters[3:]]
+    own = arguments(steps, bound, given, iterations).values()
 
     def evaluate(points: np.ndarray) -> np.ndarray:
         with np.errstate(all="ignore"):
-            return np.asarray(function(*points, *given))
+            return np.asarray(function(*points, *own))
 
     centres, _, size = possible_cells(evaluate, LIPSCHITZ, Box.centred(*bound.half), CELLS)
     x, y, z = (np.ceil((abs(centres).max(axis=1, initial=0) + size / 2) * 256) / 256).tolist()
     return x, y, z
 
 
-def arguments(steps: Round, bound: Growth, iterations: int) -> dict[str, object]:
-    """Return the arguments of an orbit's field, besides those of its steps."""
-    own: dict[str, object] = {"iterations": iterations}
+def arguments(steps: Round, bound: Growth, given: Sequence[Given], iterations: int) -> dict[str, object]:
+    """Return the arguments of an orbit's field, in their order; see `orbit_code.field`."""
+    limits: tuple[float, ...] = (bound.escape,)
+    if bound.by_power:
+        scale = bound.scales[-1] if bound.scaled else 1.0
+        limits = *levels(bound.power, iterations, bound.surface * scale), min(bound.reach, bound.surface)
+    own = {"iterations": iterations, "limits": limits, "given": tuple(given)}
+    return {**own, "numbers": numbers(steps, bound)}
+
+
+def numbers(steps: Round, bound: Growth) -> tuple[tuple[float, ...], ...]:
+    """Return the numbers of each step that its field takes; see `orbit_code.field`."""
     if not bound.by_power:
-        stops = {f"stop{k}": (STOP * max(e, bound.escape)) ** 2 for k, e in enumerate(bound.escapes)}
-        return {**own, **stops, "bailout": bound.escape}
+        return tuple(((STOP * max(e, bound.escape)) ** 2, 1.0, 1.0, 0.0, e) for e in bound.escapes)
     scales = bound.scales if bound.scaled else (1.0,) * len(steps)
-    radius = bound.surface * scales[-1]
-    own["levels"] = levels(bound.power, iterations, radius)
-    own["reach"] = min(bound.reach, bound.surface)
-    escapes = (*bound.escapes[:-1], bound.surface)
-    for k, (escape, following, scale) in enumerate(zip(escapes, bound.following, scales, strict=True)):
-        own[f"stop{k}"] = max(escape, bound.stopped ** (1 / following) / scale) ** 2
-        own[f"surface{k}"] = escape
-        own[f"rate{k}"] = power = bound.powers[k]
-        if bound.scaled:
-            own[f"scale{k}"] = scale
-        if not bound.connected and steps[k].is_fixed(k):
-            own[f"least{k}"] = power * CORE ** ((power - 1) / 2) if power > POWER else 0.0
-    return own
-
-
-FARTHEST_BOX = 1e15
-"""Radius from which a ball is not used: intervals do not hold the squares of its points (`intervals`)."""
-
-MIDDLE = [f"m{v} = cell_middle({v})" for v in "xyz"]
-REACH = [*(f"e{v} = cell_extent({v})" for v in "xyz"), "reach = sqrt(ex * ex + ey * ey + ez * ez)"]
-
-
-def sign(steps: Round, scaled: bool) -> Function:
-    """Write the function of ``|w_N|^2 - R^2`` where an orbit does not stop before, else of 1.
-
-    Of a cell, it follows a box and a ball around the image of its middle; each holds the images of all
-    points. The ball grows by the stretch over the box, where intervals of folds and turns grow with each sum.
-    """
-    return _sign(steps, scaled, tuple(language.fingerprint(code.step) for code in steps))
-
-
-@lru_cache(maxsize=256)
-def _sign(steps: Round, scaled: bool, _: object) -> Function:
-    given, setup, loop = [], [], []
-    for place, code in enumerate(steps):
-        given += [*code.arguments(place), f"stop{place}"]
-        setup += code.before(place, ("x", "y", "z"))
-        loop += [*_in_ball(code, place), *([R2] if code.traced(place).length is None else []), *_BETWEEN]
-        loop += [f"alive = alive & (r2 < stop{place})"]
-    body = [
-        *setup,
-        *[*MIDDLE, *REACH, "px, py, pz, size = mx, my, mz, reach", f"held = reach < {FARTHEST_BOX}"],
-        R2,
-        f"alive = r2 < stop{len(steps) - 1}",
-        "for _ in range(iterations):",
-        *indent_lines(["if not any_of(alive):", "    break", *loop]),
-        f"return where(alive, {'scale * scale * ' if scaled else ''}r2 - radius2, 1.0 + 0.0 * r2)",
-    ]
-    own = ["scale", "radius2"] if scaled else ["radius2"]
-    return function_of_text(steps, ["x", "y", "z", "iterations", *own, *given], body)
-
-
-_BETWEEN = [
-    "size2 = mx * mx + my * my + mz * mz",
-    "near, far = maximum(sqrt(size2) - reach, 0.0), sqrt(size2) + reach",
-    "r2 = where(held, maximum(minimum(r2, far * far), near * near), r2)",
-]
-"""Lines that bound |w|^2 by the ball."""
-
-
-def _in_ball(code: Code, place: int) -> list[str]:
-    """Lines that take a box to its image, within the image of a ball around its middle.
-
-    The ball grows by the stretch over the box. Steps that may tear space, or hold the start point in another
-    place than a sum, begin with the ball around the box again.
-    """
-    step = code.traced(place)
-    if step.is_torn or not (step.is_added or code.is_fixed(place)):
-        return [*code.boxed(place), *MIDDLE, *REACH]
-    own, spread = f"cx{place}, cy{place}, cz{place}", f"spread{place} * " if code.moved else ""
-    moves = not code.is_fixed(place)
-    there = ", ".join(mapped(f"back{place}", ("px", "py", "pz"))) if code.moved else "px, py, pz"
-    grown = (
-        f"({step.stretch[0]} * reach + {step.stretch[1]} * size)" if moves else f"({step.stretch[0]} * reach)"
+    rows = zip((*bound.escapes[:-1], bound.surface), bound.following, scales, bound.powers, strict=True)
+    return tuple(
+        (
+            max(escape, bound.stopped ** (1 / following) / scale) ** 2,
+            scale,
+            power,
+            power * CORE ** ((power - 1) / 2) if power > POWER else 0.0,
+            escape,
+        )
+        for escape, following, scale, power in rows
     )
-    return [
-        *([f"hx, hy, hz = {own}", f"{own} = {there}"] if moves else []),
-        *["bx, by, bz = x, y, z", "x, y, z = mx, my, mz", *code.image(place)],
-        *["mx, my, mz = x, y, z", "x, y, z = bx, by, bz"],
-        *([f"{own} = hx, hy, hz"] if moves else []),
-        *code.boxed(place, [f"reach = {spread}{grown}"]),
-        f"held = held & (reach < {FARTHEST_BOX})",
-        *(f"{v} = where(held, maximum(minimum({v}, m{v} + reach), m{v} - reach), {v})" for v in "xyz"),
-    ]
 
 
-def sign_arguments(steps: Round, grown: Growth, iterations: int) -> dict[str, object] | None:
-    """Return the arguments of the sign of an orbit's field, besides those of its steps."""
-    own = arguments(steps, grown, iterations)
-    stops = {name: value for name, value in own.items() if name.startswith("stop")}
+def sign_arguments(
+    steps: Round, grown: Growth, given: Sequence[Given], iterations: int
+) -> dict[str, object] | None:
+    """Return the arguments of `orbit_code.orbit_sign`; None where the sign is not that of the field."""
+    stops = tuple(own[0] for own in numbers(steps, grown))
     scales = grown.scales if grown.scaled else (1.0,) * len(steps)
-    radius, outside = grown.surface * scales[-1], _outside(grown, iterations)
-    sizes = (scale**2 * cast("float", stop) for scale, stop in zip(scales, stops.values(), strict=True))
+    outside = _outside(grown, iterations)
+    sizes = (scale**2 * stop for scale, stop in zip(scales, stops, strict=True))
     if any(size < least for size, least in zip(sizes, outside, strict=True)):
         return None
-    scale = {"scale": scales[-1]} if grown.scaled else {}
-    return {"iterations": iterations, "radius2": radius**2, **scale, **stops}
+    limits = scales[-1], (grown.surface * scales[-1]) ** 2
+    return {"iterations": iterations, "limits": limits, "given": tuple(given), "stops": stops}
 
 
 def _outside(grown: Growth, iterations: int) -> list[float]:
@@ -613,20 +501,18 @@ def _outside(grown: Growth, iterations: int) -> list[float]:
 
 
 @lru_cache(maxsize=64)
-def proved_box(steps: Round, values: tuple[tuple[str, Any], ...], grown: Growth, iterations: int) -> Box:
+def proved_box(steps: Round, given: tuple[Given, ...], grown: Growth, iterations: int) -> Box:
     """Return a box that is proved to hold the inside of an orbit's field."""
-    known = arguments(steps, grown, iterations)
-    radius = math.sqrt(cast("float", known[f"stop{len(steps) - 1}"]))
+    radius = math.sqrt(numbers(steps, grown)[-1][0])
     if grown.proved and grown.by_power:  # for constants as long as the start point, too
         radius = min(radius, grown.surface)
-    signed = sign_arguments(steps, grown, iterations)
-    if signed is None:
+    own = sign_arguments(steps, grown, given, iterations)
+    if own is None:
         return Box.centred(radius)
-    function, own = sign(steps, grown.scaled), {**signed, **dict(values)}
-    given = [own[name] for name in function.parameters[3:]]
+    function, known = sign(steps, grown.scaled), tuple(own.values())
 
     def outside(*cells: Interval) -> Interval:
         with np.errstate(all="ignore"):
-            return cast("Interval", evaluate_on_cells(function, *cells, *given))
+            return cast("Interval", evaluate_on_cells(function, *cells, *known))
 
     return Box.centred(*proved_half(outside, radius, grown.half))

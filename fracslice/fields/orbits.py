@@ -12,8 +12,8 @@ from ..common.parameters import AUTO, Count, Parameter, Vector
 from ..expr.graph import Function
 from ..expr.language import Fixed
 from .box import Box
-from .growth import Growth, arguments, growth, proved_box, sign, sign_arguments
-from .orbit_code import Code, field
+from .growth import Growth, arguments, growth, proved_box, sign_arguments
+from .orbit_code import Code, Given, Round, field, sign, stages
 from .registry import Formula, Node, register, shape
 
 Stepped = tuple[Callable[..., Any], dict[str, Any], tuple[float, ...] | None]
@@ -62,28 +62,27 @@ def _step(node: Node, alone: bool) -> Stepped:
     return function, {**values, **(only(node) if only else {})}, constant
 
 
-def steps(node: Node, alone: bool = True) -> tuple[tuple[Any, ...], dict[str, Any]]:
-    """Return the steps of a round as code, and the values of their arguments."""
-    codes, values = [], dict[str, Any]()
-    for place, (step, moved) in enumerate(steps_of_round(node)):
+def steps(node: Node, alone: bool = True) -> tuple[Round, tuple[Given, ...]]:
+    """Return the steps of a round as code, and the values that they take."""
+    codes, given = list[Code](), list[Given]()
+    for step, moved in steps_of_round(node):
         function, own, constant = _step(step, alone and step is node)
         fixed = tuple((name, v.value) for name, v in own.items() if isinstance(v, Fixed))
         passed = {name: v for name, v in own.items() if not isinstance(v, Fixed)}
         sizes = tuple((name, len(v) if isinstance(v, tuple) else 1) for name, v in passed.items())
-        values |= {f"v{place}_{name}": v for name, v in passed.items()}
+        maps: tuple[Any, ...] = ()
         if moved:
             linear, offset = moved
             undone, spread = inverse(linear), stretches(linear)
-            values[f"back{place}"] = (*undone.ravel().tolist(), *(-product(undone, offset)).tolist())
-            values[f"forth{place}"] = (*linear.ravel().tolist(), *offset.tolist())
-            values |= {f"spread{place}": float(spread[0] / spread[-1]), f"shrink{place}": float(spread[-1])}
+            back = (*undone.ravel().tolist(), *(-product(undone, offset)).tolist())
+            forth = (*linear.ravel().tolist(), *offset.tolist())
+            maps = back, forth, float(spread[0] / spread[-1]), float(spread[-1])
         if constant is None and node["julia"] is not None:
             point = np.array(node["julia"])
             constant = tuple((product(undone, point - offset) if moved else point).tolist())
-        if constant is not None:
-            values[f"c{place}"] = constant
+        given.append((tuple(passed.values()), constant or (), maps))
         codes.append(Code(function, sizes, fixed, constant is not None, moved is not None))
-    return tuple(codes), values
+    return tuple(codes), tuple(given)
 
 
 LIPSCHITZ = 2.0
@@ -120,8 +119,7 @@ def growth_of(node: Node) -> Growth:
     """Growth of a node's orbits."""
     if known := node.formula.hooks.get("growth"):
         return Growth(**known(node))
-    made, values = steps(node, alone=False)
-    bound = growth(made, tuple(values.items()), rounds(node))
+    bound = growth(*steps(node, alone=False), rounds(node))
     if bound is None:
         raise node.fail("has orbits that do not escape: expected parameters that enlarge more")
     if not bound.fits:
@@ -147,23 +145,21 @@ def orbit_bounds(node: Node) -> Box:
 
 
 def orbit_arguments(node: Node) -> dict[str, object]:
-    made, values = steps(node)
-    own = {**arguments(made, growth_of(node), node["iterations"]), **values}
-    return {name: own[name] for name in orbit_select(node).parameters[3:]}
+    code, given = steps(node)
+    return arguments(code, growth_of(node), given, node["iterations"])
 
 
 def orbit_sign(node: Node) -> tuple[Function, dict[str, object]] | None:
-    code, values = steps(node)
-    grown_by = growth_of(node)
-    own = sign_arguments(code, grown_by, node["iterations"])
-    return (sign(code, grown_by.scaled), {**own, **values}) if own else None
+    code, given = steps(node)
+    grown = growth_of(node)
+    own = sign_arguments(code, grown, given, node["iterations"])
+    return (sign(code, grown.scaled), own) if own else None
 
 
 def orbit_proved_bounds(node: Node) -> Box:
     if "growth" in node.formula.hooks:
         return orbit_bounds(node)
-    code, values = steps(node)
-    return proved_box(code, tuple(values.items()), growth_of(node), rounds(node))
+    return proved_box(*steps(node), growth_of(node), rounds(node))
 
 
 def escape_sign(node: Node, radius: float, escape2: float) -> tuple[Function, dict[str, object]]:
@@ -171,9 +167,9 @@ def escape_sign(node: Node, radius: float, escape2: float) -> tuple[Function, di
 
     `escape2`: square of the radius where its orbits stop.
     """
-    code, values = steps(node)
-    own = {"iterations": node["iterations"], "radius2": radius**2, "stop0": escape2}
-    return sign(code, False), {**own, **values}
+    code, given = steps(node)
+    own = {"iterations": node["iterations"], "limits": (1.0, radius**2), "given": given}
+    return sign(code, False), {**own, "stops": (escape2,)}
 
 
 def orbit_select(node: Node) -> Function:
@@ -217,8 +213,7 @@ def orbit_check(node: Node) -> None:
         for name in ("iterations", "bailout"):
             if node is not step and step.values.get(name) != _default(step, name):
                 raise step.fail(f"{name}={step[name]}: expected none inside <orbit>")
-    for place, code in enumerate(steps(node)[0]):
-        code.traced(place)
+    stages(steps(node)[0])
 
 
 HOOKS: dict[str, Callable[..., Any]] = {

@@ -1,96 +1,66 @@
 """Steps of orbits as straight-line code, with their derivatives in forward mode.
 
-A step maps a point w and a constant c to the next point. Its text is followed once, onto a `Tape` with the
+A step maps a point w and a constant c to the next point. Its graph is followed once, onto a `Tape` with the
 derivatives by w and by c. The stretch of the step is the one that verbs, sums and constant factors are known
 to keep; where they do not, it is a bound of the norm of the Jacobian.
 
-Every number is an expression with three derivatives by a point w and three by a constant c (Wengert 1964,
-"A simple automatic derivative evaluation program"). A vector also carries its stretch as far as sums and
-constant factors are known to keep it.
+Every number is a term with three derivatives by a point w and three by a constant c (Wengert 1964, "A simple
+automatic derivative evaluation program"). A vector also carries its stretch as far as sums and constant
+factors are known to keep it.
 """
 
 from __future__ import annotations
 
 import ast
 import operator
-import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from itertools import product
-from math import isfinite, nan
-from typing import Any, cast
+from math import copysign, isfinite, nan
+from typing import Any, NamedTuple, cast
 
 from ..errors import KernelError
 from ..expr import graph, language
-from ..expr.frontend import FormulaReader, Source, source_function
-from ..expr.graph import MismatchError
-from ..expr.language import EVALUATED, parse, parse_expression
+from ..expr.frontend import FormulaReader, Source, formula, source_function
+from ..expr.graph import Function, MismatchError, Writer, identified, written
+from ..expr.language import EVALUATED, parse_expression
+from ..expr.vocabulary import cos, maximum, ratio, sin, where
 from .maps import CENTRAL, LENGTHS, MAJORANTS, RIGID
 
-Terms = dict[tuple[str, ...], float]
-"""Coefficients of monomials, each the sorted names of its factors."""
 
-Find = Callable[[str], str | None]
-"""Expression of a name, or None."""
+class Term(NamedTuple):
+    """Operation on terms before it; a number, an input."""
 
-
-def linear(atom: str, find: Find) -> Terms:
-    """Return an atom as a linear form of names."""
-    if atom[0] == "-":
-        return scale_form(linear(atom[1:], find), -1.0)
-    if not atom.isidentifier():
-        return {(): float(atom)}
-    match (find(atom) or "").split(" "):
-        case [a, ("+" | "-") as sign, b] if _is_atom(a) and _is_atom(b):
-            terms = add_forms(linear(a, find), scale_form(linear(b, find), 1.0 if sign == "+" else -1.0))
-        case [a, "*", b] if _is_atom(a) and _is_atom(b):
-            terms = multiply_forms(linear(a, find), linear(b, find))
-        case _:
-            return {(atom,): 1.0}
-    return terms if all(len(names) == 1 for names in terms) else {(atom,): 1.0}
+    op: str  # of `expr.graph`; "constant" and "input" without operands
+    operands: tuple[int, ...] = ()  # indices of terms
+    data: Any = None  # the number; the name of the input, or its place in the arguments of the step
 
 
-def _is_atom(text: str) -> bool:
-    """True for a name or a number."""
-    name = text.removeprefix("-")
-    return name.isidentifier() or name.replace(".", "", 1).isdigit()
+Sum = dict[tuple[int, ...], float]
+"""Coefficients of monomials, each the sorted indices of its factors."""
 
 
-def scale_form(a: Terms, factor: float) -> Terms:
+def scale_form(a: Sum, factor: float) -> Sum:
     """Return a form times a number."""
     return {names: factor * value for names, value in a.items()}
 
 
-def add_forms(a: Mapping[tuple[str, ...], float], b: Mapping[tuple[str, ...], float]) -> Terms:
+def add_forms(a: Mapping[tuple[int, ...], float], b: Mapping[tuple[int, ...], float]) -> Sum:
     """Return the sum of two forms, without terms that cancel."""
     total = {names: a.get(names, 0.0) + b.get(names, 0.0) for names in {**a, **b}}
     return {names: value for names, value in total.items() if value}
 
 
-def multiply_forms(a: Terms, b: Terms) -> Terms:
+def multiply_forms(a: Sum, b: Sum) -> Sum:
     """Return the product of two forms."""
-    total: Terms = {}
+    total: Sum = {}
     for (p, u), (q, v) in product(a.items(), b.items()):
         total = add_forms(total, {tuple(sorted((*p, *q))): u * v})
     return total
 
 
-def dot(a: Sequence[str | None], b: Sequence[str | None], find: Find) -> Terms | None:
-    """Return the dot product of two rows of atoms if it needs less code than its products.
-
-    `a`, `b`: rows.
-    """
-    pairs = [(x, y) for x, y in zip(a, b, strict=True) if x is not None and y is not None]
-    total: Terms = {}
-    for x, y in pairs:
-        total = add_forms(total, multiply_forms(linear(x, find), linear(y, find)))
-    same = len({abs(value) for value in total.values()}) <= 1
-    quadratic = all(len(names) == 2 for names in total)
-    return total if same and quadratic and len(total) <= len(pairs) else None
-
-
-Slopes = tuple[str | None, ...]
+Slopes = tuple[int | None, ...]
 """Derivatives by w (three) and by c (three); None is zero."""
 
 FLAT: Slopes = (None,) * 6
@@ -98,9 +68,9 @@ FLAT: Slopes = (None,) * 6
 
 @dataclass(frozen=True)
 class Scalar:
-    """Atom, which is a name or a number with or without a minus, and its derivatives."""
+    """Term and its derivatives."""
 
-    atom: str
+    term: int
     slopes: Slopes = FLAT
 
     @property
@@ -109,22 +79,22 @@ class Scalar:
         return self.slopes == FLAT
 
 
-Stretch = tuple[str | None, str | None]
+Stretch = tuple[int | None, int | None]
 """Stretch by w and by c; None is zero."""
 
 
-Majorant = tuple[str | None, str | None]
+Majorant = tuple[int | None, int | None]
 """Bend by w (`fields.maps.sure_distance`), and distance to the nearest tear; None is none."""
 
 
 @dataclass(frozen=True)
 class Vector3:
-    """Three scalars; the stretch, the majorant and an atom of the length if they are known."""
+    """Three scalars; the stretch, the majorant and the length if they are known."""
 
     parts: tuple[Scalar, Scalar, Scalar]
     stretch: Stretch | None = None
     majorant: Majorant | None = None
-    length: str | None = None
+    length: int | None = None
 
     @property
     def known_majorant(self) -> Majorant | None:
@@ -134,74 +104,115 @@ class Vector3:
 
 @dataclass
 class Tape:
-    """Assignments, one for each expression."""
+    """Terms, each once."""
 
-    prefix: str  # prefix of the assigned names
-    lines: list[str] = field(default_factory=list)  # assignments
-    names: dict[str, str] = field(default_factory=dict)  # names by expression
-    expressions: dict[str, str] = field(default_factory=dict)  # expressions by name
+    terms: list[Term] = field(default_factory=list)
+    places: dict[Term, int] = field(default_factory=dict)  # indices of the terms
 
-    def variable(self, names: str, first: int, length: str) -> Vector3:
-        """Point of three names; its derivatives are those from the given index on."""
+    def add(self, op: str, *operands: int, data: Any = None) -> int:
+        """Index of a term."""
+        term = Term(op, operands, data)
+        if term not in self.places:
+            self.places[term] = len(self.terms)
+            self.terms.append(term)
+        return self.places[term]
+
+    def number(self, value: float) -> int:
+        """Index of a number; a negative one is that of its size with a minus."""
+        size = self.add("constant", data=abs(value))
+        return self.negative(size) if copysign(1.0, value) < 0 else size
+
+    def variable(self, letter: str, first: int) -> Vector3:
+        """Point whose derivatives are those from the given index on; `letter`: name of the point."""
         parts = [
-            Scalar(name, tuple("1.0" if i == first + k else None for i in range(6)))
-            for k, name in enumerate(names.split())
+            Scalar(
+                self.add("input", data=letter + axis),
+                tuple(self.one if i == first + k else None for i in range(6)),
+            )
+            for k, axis in enumerate("xyz")
         ]
-        stretch = (None, "1.0") if first else ("1.0", None)
-        return Vector3(tuple(parts), stretch, (None, None), length)  # type: ignore[arg-type]
+        stretch = (None, self.one) if first else (self.one, None)
+        return Vector3(tuple(parts), stretch, (None, None), self.add("input", data=letter + "r"))  # type: ignore[arg-type]
 
-    def name(self, code: str | None) -> str | None:
-        """Name of an expression; equal expressions have one. That of a name with a minus is itself."""
-        if code is None or code.removeprefix("-").isidentifier() or as_number(code) is not None:
-            return code
-        if code not in self.names:
-            self.names[code] = f"{self.prefix}{len(self.names)}"
-            self.expressions[self.names[code]] = code
-            self.lines.append(f"{self.names[code]} = {code}")
-        return self.names[code]
+    @property
+    def one(self) -> int:
+        return self.number(1.0)
 
-    def times(self, a: str | None, b: str | None) -> str | None:
-        """Product of two atoms; None is zero."""
+    @property
+    def zero(self) -> int:
+        return self.number(0.0)
+
+    def value(self, term: int | None) -> float | None:
+        """Number of a term that is one; None is zero."""
+        if term is None:
+            return 0.0
+        op, operands, data = self.terms[term]
+        if op == "neg":
+            number = self.value(operands[0])
+            return None if number is None else -number
+        return cast("float", data) if op == "constant" else None
+
+    def negative(self, a: int) -> int:
+        """Term with the other sign."""
+        size, minus = self.parted(a)
+        return size if minus else self.add("neg", a)
+
+    def parted(self, a: int) -> tuple[int, bool]:
+        """Term without its minus, and whether it has one."""
+        op, operands, _ = self.terms[a]
+        return (operands[0], True) if op == "neg" else (a, False)
+
+    def times(self, a: int | None, b: int | None) -> int | None:
+        """Product of two terms; None is zero."""
         if a is None or b is None:
             return None
-        (p, q), (m, n) = (as_number(a), as_number(b)), (a.removeprefix("-"), b.removeprefix("-"))
+        p, q = self.value(a), self.value(b)
         if 0 in (p, q):
             return None
         if p is not None and q is not None and isfinite(p * q):
-            return repr(p * q)
-        size = self.name(_product(*sorted((m, n), key=_numbers_first)))
-        return size if (m == a) == (n == b) else _negative(size)
+            return self.number(p * q)
+        (m, minus), (n, other) = self.parted(a), self.parted(b)
+        one = self.one
+        factors = [f for f in sorted((m, n), key=lambda f: (self.value(f) is None, f)) if f != one]
+        size = self.add("mul", *factors) if len(factors) > 1 else factors[0]
+        return size if minus == other else self.negative(size)
 
-    def plus(self, a: str | None, b: str | None, sign: str = "+") -> str | None:
-        """Sum or difference of two atoms; None is zero."""
-        b = b if sign == "+" else _negative(b)
-        p, q = (0 if e is None else as_number(e) for e in (a, b))
+    def plus(self, a: int | None, b: int | None, sign: int = 1) -> int | None:
+        """Sum or difference of two terms; None is zero."""
+        b = b if sign > 0 or b is None else self.negative(b)
+        p, q = self.value(a), self.value(b)
         if a is None or b is None or 0 in (p, q):
             return b if p == 0 else a
         if p is not None and q is not None and isfinite(abs(p) + abs(q)):
-            return repr(p + q) if p + q else None
+            return self.number(p + q) if p + q else None
         if a == b:
-            return self.times("2.0", a)
-        if a == _negative(b):
+            return self.times(self.number(2.0), a)
+        (m, minus), (n, other) = self.parted(a), self.parted(b)
+        if m == n:
             return None
-        if a[0] == b[0] == "-":
-            return _negative(self.plus(a[1:], b[1:]))
-        a, b = (b, a) if a[0] == "-" else (a, b)
-        return self.name(f"{a} - {b[1:]}" if b[0] == "-" else " + ".join(sorted((a, b))))
+        if minus and other:
+            return self.negative(self.or_zero(self.plus(m, n)))
+        if minus or other:
+            return self.add("sub", *((n, m) if minus else (m, n)))
+        return self.add("add", *sorted((a, b)))
 
-    def scalar(self, code: str, *slopes: tuple[str | None, Scalar]) -> Scalar:
-        """Scalar of an expression, with factors of the derivatives of others."""
-        total: list[str | None] = [None] * 6
+    def scalar(self, term: int, *slopes: tuple[int | None, Scalar]) -> Scalar:
+        """Scalar of a term, with factors of the derivatives of others."""
+        total: list[int | None] = [None] * 6
         for factor, of in slopes:
             total = [self.plus(t, self.times(factor, s)) for t, s in zip(total, of.slopes, strict=True)]
-        return Scalar(str(self.name(code)), tuple(total))
+        return Scalar(term, tuple(total))
 
-    def sum(self, a: Scalar, b: Scalar, sign: str) -> Scalar:
+    def sum(self, a: Scalar, b: Scalar, sign: int) -> Scalar:
         """Sum or difference of two scalars."""
-        slopes = [self.plus(x, y, sign) for x, y in zip(a.slopes, b.slopes, strict=True)]
-        return Scalar(self.plus(a.atom, b.atom, sign) or "0.0", tuple(slopes))
+        slopes = tuple(self.plus(x, y, sign) for x, y in zip(a.slopes, b.slopes, strict=True))
+        return Scalar(self.or_zero(self.plus(a.term, b.term, sign)), slopes)
 
-    def vector_sum(self, a: Vector3, b: Vector3, sign: str) -> Vector3:
+    def or_zero(self, a: int | None) -> int:
+        """Term that may be zero."""
+        return self.zero if a is None else a
+
+    def vector_sum(self, a: Vector3, b: Vector3, sign: int) -> Vector3:
         """Sum or difference of two vectors; the stretch of both is at most the sum."""
         stretch = None
         if a.stretch and b.stretch:
@@ -211,38 +222,43 @@ class Tape:
         majorant = first and second and self.joined(first, second)
         return Vector3(parts, stretch, majorant, self.length_of_sum(a, b, parts))  # type: ignore[arg-type]
 
-    def length_of_sum(self, a: Vector3, b: Vector3, parts: Sequence[Scalar]) -> str | None:
+    def length_of_sum(self, a: Vector3, b: Vector3, parts: Sequence[Scalar]) -> int | None:
         """Length of a sum or difference: of intervals, between the difference and the sum of the lengths."""
         first, second = (self.norm_of(v.parts) if v.stretch == (None, None) else v.length for v in (a, b))
         if first is None or second is None:
             return None
-        least, most = self.size(self.plus(first, second, "-")), self.plus(first, second)
-        return self.name(f"maximum({least or '0.0'}, {self.name(f'minimum({most}, {self.norm_of(parts)})')})")
+        least, most = self.size(self.plus(first, second, -1)), self.plus(first, second)
+        within = self.add("minimum", self.or_zero(most), self.norm_of(parts))
+        return self.add("maximum", self.or_zero(least), within)
 
-    def norm_of(self, parts: Sequence[Scalar]) -> str:
+    def norm_of(self, parts: Sequence[Scalar]) -> int:
         """Length of a vector, from its coordinates."""
-        x, y, z = (self.times(part.atom, part.atom) for part in parts)
+        x, y, z = (self.times(part.term, part.term) for part in parts)
         total = self.plus(self.plus(x, y), z)
-        return str(self.name(f"sqrt({total})")) if total else "0.0"
+        return self.zero if total is None else self.add("sqrt", total)
 
     def joined(self, a: Majorant, b: Majorant) -> Majorant:
         """Majorant of a sum: the larger bend, and the nearer tear."""
         pairs = zip(("maximum", "minimum"), a, b, strict=True)
-        bend, tear = (self.name(f"{which}({p}, {q})") if p and q else p or q for which, p, q in pairs)
+        bend, tear = (
+            (p if q is None else q) if None in (p, q) else self.add(which, cast("int", p), cast("int", q))
+            for which, p, q in pairs
+        )
         return bend, tear
 
     def product(self, a: Scalar, b: Scalar) -> Scalar:
         """Product of two scalars."""
-        return self.scalar(self.times(a.atom, b.atom) or "0.0", (b.atom, a), (a.atom, b))
+        return self.scalar(self.or_zero(self.times(a.term, b.term)), (b.term, a), (a.term, b))
 
     def scaled(self, a: Scalar, b: Vector3) -> Vector3:
         """Vector times a scalar."""
-        stretch = None
+        stretch = length = None
         if a.constant and b.stretch:
-            size = self.size(a.atom)
+            size = self.size(a.term)
             stretch = self.times(size, b.stretch[0]), self.times(size, b.stretch[1])
         majorant = b.known_majorant if a.constant else None
-        length = self.times(self.size(a.atom), b.length) if a.constant and b.length else None
+        if a.constant and b.length is not None:
+            length = self.times(self.size(a.term), b.length)
         return Vector3(tuple(self.product(a, part) for part in b.parts), stretch, majorant, length)  # type: ignore[arg-type]
 
     def after(self, before: Vector3, own: Majorant) -> Majorant | None:
@@ -252,207 +268,376 @@ class Tape:
         (bend, tear), (size, _) = before.known_majorant, before.stretch
         if own[1] is not None and bend is not None:
             return None
-        over = own[1] if size in (None, "1.0") else own[1] and self.name(f"ratio({own[1]}, {size})")
+        over = own[1]
+        if over is not None and size not in (None, self.one):
+            over = self.add("ratio", over, size)
         return self.joined((None, tear), (self.plus(bend, self.times(size, own[0])), over))
 
     def inverse(self, b: Scalar) -> Scalar:
         """Reciprocal of a scalar."""
-        number = as_number(b.atom)
+        number = self.value(b.term)
         if number:
-            return Scalar(repr(1.0 / number))
-        over = str(self.name(f"ratio(1.0, {b.atom})"))
-        return self.scalar(over, (self.name(f"-{over} * {over}") if not b.constant else None, b))
+            return Scalar(self.number(1.0 / number))
+        over = self.add("ratio", self.one, b.term)
+        squared = self.times(over, over)
+        return self.scalar(over, (None if b.constant else self.negative(self.or_zero(squared)), b))
 
     def intrinsic(self, name: str, given: list[Scalar]) -> Scalar:
         """Value of an intrinsic of `DERIVATIVES`, or of ``where``."""
-        atoms = [v.atom for v in given]
-        result = str(self.name(f"{name}({', '.join(atoms)})"))
+        terms = [v.term for v in given]
+        result = self.add(name, *terms)
         if all(v.constant for v in given):
             return Scalar(result)
         if name in ("minimum", "maximum", "where"):
-            sign = "<" if name == "minimum" else ">"
-            mask = self.name(atoms[0] if name == "where" else f"{atoms[0]} {sign} {atoms[1]}")
+            less = "lt" if name == "minimum" else "gt"
+            mask = terms[0] if name == "where" else self.add(less, *terms)
             pairs = zip(given[-2].slopes, given[-1].slopes, strict=True)
             return Scalar(result, tuple(self.chosen(mask, a, b) for a, b in pairs))
-        places = dict(zip("abc", atoms, strict=False)) | {"r": result}
+        slopes = _Slopes(self)
         factors = [
-            (self.name(_filled(text, places)) if text and not of.constant else None, of)
-            for text, of in zip(DERIVATIVES[name], given, strict=True)
+            (slopes(formula(slope), *terms, result) if slope and not of.constant else None, of)
+            for slope, of in zip(DERIVATIVES[name], given, strict=True)
         ]
         return self.scalar(result, *factors)
 
-    def chosen(self, mask: str | None, a: str | None, b: str | None) -> str | None:
-        """Expression of a where a mask holds, else of b; None is zero."""
-        return a if a == b else self.name(f"where({mask}, {a or '0.0'}, {b or '0.0'})")
+    def chosen(self, mask: int, a: int | None, b: int | None) -> int | None:
+        """Term a where a mask holds, else b; None is zero."""
+        return a if a == b else self.add("where", mask, self.or_zero(a), self.or_zero(b))
 
     def norms(self, vector: Vector3) -> Stretch:
         """Bounds of the norms of the Jacobians by w and by c."""
         rows = [part.slopes for part in vector.parts]
         return self.norm([r[:3] for r in rows]), self.norm([r[3:] for r in rows])
 
-    def norm(self, rows: Sequence[Slopes]) -> str | None:
+    def norm(self, rows: Sequence[Slopes]) -> int | None:
         """Bound of the norm of a matrix J.
 
         The largest eigenvalue of J J^T is at most the largest sum of absolute values in a row (Gershgorin
         1931), which is exact for similarities.
         """
-        if all(as_number(rows[i][k] or "0") == (i == k) for i in range(3) for k in range(3)):
-            return "1.0"
-        largest: str | None = None
+        if all(self.value(rows[i][k]) == (i == k) for i in range(3) for k in range(3)):
+            return self.one
+        largest: int | None = None
         for i, row in enumerate(rows):
             total = self.dot(row, row)
             for other in (*rows[:i], *rows[i + 1 :]):
                 total = self.plus(total, self.size(self.dot(row, other)))
-            largest = self.name(f"maximum({largest}, {total})") if largest and total else largest or total
-        return largest and self.name(f"sqrt({largest})")
+            if total is not None:
+                largest = total if largest is None else self.add("maximum", largest, total)
+        return None if largest is None else self.add("sqrt", largest)
 
-    def size(self, a: str | None) -> str | None:
-        """Absolute value of an atom."""
-        magnitude = a and a.removeprefix("-")
-        if magnitude is None or as_number(magnitude) is not None:
-            return magnitude
-        return self.name(f"absolute({magnitude})")
+    def size(self, a: int | None) -> int | None:
+        """Absolute value of a term."""
+        if a is None:
+            return None
+        magnitude, _ = self.parted(a)
+        return magnitude if self.value(magnitude) is not None else self.add("absolute", magnitude)
 
-    def dot(self, a: Slopes, b: Slopes) -> str | None:
+    def dot(self, a: Slopes, b: Slopes) -> int | None:
         """Dot product of two rows."""
-        total: str | None = None
-        terms = dot(a, b, self.expressions.get)
+        total: int | None = None
+        terms = self.short_dot(a, b)
         if terms is not None:
             for names, value in terms.items():
-                total = self.plus(total, self.times(*names), "+" if value > 0 else "-")
-            return total and self.times(repr(abs(next(iter(terms.values())))), total)
+                total = self.plus(total, self.times(*names), 1 if value > 0 else -1)
+            return total and self.times(self.number(abs(next(iter(terms.values())))), total)
         for x, y in zip(a, b, strict=True):
             total = self.plus(total, self.times(x, y))
         return total
 
+    def short_dot(self, a: Slopes, b: Slopes) -> Sum | None:
+        """Dot product of two rows if it needs less code than its products."""
+        pairs = [(x, y) for x, y in zip(a, b, strict=True) if x is not None and y is not None]
+        total: Sum = {}
+        for x, y in pairs:
+            total = add_forms(total, multiply_forms(self.linear(x), self.linear(y)))
+        same = len({abs(value) for value in total.values()}) <= 1
+        quadratic = all(len(names) == 2 for names in total)
+        return total if same and quadratic and len(total) <= len(pairs) else None
 
-DERIVATIVES: dict[str, tuple[str, ...]] = {
-    "sqrt": ("ratio(0.5, maximum(r, 1e-15))",),
-    "rsqrt": ("-0.5 * r * r * r",),
-    "ratio": ("ratio(1.0, b)", "-r * ratio(1.0, b)"),
-    "log": ("ratio(1.0, a)",),
-    "exp": ("r",),
-    "sin": ("cos(a)",),
-    "cos": ("-sin(a)",),
-    "atan2": ("b * ratio(1.0, a * a + b * b)", "-a * ratio(1.0, a * a + b * b)"),
-    "floor": ("",),
-    "absolute": ("where(a < 0.0, -1.0, 1.0)",),
+    def linear(self, a: int) -> Sum:
+        """Term as a linear form of others."""
+        op, operands, data = self.terms[a]
+        match op:
+            case "neg":
+                return scale_form(self.linear(operands[0]), -1.0)
+            case "constant":
+                return {(): cast("float", data)}
+            case "add" | "sub":
+                p, q = map(self.linear, operands)
+                terms = add_forms(p, scale_form(q, 1.0 if op == "add" else -1.0))
+            case "mul":
+                terms = multiply_forms(*map(self.linear, operands))
+            case _:
+                return {(a,): 1.0}
+        return terms if all(len(names) == 1 for names in terms) else {(a,): 1.0}
+
+
+class _Slopes(graph.Evaluator):
+    """Writes derivatives on a tape."""
+
+    def __init__(self, tape: Tape) -> None:
+        super().__init__({})
+        self.tape = tape
+
+    def evaluate(self, value: graph.Value, given: list[Any]) -> int:
+        terms = [self.tape.number(v) if isinstance(v, float) else v for v in given]
+        if value.op == "mul":
+            return self.tape.or_zero(self.tape.times(*terms))
+        return self.tape.negative(terms[0]) if value.op == "neg" else self.tape.add(value.op, *terms)
+
+
+# Derivatives of the vocabulary by an argument: functions of the arguments and of the result r.
+def _of_sqrt(a, r):  # type: ignore[no-untyped-def]
+    return ratio(0.5, maximum(r, 1e-15))
+
+
+def _of_rsqrt(a, r):  # type: ignore[no-untyped-def]
+    return -0.5 * r * r * r
+
+
+def _of_upper(a, b, r):  # type: ignore[no-untyped-def]
+    return ratio(1.0, b)
+
+
+def _of_lower(a, b, r):  # type: ignore[no-untyped-def]
+    return -r * ratio(1.0, b)
+
+
+def _of_log(a, r):  # type: ignore[no-untyped-def]
+    return ratio(1.0, a)
+
+
+def _of_exp(a, r):  # type: ignore[no-untyped-def]
+    return r
+
+
+def _of_sin(a, r):  # type: ignore[no-untyped-def]
+    return cos(a)
+
+
+def _of_cos(a, r):  # type: ignore[no-untyped-def]
+    return -sin(a)
+
+
+def _of_rise(a, b, r):  # type: ignore[no-untyped-def]
+    return b * ratio(1.0, a * a + b * b)
+
+
+def _of_run(a, b, r):  # type: ignore[no-untyped-def]
+    return -a * ratio(1.0, a * a + b * b)
+
+
+def _of_absolute(a, r):  # type: ignore[no-untyped-def]
+    return where(a < 0.0, -1.0, 1.0)
+
+
+DERIVATIVES: dict[str, tuple[Callable[..., Any] | None, ...]] = {
+    "sqrt": (_of_sqrt,),
+    "rsqrt": (_of_rsqrt,),
+    "ratio": (_of_upper, _of_lower),
+    "log": (_of_log,),
+    "exp": (_of_exp,),
+    "sin": (_of_sin,),
+    "cos": (_of_cos,),
+    "atan2": (_of_rise, _of_run),
+    "floor": (None,),
+    "absolute": (_of_absolute,),
     "minimum": (),
     "maximum": (),
 }
-"""Derivatives of the vocabulary by each argument, in terms of a, b and the result r."""
+"""Derivatives of the vocabulary by each argument; None is zero."""
 
 
-def _filled(text: str, places: Mapping[str, str]) -> str:
-    tree = parse_expression(text)
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Name) and node.id in places:
-            node.id = places[node.id]
-    return ast.unparse(tree)
+CONSTANT, POINT = ("cx", "cy", "cz"), ("wx", "wy", "wz")
+"""Inputs: coordinates of the constant and of the point; "cr" and "wr" are their lengths."""
+
+TEARING = frozenset({"floor", "where", "atan2", "lt", "le", "gt", "ge"})
+"""Operations that may tear space."""
 
 
-def _product(a: str, b: str) -> str:
-    """Expression of a product whose first factor is a number if one is."""
-    return b if as_number(a) == 1 else f"{a} * {b}"
-
-
-def _numbers_first(atom: str) -> tuple[bool, str]:
-    return as_number(atom) is None, atom
-
-
-def _negative(atom: str | None) -> str | None:
-    """Atom with the other sign."""
-    return atom and (atom[1:] if atom[0] == "-" else f"-{atom}")
-
-
-def as_number(code: str) -> float | None:
-    """Number that an expression spells, or None."""
-    try:
-        return float(code)
-    except ValueError:
-        return None
-
-
-CONSTANTS, POINTS = re.compile(r"\bc[xyz]\d+\b"), re.compile(r"\b([xyz]|c[xyz]\d+)\b")
-TEARS = re.compile(r"\b(floor|where|atan2)\b|[<>]")
-"""Coordinates of the constant, and of it or the point; functions and comparisons that may tear space."""
-
-
-@dataclass
+@dataclass(frozen=True)
 class Step:
-    """Code of a step."""
+    """Code of a step.
 
-    before: list[str]  # assignments that do not depend on the last point
-    lines: list[str]  # the other assignments
-    point: tuple[str, str, str]  # expressions of the next point
-    stretch: tuple[str, str]  # expressions of the stretch by w and by c
-    # expressions of the bend and of the distance to the nearest tear, or None without one; None if they are
-    # not known
-    majorant: tuple[str, str | None] | None = None
-    bending: tuple[str, ...] = ()  # assignments after `lines` that the majorant depends on
-    # expression of the length of the next point, from "rw" and "rc", those of the point and the constant;
-    # None if it is not known
-    length: str | None = None
-    measuring: tuple[str, ...] = ()  # assignments after `lines` that the length depends on
+    Its functions take the point w, the constant c, the tuple v of the other arguments, and the terms that are
+    `ready`.
+    """
+
+    terms: tuple[Term, ...]
+    point: tuple[int, ...]  # coordinates of the next point
+    stretch: tuple[int, int]  # stretch by w and by c
+    # bend and distance to the nearest tear, or None without one; None if they are not known
+    majorant: tuple[int, int | None] | None = None
+    length: int | None = None  # length of the next point, from those of the point and of the constant
+
+    @classmethod
+    def read(cls, text: str) -> Step:
+        """Step of a text; see `text`."""
+        terms, *others = ast.literal_eval(parse_expression(text))
+        return cls(tuple(Term(*term) for term in terms), *others)
+
+    @property
+    def text(self) -> str:
+        """The step as text."""
+        terms = tuple(map(tuple, self.terms))
+        return repr((terms, self.point, self.stretch, self.majorant, self.length))
 
     @cached_property
-    def image(self) -> list[str]:
-        """Assignments of `lines` that the next point depends on."""
-        before = {*self.before}
-        return [line for line in self.needed(*self.point) if line not in before]
+    def identity(self) -> str:
+        """Identity of the code."""
+        return identified(self.text)
 
-    def needed(self, *names: str) -> list[str]:
-        """Assignments that some names depend on."""
-        kept, live = [], {name.removeprefix("-") for name in names}
-        for line in reversed([*self.before, *self.lines]):
-            target, value = line.split(" = ", 1)
-            if target in live:
-                live |= names_in(value)
-                kept.append(line)
-        return kept[::-1]
+    def __hash__(self) -> int:
+        return hash(self.identity)
+
+    def needed(self, places: Sequence[int], known: Sequence[int] = ()) -> list[int]:
+        """Terms that some terms depend on, in order, without those that are known and theirs."""
+        live, stack = {*known}, [*places]
+        while stack:
+            if (place := stack.pop()) not in live:
+                live.add(place)
+                stack += self.terms[place].operands
+        return sorted(live.difference(known))
+
+    @cached_property
+    def changing(self) -> frozenset[int]:
+        """Terms that depend on the point."""
+        changing = set[int]()
+        for place, (_, operands, data) in enumerate(self.terms):
+            if data in POINT or not changing.isdisjoint(operands):
+                changing.add(place)
+        return frozenset(changing)
+
+    @cached_property
+    def ready(self) -> tuple[int, ...]:
+        """Calculations of the next point and the stretch that do not depend on the point."""
+        needed = self.needed([*self.point, *self.stretch])
+        plain = ("input", "constant", "neg")
+        return tuple(p for p in needed if p not in self.changing and self.terms[p].op not in plain)
+
+    def inputs(self, places: Sequence[int]) -> Iterator[Any]:
+        """Inputs that terms are made of, each as often as it is used."""
+        within = [o for p in self.needed(places) if self.terms[p].op != "neg" for o in self.terms[p].operands]
+        for place in (*within, *places):
+            op, operands, data = self.terms[place]
+            if op == "neg":
+                op, operands, data = self.terms[operands[0]]
+            if op == "input":
+                yield data
 
     @property
     def constants(self) -> list[str]:
-        """Coordinates of the constant, wherever the next point depends on them."""
-        return CONSTANTS.findall("\n".join([*self.needed(*self.point), *self.point]))
+        """Coordinates of the constant, as often as the next point depends on them."""
+        return [name for name in self.inputs(self.point) if name in CONSTANT]
 
-    @property
+    @cached_property
     def is_added(self) -> bool:
         """True if the constant is a summand of the next point and nowhere else."""
-        values = dict(line.split(" = ", 1) for line in self.image)
-        summands = [values.get(name, "").split(" + ") for name in self.point]
+        sums = [term.operands if term.op == "add" else () for term in map(self.terms.__getitem__, self.point)]
+        summands = [[self.terms[operand].data for operand in operands] for operands in sums]
         constants = sorted(self.constants)
         return len(constants) == 3 and all(c in two for c, two in zip(constants, summands, strict=True))
 
-    @property
+    @cached_property
     def is_torn(self) -> bool:
         """True if the step may tear space."""
-        return bool(TEARS.search("\n".join(self.image)))
+        return any(self.terms[p].op in TEARING for p in self.needed(self.point) if p in self.changing)
 
-    @property
+    @cached_property
     def is_steady(self) -> bool:
         """True if the stretch is the same at all points, and space is not torn."""
-        stretch = "\n".join([*self.needed(self.stretch[0]), self.stretch[0]])
-        return not self.is_torn and not POINTS.search(stretch)
+        return not self.is_torn and {*POINT, *CONSTANT}.isdisjoint(self.inputs(self.stretch[:1]))
+
+    @cached_property
+    def has_tear(self) -> bool:
+        """True if the distance to a tear of the step is known."""
+        return self.majorant is not None and self.majorant[1] is not None
+
+    @cached_property
+    def is_measured(self) -> bool:
+        """True if the length of the next point is known."""
+        return self.length is not None
+
+    @cached_property
+    def ignores_constant(self) -> bool:
+        """True if the constant does not change the next point."""
+        return self.terms[self.stretch[1]] == Term("constant", data=0.0)
+
+    # --- functions ---
+    @cached_property
+    def prepared(self) -> Function:
+        """Terms that are ready, from c and v."""
+        return self.function("prepared", ("c", "v"), self.ready)
+
+    @cached_property
+    def image(self) -> Function:
+        """The next point, from w, c, v and ready."""
+        return self.function("image", TAKEN, self.point)
+
+    @cached_property
+    def taken(self) -> Function:
+        """The next point and the stretches by w and by c, from w, c, v and ready."""
+        return self.function("taken", TAKEN, (self.point, *self.stretch))
+
+    @cached_property
+    def bent(self) -> Function:
+        """As `taken`, then the bend and the distance to the nearest tear, zero without one."""
+        assert self.majorant is not None
+        bend, tear = self.majorant
+        return self.function("bent", TAKEN, (self.point, *self.stretch, bend, bend if tear is None else tear))
+
+    @cached_property
+    def sized(self) -> Function:
+        """As `taken`, then the length of the next point, from those of w and c, too."""
+        return self.function("sized", (*TAKEN, "wr", "cr"), (self.point, *self.stretch, self.length))
+
+    def function(self, name: str, parameters: Sequence[str], results: tuple[Any, ...]) -> Function:
+        """Return a function of some results: terms, and tuples of terms."""
+        known = self.ready if "ready" in parameters else ()
+        places = [p for result in results for p in (result if isinstance(result, tuple) else (result,))]
+
+        def write(writer: Writer) -> graph.Value:
+            given = writer.items(writer.names["ready"], len(known)) if known else ()
+            values = dict(zip(known, given, strict=True))
+            for place in self.needed(places, known):
+                values[place] = self.written(writer, place, values)
+
+            def tupled(result: Any) -> graph.Value:
+                return (
+                    writer.add("tuple", *map(tupled, result)) if isinstance(result, tuple) else values[result]
+                )
+
+            return tupled(results)
+
+        return written(name, parameters, identified(self.identity, name), write)
+
+    def written(self, writer: Writer, place: int, values: Mapping[int, graph.Value]) -> graph.Value:
+        """Write a term."""
+        op, operands, data = self.terms[place]
+        if op == "constant":
+            return writer.constant(data)
+        if op != "input":
+            return writer.add(op, *(values[operand] for operand in operands))
+        if isinstance(data, tuple):
+            return reduce(lambda whole, k: writer.add("element", whole, k), data, writer.names["v"])
+        if data in ("wr", "cr"):
+            return writer.names[data]
+        return writer.items(writer.names[data[0]], 3)["xyz".index(data[1])]
 
 
-def names_in(value: str) -> set[str]:
-    """Return the names in an expression."""
-    return {n.id for n in ast.walk(parse(value)) if isinstance(n, ast.Name)}
-
+TAKEN = ("w", "c", "v", "ready")
+"""Arguments of the functions of a step."""
 
 Value = Any
 """Scalar, Vector or tuple of these."""
 
 
-def trace(
-    function: Callable[..., Any], parameters: Mapping[str, int], fixed: Mapping[str, Any], place: int = 0
-) -> Step:
-    """Follow the graph of a step."""
-    tape = Tape(f"s{place}_")
-    constant = tape.variable(f"cx{place} cy{place} cz{place}", 3, f"rc{place}")
-    env: dict[str, Value] = {"w": tape.variable("x y z", 0, f"rw{place}"), "c": constant}
-    env |= {name: _argument(f"v{place}_{name}", size) for name, size in parameters.items()}
+def trace(function: Callable[..., Any], parameters: Mapping[str, int], fixed: Mapping[str, Any]) -> Step:
+    """Follow the graph of a step; `parameters`: numbers of components of its other arguments, in order."""
+    tape = Tape()
+    env: dict[str, Value] = {"w": tape.variable("w", 0), "c": tape.variable("c", 3)}
+    env |= {name: _argument(tape, k, size) for k, (name, size) in enumerate(parameters.items())}
     names = language.parameters(function)
     if names[:2] != ["w", "c"] or {*names[2:]} != {*parameters, *fixed}:
         line = f"{function.__code__.co_filename}:{function.__code__.co_firstlineno}"
@@ -462,21 +647,11 @@ def trace(
     value = _Follower(tape)(step, *(env[name] for name in step.parameters))
     declared = value[1] if isinstance(value, tuple) and len(value) == 2 else None
     vector = _vector(value if declared is None else value[0], function)
-    stretch = vector.stretch or tape.norms(vector)
-    if declared is not None:
-        stretch = declared.atom, stretch[1]
-    point = tuple(part.atom for part in vector.parts)
-    majorant = vector.majorant and (vector.majorant[0] or "0.0", vector.majorant[1])
-    made = Step([], tape.lines, point, (stretch[0] or "0.0", stretch[1] or "0.0"), majorant)  # type: ignore[arg-type]
-    own = made.needed(*made.point, *made.stretch)
-    before, lines = _divide_assignments(own)
-    bending, measuring = (
-        tuple(line for line in made.needed(*filter(None, names)) if line not in own)
-        for names in (majorant or (), (vector.length,))
-    )
-    return replace(
-        made, before=before, lines=lines, bending=bending, length=vector.length, measuring=measuring
-    )
+    by_w, by_c = map(tape.or_zero, vector.stretch or tape.norms(vector))
+    majorant = vector.majorant and (tape.or_zero(vector.majorant[0]), vector.majorant[1])
+    point = tuple(part.term for part in vector.parts)
+    stretch = by_w if declared is None else declared.term, by_c
+    return Step(tuple(tape.terms), point, stretch, majorant, vector.length)
 
 
 @dataclass
@@ -545,25 +720,12 @@ class Verb:
         return [self.fixed[name] if name in self.fixed else next(rest) for name in names]
 
 
-def _argument(name: str, size: int) -> Value:
+def _argument(tape: Tape, place: int, size: int) -> Value:
     """Argument of a step: a number, a point or a tuple of numbers."""
     if size == 1:
-        return Scalar(name)
-    parts = tuple(Scalar(f"{name}_{k}") for k in range(size))
+        return Scalar(tape.add("input", data=(place,)))
+    parts = tuple(Scalar(tape.add("input", data=(place, k))) for k in range(size))
     return Vector3(parts, (None, None)) if size == 3 else parts  # type: ignore[arg-type]
-
-
-def _divide_assignments(lines: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Assignments that do not depend on the point x, y, z, and the others."""
-    before: list[str] = []
-    others: list[str] = []
-    changing = {"x", "y", "z"}
-    for line in lines:
-        target, value = line.split(" = ", 1)
-        changes = not changing.isdisjoint(names_in(value))
-        (others if changes else before).append(line)
-        changing |= {target} if changes else set()
-    return before, others
 
 
 class _Count(int):
@@ -579,12 +741,12 @@ class _Follower(graph.Evaluator):
 
     def __call__(self, function: graph.Function, *given: Any) -> Any:
         value = super().__call__(function, *given)
-        return _constants(value) if isinstance(value, float) else value
+        return self.constants(value) if isinstance(value, float) else value
 
     def decide(self, value: Any) -> bool:
         if isinstance(value, (bool, tuple)):
             return bool(value)
-        number = as_number(value.atom) if isinstance(value, Scalar) else None
+        number = self.tape.value(value.term) if isinstance(value, Scalar) else None
         if number is None:
             raise MismatchError("expected a condition on constants")
         return number != 0
@@ -593,7 +755,7 @@ class _Follower(graph.Evaluator):
         op = value.op
         if op == "index" or (given and all(isinstance(v, _Count) for v in given)):
             return self.counted(op, given, value.data)
-        parts = [_constants(v) if isinstance(v, (int, float)) else v for v in given]
+        parts = [self.constants(v) if isinstance(v, (int, float)) else v for v in given]
         if op == "call":
             return self.called(value.data, parts)
         if op == "tuple":
@@ -609,7 +771,7 @@ class _Follower(graph.Evaluator):
         """A step of a counter."""
         if op in ("index", "int"):
             number = data if data is not None else given[0]
-            return _Count(_number(number) if isinstance(number, Scalar) else number)
+            return _Count(self.number(number) if isinstance(number, Scalar) else number)
         made = getattr(operator, op)(*given)
         return made if isinstance(made, bool) else _Count(made)
 
@@ -618,17 +780,29 @@ class _Follower(graph.Evaluator):
         whole = given[0].parts if isinstance(given[0], Vector3) else given[0]
         if not isinstance(whole, tuple) or (data and len(whole) != data[1]):
             raise MismatchError(f"expected {data[1] if data else 'several'} values")
-        return whole[data[0] if data else int(_number(given[1]))]
+        return whole[data[0] if data else int(self.number(given[1]))]
+
+    def number(self, value: Value) -> float:
+        """Number that a value is known to be; NaN if it is not known."""
+        number = self.tape.value(value.term) if isinstance(value, Scalar) else None
+        return nan if number is None else number
+
+    def constants(self, value: Any) -> Value:
+        """Numbers from outside a step."""
+        if not isinstance(value, tuple):
+            return Scalar(self.tape.number(float(value)))
+        parts = tuple(map(self.constants, value))
+        return Vector3(parts, (None, None)) if _is_triple(parts) else parts
 
     # --- arithmetic ---
     def operator(self, op: str, a: Value, b: Value | None = None) -> Value:
         if op == "neg":
-            return self.product(Scalar("-1.0"), a)
+            return self.product(Scalar(self.tape.number(-1.0)), a)
         assert b is not None
-        if op in SIGNS:
+        if op in DECIDING:
             if not (isinstance(a, Scalar) and isinstance(b, Scalar)):
                 raise MismatchError("expected numbers, found a point; x, y, z = w gives its coordinates")
-            return Scalar(str(self.tape.name(f"{a.atom} {SIGNS[op]} {b.atom}")))
+            return Scalar(self.tape.add(op, a.term, b.term))
         if op == "mul":
             return self.product(a, b)
         if op == "truediv":
@@ -639,7 +813,7 @@ class _Follower(graph.Evaluator):
             raise MismatchError("expected +, -, * or /")
         if isinstance(b, Vector3) != isinstance(a, Vector3):
             raise MismatchError("expected two points or two numbers")
-        sign = "+" if op == "add" else "-"
+        sign = 1 if op == "add" else -1
         if isinstance(a, Scalar):
             return self.tape.sum(a, b, sign)
         return self.tape.vector_sum(a, b, sign)
@@ -659,7 +833,7 @@ class _Follower(graph.Evaluator):
         if not (given and isinstance(given[0], Vector3)):
             raise MismatchError("expected a point first")
         (image, factor), before = value, given[0].stretch
-        stretch = before and tuple(self.tape.times(factor.atom, s) for s in before)
+        stretch = before and tuple(self.tape.times(factor.term, s) for s in before)
         length = self.length(verb, given)
         return Vector3(image.parts, stretch, self.majorant(verb, given), length)  # type: ignore[arg-type]
 
@@ -687,21 +861,21 @@ class _Follower(graph.Evaluator):
         if verb.function not in MAJORANTS:
             return None
         bend, tear = self.followed(MAJORANTS[verb.function], verb.values(given))
-        return self.tape.after(given[0], (bend.atom, None if as_number(tear.atom) else tear.atom))
+        return self.tape.after(given[0], (bend.term, None if self.tape.value(tear.term) else tear.term))
 
-    def length(self, verb: Verb, given: list[Value]) -> str | None:
+    def length(self, verb: Verb, given: list[Value]) -> int | None:
         """Length of a verb's image, from that of its point."""
         before = given[0].length
         if before is None or verb.function in CENTRAL:
-            return cast("str | None", before)
+            return cast("int | None", before)
         if verb.function not in LENGTHS:
             return None
         values = verb.values([Scalar(before), *given[1:]])
-        return cast("str", self.followed(LENGTHS[verb.function], values).atom)
+        return cast("int", self.followed(LENGTHS[verb.function], values).term)
 
 
-SIGNS = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!=", "and_": "&", "or_": "|"}
-"""Comparisons and conjunctions in the text of a step."""
+DECIDING = graph.COMPARISONS | {"and_", "or_"}
+"""Comparisons and conjunctions."""
 
 
 def _vector(value: Value, function: Callable[..., Any]) -> Vector3:
@@ -720,17 +894,3 @@ def _is_triple(value: Value) -> bool:
 
 def _constant_stretch(parts: tuple[Scalar, ...]) -> Stretch | None:
     return (None, None) if all(part.constant for part in parts) else None
-
-
-def _number(value: Value) -> float:
-    """Number that a value is known to be; NaN if it is not known."""
-    number = as_number(value.atom) if isinstance(value, Scalar) else None
-    return nan if number is None else number
-
-
-def _constants(value: Any) -> Value:
-    """Numbers from outside a step."""
-    if not isinstance(value, tuple):
-        return Scalar(repr(float(value)))
-    parts = tuple(map(_constants, value))
-    return Vector3(parts, (None, None)) if _is_triple(parts) else parts

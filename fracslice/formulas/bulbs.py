@@ -118,9 +118,9 @@ def _is_connected(node: Node) -> bool:
     """True if the critical point 0 is inside; if not, the set of one constant is disconnected."""
     if not node["julia"]:
         return True
-    bailout, (code, values) = _bailout(node), steps(node, alone=False)
+    bailout, (code, given) = _bailout(node), steps(node, alone=False)
     outer = stop(node["power"], bailout, ESCAPED)
-    return stays(code, values, rounds(node), bailout, outer)
+    return stays(code, given, rounds(node), bailout, outer)
 
 
 @orbit(

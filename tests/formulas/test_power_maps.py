@@ -8,7 +8,7 @@ import pytest
 from fracslice.fields.devices import reference
 from fracslice.fields.growth import image
 from fracslice.fields.maps import by_angles, sure_distance, triplex
-from fracslice.fields.orbit_code import function_of_text
+from fracslice.fields.orbit_code import constant_of
 from fracslice.fields.orbits import growth_of, steps
 from fracslice.formulas import (
     Node,
@@ -43,8 +43,8 @@ def test_products_are_the_power(n: float) -> None:
 def test_what_follows_from_a_power_is_true(formula, power: float) -> None:  # type: ignore[no-untyped-def]
     """|m(w)| = |w|^n, so no orbit comes back from beyond the radius, and the box holds the solid."""
     root = formula(power=power, iterations=3)
-    code, values = steps(root)
-    step, w = image(code, 0, values), RNG.uniform(-1.5, 1.5, (3, 4000))
+    code, given = steps(root)
+    step, w = image(code, 0, given), RNG.uniform(-1.5, 1.5, (3, 4000))
     size = np.linalg.norm(w, axis=0)
     np.testing.assert_allclose(np.linalg.norm(step(w, 0 * w), axis=0), size**power, rtol=1e-9)
     start = RNG.uniform(-2, 2, (3, 20000))
@@ -102,19 +102,18 @@ def test_no_solid_is_nearer_across_a_tear(power: float) -> None:
 )
 def test_a_majorant_bounds_the_step(root: Node) -> None:
     """|f(w + e) - f(w)| <= a e / (1 - b e), where no tear is as near as e."""
-    code, values = steps(root)
-    made = code[0].traced(0)
-    assert made.majorant is not None
-    bend, tear = made.majorant
-    names, wanted = code[0].arguments(0), [made.stretch[0], bend, tear or "1e30"]
-    body = [*code[0].before(0, ("x", "y", "z")), *made.lines, *made.bending, f"return {', '.join(wanted)}"]
-    function = function_of_text(code, ["x", "y", "z", *names], body)
+    code, given = steps(root)
+    stage = code[0].stage
     w = RNG.uniform(-1.4, 1.4, (3, 4000))
     w = w[:, np.linalg.norm(w, axis=0) > 0.75]  # nearer to 0 the stretch of a power has a minimum, CORE
-    a, b, t = (np.broadcast_to(v, w.shape[1]) for v in function(*w, *(values[name] for name in names)))
+    constant = constant_of(tuple(w), given[0], stage)
+    ready = stage.step.prepared(constant, given[0][0])
+    _, *taken = stage.step.bent(tuple(w), constant, given[0][0], ready)
+    a, _, b, t = (np.broadcast_to(v, w.shape[1]) for v in taken)
+    t = t if stage.step.has_tear else np.full_like(a, 1e30)
     margin = 10 ** RNG.uniform(-3, 0.5, w.shape[1])
     sure = np.minimum(sure_distance(margin, a, a * b), 0.999 * t)
-    step, far = image(code, 0, values), 0.0
+    step, far = image(code, 0, given), 0.0
     for _ in range(20):
         direction = RNG.normal(size=w.shape)
         direction *= RNG.uniform(0, 1, w.shape[1]) * sure / np.linalg.norm(direction, axis=0)
@@ -125,8 +124,8 @@ def test_a_majorant_bounds_the_step(root: Node) -> None:
 
 
 def test_a_whole_power_has_no_tear() -> None:
-    tears = [steps(lambda_bulb(power=p))[0][0].traced(0).majorant[1] for p in (4.0, 4.5)]  # type: ignore[index]
-    assert tears[0] is None and tears[1] is not None
+    tears = [steps(lambda_bulb(power=p))[0][0].stage.step.has_tear for p in (4.0, 4.5)]
+    assert tears == [False, True]
 
 
 def test_the_radius_of_a_solid_is_iterated_once(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,12 +10,12 @@ import pytest
 
 from fracslice.fields.growth import (
     _prove_growth,
-    arguments,
     compose_steps,
     constant_stretch,
     image,
     least_size,
     norm,
+    numbers,
 )
 from fracslice.fields.maps import modulo
 from fracslice.fields.orbit_code import Code
@@ -65,10 +65,10 @@ def test_the_radius_of_every_orbit_is_proved(formula: Any) -> None:
 )
 def test_a_radius_that_is_too_small_grows(root: Node, radius: float) -> None:
     """Known radii: |w|^n - |w| = |w|, and factor (|w|^n - |w|) = |w|."""
-    code, values = steps(root, alone=False)
+    code, given = steps(root, alone=False)
     bound = replace(growth_of(root), escapes=(0.9 * radius,), proved=False)
-    fixed = code[0].is_fixed(0)
-    result = _prove_growth(code, bound, values, 0.0 if fixed else bound.escape)
+    fixed = code[0].stage.is_fixed
+    result = _prove_growth(code, bound, given, 0.0 if fixed else bound.escape)
     assert result.proved and radius < result.escape < 1.5 * radius
 
 
@@ -110,8 +110,8 @@ def test_denser_samples_find_no_orbit_that_comes_back(seed: int) -> None:
     """From beyond the radius at the end of a round, for constants as long as points of the solid."""
     root = random_hybrid(seed)
     bound, rng = growth_of(root), np.random.default_rng(seed)
-    code, values = steps(root)
-    whole = compose_steps([image(code, k, values) for k in range(len(code))])
+    code, given = steps(root)
+    whole = compose_steps([image(code, k, given) for k in range(len(code))])
     w, c = rng.normal(size=(2, 3, 1 << 15))
     w *= bound.escape * rng.uniform(1, 3, 1 << 15) / np.linalg.norm(w, axis=0)
     c *= max(root.bounds.box.hi) * rng.uniform(0, 1, 1 << 15) / np.linalg.norm(c, axis=0)
@@ -133,22 +133,21 @@ def test_denser_samples_find_no_orbit_that_comes_back(seed: int) -> None:
 )
 def test_the_least_size_is_a_lower_bound(root: Node) -> None:
     """Of |w| at the end of a round, for points of cells and constants of a size."""
-    code, values = steps(root)
-    known = {**values, **arguments(code, growth_of(root), 1)}
-    stops = [known[f"stop{k}"] for k in range(len(code) - 1)]
+    code, given = steps(root)
+    stops = [own[0] for own in numbers(code, growth_of(root))]
     half, size, tight = 0.02, 1.5, 0
     centres = RNG.uniform(-2, 2, (3, 300))
     centres[:, :40] = half * np.round(centres[:, :40])
     lo, hi = centres - half, centres + half
-    bound = least_size(code, 0, known, size)(lo, hi, np.linalg.norm(np.maximum(-lo, hi), axis=0))
+    bound = least_size(code, 0, given, stops, size)(lo, hi, np.linalg.norm(np.maximum(-lo, hi), axis=0))
     for _ in range(20):
         w, c = RNG.uniform(lo, hi), RNG.normal(size=centres.shape)
         c *= size / np.linalg.norm(c, axis=0)
         stopped = np.zeros(300, bool)
-        for k, stop in enumerate(stops):
-            between = compose_steps([image(code, i, known) for i in range(k + 1)])(w, c)
+        for k, stop in enumerate(stops[:-1]):
+            between = compose_steps([image(code, i, given) for i in range(k + 1)])(w, c)
             stopped |= (between**2).sum(0) >= stop
-        last = np.linalg.norm(compose_steps([image(code, k, known) for k in range(len(code))])(w, c), axis=0)
+        last = np.linalg.norm(compose_steps([image(code, k, given) for k in range(len(code))])(w, c), axis=0)
         assert (stopped | (last >= bound * (1 - 1e-9))).all()
         tight += int((last < 2 * bound).sum())
     assert tight > 100
@@ -172,7 +171,7 @@ def test_a_constant_stretch_makes_the_bound_a_theorem() -> None:
     def torn(w, c):  # type: ignore[no-untyped-def]
         return 2.0 * modulo(w, 1.0)
 
-    assert constant_stretch((Code(torn, ()),), 0, {}) is None
+    assert constant_stretch((Code(torn, ()),), [((), (), ())]) is None
 
 
 def test_a_report_can_name_the_formulas_whose_bound_is_measured() -> None:

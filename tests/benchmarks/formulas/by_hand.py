@@ -98,11 +98,11 @@ def bristorbrot(x, y, z, iterations, levels, stop):  # type: ignore[no-untyped-d
     return potential_distance(end_r2, slope * slope, level, first_level, last_level, least)
 
 
-def mandelbulb(x, y, z, v0_calm, iterations, levels, stop):  # type: ignore[no-untyped-def]
+def mandelbulb(x, y, z, calm, iterations, levels, stop):  # type: ignore[no-untyped-def]
     """Power 8, by complex multiplication."""
     a, b, c = x, y, z
     first_level, last_level, least = levels
-    fade, fading = v0_calm
+    fade, fading = calm
     level = 0.0 * x + first_level
     rho2 = x * x + y * y
     r2 = rho2 + z * z
@@ -157,8 +157,10 @@ def julia(x, y, z, constant, iterations, levels, stop):  # type: ignore[no-untyp
 
 def made(function: Callable[..., Any], node: Node, **values: Any) -> Node:
     """Solid of a field by hand, with the radii of a node whose step is the same."""
-    given = {**orbit_arguments(node), **values}
-    given["stop"] = given["stop0"]
+    taken: dict[str, Any] = orbit_arguments(node)
+    limits, ((others, *_),), ((stop, *_),) = taken["limits"], taken["given"], taken["numbers"]
+    given = {"iterations": taken["iterations"], "stop": stop, "levels": limits[:3], "bailout": limits[0]}
+    given |= {"calm": others[0] if others else (), **values}
     own = {name: given[name] for name in list(signature(function).parameters)[3:]}
     hooks = {"arguments": lambda _: own, "bounds": lambda _: node.bounds.box}
     known = {"lipschitz": 2.0, "exterior_only": True, "hooks": hooks}
