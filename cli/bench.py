@@ -57,8 +57,7 @@ def bench(given: BenchOptions) -> int:
     --------
     fracslice bench -o bench --workload sphere --resolution 64
     """
-    from fracslice.bench.bench_report import require_plots, write_report
-    from fracslice.bench.measurements import BenchmarkTask, Peer, measure
+    from fracslice.bench.measurements import BenchmarkTask, Peer, measure, require_plots, write_report
 
     require_plots()
     chosen = {"workloads": given.workloads, "resolutions": given.resolutions}

@@ -15,7 +15,19 @@ from fracslice.common.messages import decimal, format_count, significant
 from fracslice.formats import ENDINGS
 from fracslice.records import PIXEL, MeshJob, Placed, Print, SliceJob
 
-from .execution import BadInput, check_targets, is_model, load_model, load_scene, refuse_options
+from .execution import (
+    DENSITIES,
+    BadInput,
+    check_targets,
+    figures,
+    is_model,
+    load_model,
+    load_scene,
+    of_material,
+    refuse_options,
+    sizes,
+    summary,
+)
 from .options import (
     LENGTH,
     ClusterOptions,
@@ -30,7 +42,6 @@ from .options import (
     printer_option,
     write_page,
 )
-from .summary import DENSITIES, figures, of_material, sizes, summary
 
 if TYPE_CHECKING:
     from fracslice.checks.layer_checks import PrintReport

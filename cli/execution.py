@@ -1,28 +1,38 @@
-"""Execution of a command: threads, progress bar and orderly cancellation by Ctrl-C; its inputs and
-outputs.
+"""Execution of a command: threads, progress bar and orderly cancellation by Ctrl-C; its inputs, outputs and
+summary.
 """
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Container, Iterable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
 import click
 
+from fracslice.common.messages import decimal, format_count, place, significant
 from fracslice.errors import Cancelled, FracsliceError, KeptError, MeshError, SceneError
 from fracslice.formats import ENDINGS, SOLIDS
+from fracslice.records import JOINING
 
 if TYPE_CHECKING:
+    import numpy as np
+
+    from fracslice.checks.layer_checks import PrintReport
+    from fracslice.export.slice_run import SliceRun
+    from fracslice.jobs.report import Report, Result
     from fracslice.mesh import Mesh
+    from fracslice.mesh.checks import MeshReport
     from fracslice.scene import Scene
+    from fracslice.volume import Drain
     from fracslice.work import Work
 
 
@@ -224,3 +234,201 @@ def check_folder(folder: Path) -> None:
     if folder.exists() and not folder.is_dir():
         raise click.UsageError(f"{folder}: expected a folder")
     check_target(folder / "a file" if folder.is_dir() else folder)
+
+
+DENSITIES = {"resin": 1.1, "pla": 1.24, "petg": 1.27, "abs": 1.04, "asa": 1.07, "tpu": 1.22}
+"""Materials and their densities, g/ml; filaments as in PrusaResearch.ini of PrusaSlicer 2.5."""
+
+FLAT = 50.0
+"""Mean cross-section per area on the plate from which an object does not stand flat, as in the checks."""
+
+LISTED = 4
+"""Maximum number of drain holes whose places are all named."""
+
+SEALED = 1000
+"""Volume of the solid per volume of sealed cavities above which they are not mentioned."""
+
+CELLS, FINEST = 128, 256
+"""Usual and maximum number of cells along the longest side in the search for cavities."""
+
+Place = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Closing:
+    """Figures of an object that is ready to print. Lengths in mm."""
+
+    volume: float  # volume, mm3, area on the plate, mm2, and height
+    contact: float
+    height: float
+    material: str  # name of the material
+    density: float  # g/ml
+    about: str = ""  # stands before a volume that is an estimate
+    layers: int | None = None  # number of layers; None for a mesh
+    seconds: float | None = None  # time and price of the print; None if unknown
+    cost: float | None = None
+    drains: Sequence[Place] = ()  # openings of drain holes inside the hollow
+    drain: float = 0.0  # diameter of the drain holes
+    cavities: int = 0  # sealed cavities
+    trapped: float = 0.0  # their volume, mm3
+    loose: int = 0  # bodies that do not stand on the plate
+    bridge: float = 0.0  # minimum diameter of struts
+
+    def lines(self) -> Iterator[str]:
+        """Iterate over the lines, each with the option that mends what it names."""
+        ml = self.volume / 1000
+        amount = [
+            f"{self.about}{millilitres(self.volume)}",
+            f"{significant(ml * self.density)} g of {self.material} ({self.density:g} g/ml)",
+        ]
+        if self.layers is not None:
+            amount.append(format_count(self.layers, "layer"))
+        if self.seconds is not None:
+            amount.append(duration(self.seconds))
+        if self.cost:
+            amount.append(f"cost {self.cost:.2f}")
+        yield ", ".join(amount)
+        if self.drains:
+            places = [place(at, 1) for at in self.drains]
+            where = f"{' and '.join(places)} mm"
+            if len(places) > LISTED:
+                where = f"{places[0]} mm and at {len(places) - 1} other places"
+            yield f"drain holes of {self.drain:g} mm leave the hollow at {where}"
+        if self.cavities and self.trapped * SEALED > self.volume:
+            sealed = "a sealed cavity" if self.cavities == 1 else f"{self.cavities} sealed cavities"
+            mend = "--cavities fill, or --drain 3mm for a hollow"
+            yield f"{millilitres(self.trapped)} trapped in {sealed}: {mend}"
+        if self.loose:
+            bodies = format_count(self.loose, "loose body", "loose bodies")
+            yield f"{bodies}: --bridge {max(self.bridge, 1):.2g}mm, or --keep largest"
+        if self.contact * FLAT < self.volume / self.height:
+            from fracslice.checks.problems import flat_base
+
+            plate = f"{significant(self.contact, 2)} mm2 on the plate"
+            yield f"does not stand flat, {plate}: --base {flat_base(self.height)}"
+
+
+def millilitres(volume: float) -> str:
+    """Volume in millilitres, mm3 given; in mm3 below a hundredth of one."""
+    return f"{significant(volume / 1000)} ml" if volume >= 10 else f"{significant(volume, 2)} mm3"
+
+
+def duration(seconds: float) -> str:
+    """Duration in hours and minutes, or in seconds."""
+    minutes = round(seconds / 60)
+    if seconds < 60:
+        return f"{max(round(seconds), 1)} s"
+    return f"{minutes // 60} h {minutes % 60} min" if minutes >= 60 else f"{minutes} min"
+
+
+def of_mesh(result: Result, material: str, price: float | None) -> Closing:
+    """Closing figures of a mesh."""
+    report = result.report
+    mesh, grams = report.mesh, report.mesh.volume_mm3 / 1000 * DENSITIES[material]
+    return Closing(
+        volume=mesh.volume_mm3,
+        contact=report.contact_mm2,
+        height=mesh.bbox_mm[1][2] - mesh.bbox_mm[0][2],
+        material=material,
+        density=DENSITIES[material],
+        cost=None if price is None else grams * price / 1000,
+        drains=[tuple(p) for p in result.place.mm(starts(result.planned.drains)).tolist()],
+        drain=2 * result.place.scale * max((d.radius for d in result.planned.drains), default=0.0),
+        cavities=mesh.cavities,
+        trapped=report.cavities_mm3,
+        loose=report.loose_bodies,
+        bridge=JOINING * report.voxel_mm,
+    )
+
+
+def of_material(report: PrintReport, material: str) -> PrintReport:
+    """Report on layers of a key of `DENSITIES`: its weight, and of a filament no problem of resin."""
+    from fracslice.checks import checks
+
+    of_resin = {check.kind for check in checks() if check.of_resin and material != "resin"}
+    problems = [problem for problem in report.problems if problem.kind not in of_resin]
+    return replace(report, weight_g=report.volume / 1000 * DENSITIES[material], problems=problems)
+
+
+def of_layers(run: SliceRun, price: float | None) -> Closing:
+    """Closing figures of layers. Areas of layers that another process made are interpolated."""
+    import numpy as np
+
+    stack, resin = run.stack, run.resin
+    known = sorted(run.slicer.areas)
+    areas = np.interp(np.arange(run.layers), known, [run.slicer.areas[k] for k in known])
+    volume = float(areas @ stack.heights)
+    of = price if price is not None else resin.price if resin else None
+    named = resin is not None and resin.name != "unknown"
+    count, hollow = trapped_volume(run)
+    places = (starts(stack.drains) - stack.origin) * stack.scale
+    return Closing(
+        volume=volume,
+        contact=float(areas[0]),
+        height=float(stack.tops[-1]),
+        material=resin.name if resin and named else "resin",
+        density=resin.density if resin else DENSITIES["resin"],
+        about="about " if len(known) < run.layers else "",
+        layers=run.layers,
+        seconds=resin.seconds(run.layers) if resin else None,
+        cost=None if of is None else volume / 1e6 * of,
+        drains=[tuple(p) for p in places.tolist()],
+        drain=2 * stack.scale * max((d.radius for d in stack.drains), default=0.0),
+        cavities=count,
+        trapped=hollow,
+    )
+
+
+def starts(drains: Sequence[Drain]) -> np.ndarray:
+    """Inner ends of drain holes, float64 [n, 3], scene units."""
+    import numpy as np
+
+    return np.array([drain.start for drain in drains], float).reshape(-1, 3)
+
+
+def trapped_volume(run: SliceRun) -> tuple[int, float]:
+    """Number and volume, mm3, of the cavities of a stack."""
+    from fracslice.volume.amount import count_sealed
+
+    stack = run.stack
+    narrowest = min((2 * drain.radius for drain in stack.drains), default=math.inf)
+    longest = max(stack.outer.size)
+    cell = max(min(longest / CELLS, narrowest / 3), longest / FINEST)
+    count, volume = count_sealed(stack.root, stack.outer, cell, run.work)
+    return count, volume * stack.scale**3
+
+
+def summary(path: str, report: Report) -> str:
+    """Summary of a mesh job: figures, notes and accuracy."""
+    error, back, fewer = report.surface_error_mm, report.surface_to_mesh_mm, ""
+    if report.simplified is not None:
+        done = report.simplified
+        off = max(done.bound_mm, done.back_mm)
+        fewer = f"simplified from {done.from_triangles:,} triangles, at most {off:.3g} mm off\n"
+    notes = "".join(f"{note}\n" for note in report.notes)
+    return (
+        f"{path}: {figures(report.mesh, report.problems)}\n{notes}"
+        f"{fewer}vertices {error.mean * 1000:.2g} um from the surface (99 %: {error.p99 * 1000:.2g} um), "
+        f"the surface {back.mean:.2g} mm from the mesh (at most {back.max:.2g} mm), "
+        f"voxel {report.voxel_mm:.3g} mm, {report.seconds['total']:.1f} s, {report.peak_rss_mb:.0f} MB"
+    )
+
+
+def figures(mesh: MeshReport, problems: Sequence[str] | None = None) -> str:
+    """Figures and printability of a mesh, in one line; by default, the problems are the mesh's own."""
+    problems = mesh.problems if problems is None else problems
+    verdict = f"would not print: {', '.join(problems)}" if problems else "watertight, manifold"
+    return f"{sizes(mesh)}, {verdict}"
+
+
+def sizes(mesh: MeshReport) -> str:
+    """Triangles, size, volume and bodies of a mesh, in one line."""
+    (x0, y0, z0), (x1, y1, z1) = mesh.bbox_mm
+    size = " x ".join(map(decimal, (x1 - x0, y1 - y0, z1 - z0))) + " mm"
+    triangles, bodies = (
+        format_count(mesh.triangles, "triangle"),
+        format_count(mesh.components, "body", "bodies"),
+    )
+    volume = mesh.volume_mm3
+    amount = f"{decimal(volume / 1000)} cm3" if volume >= 1000 else f"{decimal(volume)} mm3"
+    return f"{triangles}, {size}, {amount}, {bodies}"

@@ -14,7 +14,17 @@ from fracslice.common.messages import decimal
 from fracslice.common.parameters import alternatives
 from fracslice.formats import ENDINGS
 
-from .execution import BadInput, check_folder, check_targets, load_scene, refuse_moved, refuse_options
+from .execution import (
+    DENSITIES,
+    BadInput,
+    check_folder,
+    check_targets,
+    load_scene,
+    of_mesh,
+    refuse_moved,
+    refuse_options,
+    summary,
+)
 from .options import (
     AMOUNT,
     INTERVAL,
@@ -28,7 +38,6 @@ from .options import (
     option,
     output,
 )
-from .summary import DENSITIES, of_mesh, summary
 from .sweeps import MOST, TABLE, families, going_on, is_table, with_suffix
 
 if TYPE_CHECKING:

@@ -173,7 +173,7 @@ def checked(kind: Parameter, _: click.Context, __: click.Parameter, value: Any) 
 
 def read_seconds(text: str) -> float:
     """Parse a time of an animation."""
-    from fracslice.scene.animation import Seconds
+    from fracslice.scene.view import Seconds
 
     return float(Seconds(0.0, "").read(text))
 

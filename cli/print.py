@@ -10,9 +10,8 @@ import click
 
 from fracslice.errors import keeping
 
-from .execution import check_targets, load_scene
+from .execution import check_targets, duration, load_scene
 from .options import MeshOptions, Name, argument, command, option, output
-from .summary import duration
 
 TOLERANCE = 0.02
 """Default tolerance of the simplified mesh, mm."""

@@ -9,9 +9,8 @@ import click
 from fracslice.common.parameters import alternatives
 from fracslice.formats import ENDINGS
 
-from .execution import BadInput, check_targets, load_model
+from .execution import BadInput, check_targets, figures, load_model
 from .options import RunOptions, argument, command, output
-from .summary import figures
 
 
 class RepairOptions(RunOptions):

@@ -15,7 +15,7 @@ from fracslice.common.messages import decimal, format_count
 from fracslice.errors import keeping
 from fracslice.records import RasterOptions
 
-from .execution import check_targets, load_scene, refuse_options
+from .execution import check_targets, load_scene, of_layers, refuse_options
 from .options import (
     AMOUNT,
     NUMBER,
@@ -29,7 +29,6 @@ from .options import (
     printer_option,
     write_page,
 )
-from .summary import of_layers
 from .sweeps import families
 
 if TYPE_CHECKING:

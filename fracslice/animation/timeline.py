@@ -23,10 +23,9 @@ from ..fields.depth import resolve_depths
 from ..fields.registry import Node
 from ..fields.varying import Varying
 from ..rendering.setup import prepare
-from ..scene.animation import Animation, Keyframes, Track
 from ..scene.layout import kind_of
 from ..scene.model import Scene
-from ..scene.view import Camera
+from ..scene.view import Animation, Camera, Keyframes, Track
 
 STEPS = 256
 """Most steps away from the surface."""

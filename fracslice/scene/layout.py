@@ -23,8 +23,7 @@ from ..fields.registry import Formula, load_installed
 from ..fields.varying import Varying
 from ..formulas import Node, get, names
 from ..records import Part, Print
-from .animation import Animation, Track
-from .view import PARTS, View
+from .view import PARTS, Animation, Track, View
 
 if TYPE_CHECKING:
     from .model import Scene

@@ -37,8 +37,8 @@ from ..expr import vocabulary
 from ..fields.node import docstring, signature
 from ..fields.registry import Formula, Node, get, names, origin
 from ..fields.varying import Variable
-from .animation import AttributePath, Keys, Seconds
 from .layout import DEFINE, LISTED, PARAMETER, SCENE, SECTIONS, Element, Identifier, formulas
+from .view import AttributePath, Keys, Seconds
 
 _GROUPS = {
     "shape": ("Shapes", "Solids. They contain no elements."),

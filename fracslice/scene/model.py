@@ -15,9 +15,8 @@ from ..errors import SceneError
 from ..fields.definitions import Definition, definitions
 from ..formulas import Node, get
 from ..records import Part, Print
-from .animation import Animation, Track
 from .layout import DEFINE, PARAMETER, SCENE, SECTIONS, SOLID, VERSION, Element
-from .view import View
+from .view import Animation, Track, View
 
 
 @dataclass(frozen=True)

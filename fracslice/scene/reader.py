@@ -23,7 +23,6 @@ from ..fields.registry import DEEPEST, TOO_DEEP, get
 from ..formats import SOLIDS
 from ..formulas import Node
 from ..records import Part, Print
-from .animation import Animation, Track
 from .layout import (
     DEFINE,
     LISTED,
@@ -37,7 +36,7 @@ from .layout import (
     registered_formulas,
 )
 from .model import Scene, computing, scene
-from .view import View
+from .view import Animation, Track, View
 
 if TYPE_CHECKING:
     from .model import Scene

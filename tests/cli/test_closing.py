@@ -6,8 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from fracslice.cli.execution import Closing, duration
 from fracslice.cli.main import run
-from fracslice.cli.summary import Closing, duration
 
 pytestmark = pytest.mark.once
 

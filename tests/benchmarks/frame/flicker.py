@@ -17,9 +17,8 @@ from fracslice.animation.film import gradual_depths
 from fracslice.formulas import Node
 from fracslice.rendering import develop
 from fracslice.scene import library
-from fracslice.scene.animation import Animation
 from fracslice.scene.reader import reads
-from fracslice.scene.view import Camera, View
+from fracslice.scene.view import Animation, Camera, View
 from fracslice.work import Work
 
 from ..runner import Row, Run

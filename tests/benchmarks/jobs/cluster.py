@@ -31,9 +31,8 @@ from fracslice.jobs.slices import SliceRecipe
 from fracslice.records import MeshJob
 from fracslice.rendering import Renderer
 from fracslice.scene import scene
-from fracslice.scene.animation import Animation
 from fracslice.scene.model import to_xml
-from fracslice.scene.view import Camera, View
+from fracslice.scene.view import Animation, Camera, View
 from fracslice.slicing import SliceJob
 from fracslice.volume import sampler
 from fracslice.work import Work

@@ -11,8 +11,7 @@ from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
-from fracslice.bench.bench_report import write_report
-from fracslice.bench.measurements import BenchmarkTask, Peer, measure
+from fracslice.bench.measurements import BenchmarkTask, Peer, measure, write_report
 from fracslice.work import Work
 
 from ..runner import Row, Run
