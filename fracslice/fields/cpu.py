@@ -6,12 +6,13 @@ Loading it takes milliseconds. Its functions (`machine`) release the GIL, so pla
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .._native import Regions32, Regions64
 from ..common.cache import Kept, cache_folder, key
 from ..expr.frontend import loop_function
 from ..expr.graph import Program
@@ -62,13 +63,31 @@ class CpuKernel(Kernel):
         Lanes.
     """
 
-    def __init__(self, linked: Linked, precision: Precision = "float32") -> None:
+    def __init__(
+        self, linked: Linked, precision: Precision = "float32", region: Region | None = None
+    ) -> None:
         self.dtype = np.dtype(precision)
         self.width = lane_count(self.dtype.itemsize * 8)
         functions = load_functions(linked.program, self.dtype.itemsize * 8, self.width, (points, bricks))
         self._points, self._bricks = functions["points"], functions["bricks"]
         self._parameters = constant(linked.parameters, self.dtype, linked.held)
         self._offsets = constant(np.indices((8, 8, 8)).reshape(3, 512), self.dtype)
+        if region is not None:
+            self._look_around(linked, region)
+
+    def _look_around(self, linked: Linked, region: Region) -> None:
+        """Let the loops pass over elements of a union that are far from a point; see `Regions64`."""
+        alone = CpuKernel(region.union, "float32" if self.dtype.itemsize == 4 else "float64")
+        given = [
+            (kernel._points, kernel._parameters, [astuple(one) for one in lists])
+            for kernel, lists in ((self, linked.lists), (alone, region.union.lists))
+        ]
+        where = region.lipschitz, region.centre, region.half, self.width
+        kind: Any = Regions32 if self.dtype.itemsize == 4 else Regions64
+        regions = kind(given[0], self._bricks, given[1], *where)
+        loops = (CompiledFunction(regions, loop, self.dtype) for loop in (points, bricks))
+        self._points, self._bricks = loops
+        self._parameters = constant(np.array([regions.address], np.uint64).view(self.dtype), self.dtype)
 
     @property
     def entry(self) -> tuple[CompiledFunction, np.ndarray]:
@@ -91,6 +110,33 @@ class CpuKernel(Kernel):
     ) -> None:
         assert corners.shape == (len(out), 3) and out.shape == (len(corners), 512)
         self._bricks(self._parameters, *origin, voxel, *self._offsets, corners, out, len(corners))
+
+
+@dataclass(frozen=True)
+class Region:
+    """Union in a scene, its Lipschitz constant, and a cube around it, scene units."""
+
+    union: Linked  # the union alone
+    lipschitz: float
+    centre: tuple[float, ...]
+    half: float
+
+    @classmethod
+    def of(cls, linked: Linked) -> Region | None:
+        """Region of a scene with a long union, or None; measured constants bound no element of it."""
+        if linked.union is None or sum(one.count for one in linked.lists) < LONG:
+            return None
+        bounds, union = linked.union.bounds, linked.union.linked
+        if not bounds.box.finite or bounds.exterior_only or bounds.measured or not union.lists:
+            return None
+        centre = tuple((a + b) / 2 for a, b in zip(bounds.box.lo, bounds.box.hi, strict=True))
+        return cls(union, bounds.lipschitz, centre, ROOM * max(bounds.box.size))
+
+
+LONG, ROOM = 32, 0.75
+"""Elements of a union from which on those near a point are looked for; half side of the cube, in which they
+are, per largest side of the solid.
+"""
 
 
 _kernel = lru_cache(maxsize=32)(CpuKernel)
@@ -116,7 +162,7 @@ def compile_scene(root: Node, precision: Precision = "float32") -> CpuKernel:
     KernelError
         If the scene cannot be linked or compiled.
     """
-    return _kernel(root.linked, precision)
+    return _kernel(root.linked, precision, Region.of(root.linked))
 
 
 @dataclass(frozen=True, eq=False)

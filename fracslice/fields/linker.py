@@ -16,7 +16,7 @@ import ast
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import groupby
+from itertools import groupby, islice
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -38,6 +38,12 @@ function, and the compile time of a large one grows with the number of its parts
 UNROLLED = 3
 """Elements of one structure that are unrolled; more become a loop."""
 
+MANY = 16
+"""Elements of a sharp union from which on they are listed in P, so that it may list fewer of them."""
+
+EMPTY = 1e30
+"""Value of a union that lists no element."""
+
 PART = ("x", "y", "z", "P", "P0")
 """Arguments of a part's function."""
 
@@ -45,6 +51,15 @@ POINT = ("x", "y", "z")
 
 FIELD = "field"
 """Name of the field's function."""
+
+
+@dataclass(frozen=True)
+class ListInP:
+    """List of elements of one structure."""
+
+    header: int  # index in P of their number; the index of the first one's numbers follows
+    count: int
+    size: int  # numbers of an element
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,11 +74,17 @@ class Linked:
         Parameters P, float64 [n].
     held
         Arguments in memory, each with the index in P of its first word.
+    lists
+        Lists of the elements of a union, at the end of P, which may hold fewer of them.
+    union
+        Scene of this union alone, with the transforms around it, or None.
     """
 
     program: Program
     parameters: np.ndarray
     held: tuple[tuple[int, InMemory], ...] = ()
+    lists: tuple[ListInP, ...] = ()
+    union: Node | None = None
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Linked) and self._contents == other._contents
@@ -177,7 +198,9 @@ class Run:
 
     part: Subroutine  # function of the elements
     count: int  # number of elements
-    start: int  # offset of the first element's numbers from P0
+    # offset from P0 of the first element's numbers; of those that are listed, of their number and their place
+    start: int
+    is_listed: bool = False  # true if the number of elements and their place are numbers in P
 
     def call(self, writer: Writer, point: Sequence[Value] = (), k: Value | None = None) -> Value:
         """Write the call of one element.
@@ -185,7 +208,7 @@ class Run:
         `point`: another one than x, y, z; `k`: index of the element.
         """
         names = writer.names
-        place = writer.add("add", names["P0"], self.start)
+        place = self.header(writer, 1) if self.is_listed else writer.add("add", names["P0"], self.start)
         if k is not None:
             place = writer.add("add", place, writer.add("mul", writer.constant(self.part.size), k))
         point = point or [names[name] for name in POINT]
@@ -199,22 +222,37 @@ class Run:
         `begun`: leave out the first one; `changed`: names that `fold` assigns, which writes it for the
         element of an index of a run.
         """
-        rest = Run(self.part, self.count - begun, self.start + begun * self.part.size)
-        if self.count <= UNROLLED:
-            for k in range(rest.count):
-                fold(Run(self.part, 1, rest.start + k * self.part.size), None)
+        if not self.is_loop:
+            for k in range(begun, self.count):
+                fold(Run(self.part, 1, self.start + k * self.part.size), None)
             return
 
         def body() -> bool:
-            fold(rest, writer.names["i"])
+            fold(self, writer.names["i"])
             return True
 
-        writer.counted("i", [writer.constant(rest.count)], changed, body, [])
+        end = self.header(writer, 0) if self.is_listed else writer.constant(self.count)
+        writer.counted("i", [writer.constant(int(begun)), end], changed, body, [])
+
+    def header(self, writer: Writer, k: int) -> Value:
+        """Write the number of many elements (0) or the place of the first one (1)."""
+        index = writer.add("add", writer.names["P0"], self.start + k)
+        return writer.add("int", writer.add("element", writer.names["P"], index))
+
+    @property
+    def is_loop(self) -> bool:
+        """True if its elements are not unrolled."""
+        return self.is_listed or self.count > UNROLLED
+
+    @property
+    def taken(self) -> int:
+        """Entries of P that it takes from its start on."""
+        return 2 if self.is_listed else self.count * self.part.size
 
     @property
     def about(self) -> str:
         """Text of its place."""
-        return f"{self.count} {self.start} {self.part.size}"
+        return f"{'listed' if self.is_listed else self.count} {self.start} {self.part.size}"
 
 
 class Dialect(Protocol):
@@ -227,11 +265,33 @@ class Dialect(Protocol):
 
     def arguments(self, node: Node) -> Arguments: ...
 
+    def lists(self, node: Node) -> bool:
+        """Return whether the elements of a node may be listed in P."""
+
     def order(self, node: Node, parts: Sequence[Subroutine]) -> Sequence[int]:
         """Return an order in which the children may be evaluated."""
 
     def write(self, name: str, node: Node, given: Arguments, runs: Sequence[Run]) -> Function:
         """Return the function of a node."""
+
+
+@dataclass
+class Numbers:
+    """Numbers of P, and lists of elements that come after them."""
+
+    values: list[float] = field(default_factory=list)
+    held: list[tuple[int, InMemory]] = field(default_factory=list)  # see `Linked`
+    lists: list[Listed] = field(default_factory=list)
+
+
+@dataclass
+class Listed:
+    """Elements of one structure: the index of their number, and their own numbers."""
+
+    header: int
+    count: int
+    is_open: bool  # see `_Tree.open_union`
+    numbers: Numbers = field(default_factory=Numbers)
 
 
 def link_tree(linker: Linker, root: Node, dialect: Dialect) -> str:
@@ -250,6 +310,7 @@ class _Tree:
     parts: dict[int, Subroutine] = field(default_factory=dict)
     inside: dict[int, list[Node]] = field(default_factory=dict)
     given: dict[int, Arguments] = field(default_factory=dict)
+    runs: dict[int, list[Run]] = field(default_factory=dict)
 
     def linked(self, root: Node) -> Subroutine:
         order, stack = [], [root]
@@ -260,14 +321,53 @@ class _Tree:
             stack += self.inside[id(node)]
         for node in reversed(order):
             self.parts[id(node)] = self.part(node)
-        stack = [root]
+        path = self.open_path(root)
+        self.append(root, self.linker.main, path[-1])
+        self.linker.union = path[-1]
+        for outer in reversed(path[:-1]):
+            if outer.formula.kind != "csg":
+                self.linker.union = outer.changed((self.linker.union,))
+        return self.parts[id(root)]
+
+    def open_path(self, root: Node) -> list[Node]:
+        """Nodes down to the largest sharp union below operators that only grow with its value."""
+        path = [root]
+        while inside := self.inside[id(path[-1])]:
+            node = path[-1]
+            is_csg = node.formula.kind == "csg" and node.is_unordered
+            if self.dialect.lists(node) and len(inside) >= MANY:
+                break
+            if not is_csg and node.formula.name not in GROWING:
+                break
+            first = inside[:1] if node.formula.name == "difference" else inside
+            path.append(max(first, key=lambda child: len(self.inside[id(child)])))
+        return path
+
+    def append(self, root: Node, numbers: Numbers, union: Node | None = None) -> None:
+        """Append the numbers of a node and of its elements; listed ones go to a list of their own.
+
+        `union`: see `open_union`.
+        """
+        stack: list[Node | tuple[list[Node], bool]] = [root]
         while stack:
             node = stack.pop()
-            given, start = self.given[id(node)], len(self.linker.parameters)
-            self.linker.held += [(start + place, memory) for place, memory in given.held]
-            self.linker.parameters += given.numbers
-            stack += reversed(self.inside[id(node)])
-        return self.parts[id(root)]
+            if isinstance(node, tuple):
+                elements, is_open = node
+                listed = Listed(len(numbers.values), len(elements), is_open)
+                numbers.lists.append(listed)
+                numbers.values += [float(len(elements)), 0.0]
+                for element in elements:
+                    self.append(element, listed.numbers)
+                continue
+            given, start = self.given[id(node)], len(numbers.values)
+            numbers.held += [(start + place, memory) for place, memory in given.held]
+            numbers.values += given.numbers
+            inside = iter(self.inside[id(node)])
+            after: list[Node | tuple[list[Node], bool]] = []
+            for run in self.runs[id(node)]:
+                group = list(islice(inside, run.count))
+                after += [(group, node is union)] if run.is_listed else group
+            stack += reversed(after)
 
     def part(self, node: Node) -> Subroutine:
         """Function of a node whose children are linked."""
@@ -276,14 +376,16 @@ class _Tree:
         places = self.dialect.order(node, [self.parts[id(child)] for child in children])
         children = self.inside[id(node)] = [children[k] for k in places]
         runs, size = [], len(given.numbers)
+        listed = self.dialect.lists(node) and len(children) >= MANY
         for part, group in groupby(self.parts[id(child)] for child in children):
-            runs.append(Run(part, len(list(group)), size))
-            size += part.size * runs[-1].count
+            runs.append(Run(part, len(list(group)), size, listed))
+            size += runs[-1].taken
+        self.runs[id(node)] = runs
         key = (
             given.function,
             given.fixed,
             repr(given.passed),
-            *((run.part.function, run.count) for run in runs),
+            *((run.part.function, run.about) for run in runs),
         )
 
         def make(name: str) -> Subroutine:
@@ -297,7 +399,7 @@ class _Tree:
         """
         held = {run.part.function: 0 for run in runs}
         for run in runs:
-            sites = run.count if run.count <= UNROLLED else 2
+            sites = 2 if run.is_loop else run.count
             part = run.part
             held[part.function] += 0 if part.function in self.linker.called else sites * part.weight
         for function in sorted(held, key=lambda function: -held[function]):
@@ -307,6 +409,10 @@ class _Tree:
                 self.linker.called.add(function)
                 held[function] = 0
         return 1 + sum(held.values())
+
+
+GROWING = frozenset({"transform", "material"})
+"""Domain operators whose value grows with that of their element."""
 
 
 LEADING = {"shape": 3, "csg": 2, "domain": 4}
@@ -345,6 +451,10 @@ class FieldDialect:
             )
         return arguments(node, leading(node))
 
+    def lists(self, node: Node) -> bool:
+        """Return True for a sharp union."""
+        return node.formula.name == "union" and node.is_unordered
+
     def order(self, node: Node, parts: Sequence[Subroutine]) -> Sequence[int]:
         """Group elements of the same structure where their order changes no bit of the result."""
         places = range(len(parts))
@@ -378,11 +488,12 @@ class FieldDialect:
                 names_now = writer.names
                 names_now["f"] = writer.call(given.read, names_now["f"], other, *given.load(writer))
 
-            names["f"] = runs[0].call(writer)
+            listed = runs[0].is_listed
+            names["f"] = writer.constant(EMPTY) if listed else runs[0].call(writer)
             if sum(run.count for run in runs) == 1:
                 names["f"] = writer.call(given.read, names["f"], *given.load(writer))
             for number, run in enumerate(runs):
-                run.each(writer, number == 0, {"f"}, fold)
+                run.each(writer, number == 0 and not listed, {"f"}, fold)
             return writer.names["f"]
 
         return part_function(name, given, runs, write, "csg")
@@ -470,12 +581,12 @@ def link(root: Node) -> Linked:
 class Linker:
     """Collects functions and parameters."""
 
-    parameters: list[float] = field(default_factory=list)  # parameters P
+    main: Numbers = field(default_factory=Numbers)  # of P, without the lists behind them
     functions: dict[str, Function] = field(default_factory=dict)  # those that are called by name
     called: set[Function] = field(default_factory=set)  # those that are called, not inlined
     # arrays that stand behind the numbers in P, each with the index of the number that is its offset
     tables: list[tuple[int, np.ndarray]] = field(default_factory=list)
-    held: list[tuple[int, InMemory]] = field(default_factory=list)  # see `Linked`
+    union: Node | None = None  # see `Linked`
     _parts: dict[Any, Subroutine] = field(default_factory=dict)
 
     def field(self, root: Node) -> None:
@@ -495,11 +606,37 @@ class Linker:
             value = 0.0
         return _read_text(append_numbers(value, self.parameters))
 
-    def numbers(self) -> np.ndarray:
-        """Return P: the numbers, then each array once.
+    @property
+    def parameters(self) -> list[float]:
+        """Numbers of P so far, without the lists behind them."""
+        return self.main.values
 
-        Returns float64 [n].
-        """
+    def linked(self) -> Linked:
+        """Return what is collected: P is the numbers, then each array once, then the lists of elements."""
+        numbers, tail = self._numbers_and_arrays(), list[float]()
+        held, lists = [*self.main.held], list[ListInP]()
+        waiting: list[tuple[Any, int, Listed]] = [(numbers, 0, listed) for listed in self.main.lists]
+        while waiting:  # those of the open union are the last
+            values, base, listed = waiting.pop(min(range(len(waiting)), key=lambda k: waiting[k][-1].is_open))
+            place, own = len(numbers) + len(tail), listed.numbers
+            values[base + listed.header + 1] = place
+            held += [(place + index, memory) for index, memory in own.held]
+            waiting += [(tail, len(tail), inner) for inner in own.lists]
+            tail += own.values
+            lists.append(ListInP(listed.header, listed.count, len(own.values) // listed.count))
+            if not listed.is_open:
+                lists.clear()
+        if len(numbers) + len(tail) > LARGEST:
+            raise KernelError(
+                f"a scene of {len(numbers) + len(tail):,} numbers: expected at most {LARGEST:,}"
+            )
+        numbers = np.concatenate([numbers, tail])
+        parts = tuple(part.function for part in self._parts.values())
+        program = Program(dict(self.functions), parts, frozenset(self.called))
+        return Linked(program, numbers, tuple(held), tuple(lists), self.union if lists else None)
+
+    def _numbers_and_arrays(self) -> np.ndarray:
+        """The numbers, then each array once, float64 [n]."""
         numbers, arrays = np.array(self.parameters or [0.0], np.float64), {}
         end = len(numbers)
         for place, array in self.tables:
@@ -535,12 +672,6 @@ class Linker:
         rest = [a for a in called.parameters if a not in values and a != "P"]
         lines = [f"return bound({', '.join(passed)})"]
         self.functions[name] = text_function(name, [*rest, "P"], lines, {"bound": called})
-
-    def linked(self) -> Linked:
-        """Return what is collected."""
-        parts = tuple(part.function for part in self._parts.values())
-        program = Program(dict(self.functions), parts, frozenset(self.called))
-        return Linked(program, self.numbers(), tuple(self.held))
 
 
 def _read_text(passed: Passed) -> str:

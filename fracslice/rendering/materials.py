@@ -316,6 +316,10 @@ class TraceDialect(FieldDialect):
         passed = append_numbers(float(self.materials[id(node)]), paint)
         return Arguments(node.function, (), (passed,), tuple(paint))
 
+    def lists(self, node: Node) -> bool:
+        """Return False: the first element's paint is that of a union; see `Dialect.lists`."""
+        return False
+
     def order(self, node: Node, parts: Sequence[Subroutine]) -> Sequence[int]:
         """Keep the order of the children: at equal distances the first child's paint is taken.
 
@@ -610,7 +614,7 @@ def _link_painting(root: Node) -> tuple[Mapping[str, Function], NDArray[np.float
         "return cr, cg, cb, paint, tone",
     ]
     linker.write(_FUNCTION, ("x", "y", "z", "P"), lines)
-    return linker.functions, np.array(linker.parameters or [0.0])
+    return linker.functions, linker.linked().parameters
 
 
 def _encode_srgb(light: NDArray[np.float64]) -> NDArray[np.uint8]:

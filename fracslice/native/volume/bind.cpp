@@ -3,8 +3,12 @@
 #include "bind_field.h"
 #include "brick_arrays.h"
 #include "extent.h"
+#include "regions.h"
 #include "signs.h"
 
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
 #include <tbb/parallel_for.h>
 
 namespace fracslice::volume {
@@ -125,10 +129,63 @@ int64_t count_open_edges(const IjkArray& ijk, const ValuesArray& values, const I
     return open_edges(bricks, signs_of(bricks));
 }
 
+// Loops over a field, in regions; holds what they call.
+template <class Real>
+class RegionLoops {
+  public:
+    using P = nb::ndarray<const Real, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+    using Lists = std::vector<std::array<size_t, 3>>;
+
+    // `whole` and `alone`: the loop "points", its P, and lists of the elements.
+    RegionLoops(const std::tuple<nb::object, P, Lists>& whole, nb::object bricks, const std::tuple<nb::object, P, Lists>& alone,
+                double lipschitz, const Point& centre, double half, size_t width)
+        : held_{std::get<0>(whole), std::get<0>(alone), bricks},
+          regions_(listing(whole), code<typename Regions<Real>::Bricks>(bricks), listing(alone), lipschitz, centre, half, width) {}
+    uintptr_t address() const { return reinterpret_cast<uintptr_t>(&regions_); }
+    uintptr_t loop(const std::string& name) const {
+        return name == "points" ? reinterpret_cast<uintptr_t>(&points_in_regions<Real>)
+                                : reinterpret_cast<uintptr_t>(&bricks_in_regions<Real>);
+    }
+
+  private:
+    template <class Loop>
+    static Loop code(const nb::object& compiled) {
+        return reinterpret_cast<Loop>(nb::cast<uintptr_t>(compiled.attr("address")));
+    }
+    static Listing<Real> listing(const std::tuple<nb::object, P, Lists>& given) {
+        const auto& [points, p, lists] = given;
+        Listing<Real> all{code<typename Listing<Real>::Points>(points), {p.data(), p.data() + p.size()}, {}};
+        size_t numbers = 0;
+        for (const auto& [header, count, size] : lists) {
+            all.lists.push_back({header, count, size});
+            numbers += count * size;
+            require(header + 2 <= p.size(), "expected the header of a list in P");
+        }
+        require(numbers <= p.size(), "expected lists at the end of P");
+        return all;
+    }
+    std::array<nb::object, 3> held_;
+    Regions<Real> regions_;
+};
+
+template <class Real>
+void bind_regions(nb::module_& module, const char* name) {
+    using namespace nanobind::literals;
+    using Loops = RegionLoops<Real>;
+    using Given = std::tuple<nb::object, typename Loops::P, typename Loops::Lists>;
+    nb::class_<Loops>(module, name)
+        .def(nb::init<const Given&, nb::object, const Given&, double, const Point&, double, size_t>(), "whole"_a, "bricks"_a,
+             "alone"_a, "lipschitz"_a, "centre"_a, "half"_a, "width"_a)
+        .def_prop_ro("address", &Loops::address)
+        .def("get_function_address", &Loops::loop, "name"_a);
+}
+
 }  // namespace
 
 void bind_extent(nb::module_& module) {
     using namespace nanobind::literals;
+    bind_regions<float>(module, "Regions32");
+    bind_regions<double>(module, "Regions64");
     nb::class_<Sides>(module, "Sides")
         .def(nb::init<nb::object, nb::object, double, bool, const Point&, const Point&, int>(), "sign"_a, "conservative"_a,
              "lipschitz"_a, "far"_a, "lo"_a, "hi"_a, "threads"_a = 0)
