@@ -15,7 +15,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, reduce
 from itertools import groupby, islice
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -276,22 +276,22 @@ class Dialect(Protocol):
 
 
 @dataclass
-class Numbers:
-    """Numbers of P, and lists of elements that come after them."""
+class PartNumbers:
+    """PartNumbers of P, and lists of elements that come after them."""
 
     values: list[float] = field(default_factory=list)
     held: list[tuple[int, InMemory]] = field(default_factory=list)  # see `Linked`
-    lists: list[Listed] = field(default_factory=list)
+    lists: list[ElementList] = field(default_factory=list)
 
 
 @dataclass
-class Listed:
+class ElementList:
     """Elements of one structure: the index of their number, and their own numbers."""
 
     header: int
     count: int
-    is_open: bool  # see `_Tree.open_union`
-    numbers: Numbers = field(default_factory=Numbers)
+    is_open: bool  # see `_Tree.open_path`
+    numbers: PartNumbers = field(default_factory=PartNumbers)
 
 
 def link_tree(linker: Linker, root: Node, dialect: Dialect) -> str:
@@ -321,12 +321,11 @@ class _Tree:
             stack += self.inside[id(node)]
         for node in reversed(order):
             self.parts[id(node)] = self.part(node)
-        path = self.open_path(root)
-        self.append(root, self.linker.main, path[-1])
-        self.linker.union = path[-1]
-        for outer in reversed(path[:-1]):
-            if outer.formula.kind != "csg":
-                self.linker.union = outer.changed((self.linker.union,))
+        *path, end = self.open_path(root)
+        self.append(root, self.linker.main, end)
+        if self.dialect.lists(end):
+            around = [node for node in reversed(path) if node.formula.kind != "csg"]
+            self.linker.union = reduce(lambda inner, node: node.changed((inner,)), around, end)
         return self.parts[id(root)]
 
     def open_path(self, root: Node) -> list[Node]:
@@ -343,17 +342,17 @@ class _Tree:
             path.append(max(first, key=lambda child: len(self.inside[id(child)])))
         return path
 
-    def append(self, root: Node, numbers: Numbers, union: Node | None = None) -> None:
+    def append(self, root: Node, numbers: PartNumbers, union: Node | None = None) -> None:
         """Append the numbers of a node and of its elements; listed ones go to a list of their own.
 
-        `union`: see `open_union`.
+        `union`: see `open_path`.
         """
         stack: list[Node | tuple[list[Node], bool]] = [root]
         while stack:
             node = stack.pop()
             if isinstance(node, tuple):
                 elements, is_open = node
-                listed = Listed(len(numbers.values), len(elements), is_open)
+                listed = ElementList(len(numbers.values), len(elements), is_open)
                 numbers.lists.append(listed)
                 numbers.values += [float(len(elements)), 0.0]
                 for element in elements:
@@ -581,7 +580,7 @@ def link(root: Node) -> Linked:
 class Linker:
     """Collects functions and parameters."""
 
-    main: Numbers = field(default_factory=Numbers)  # of P, without the lists behind them
+    main: PartNumbers = field(default_factory=PartNumbers)  # of P, without the lists behind them
     functions: dict[str, Function] = field(default_factory=dict)  # those that are called by name
     called: set[Function] = field(default_factory=set)  # those that are called, not inlined
     # arrays that stand behind the numbers in P, each with the index of the number that is its offset
@@ -608,14 +607,14 @@ class Linker:
 
     @property
     def parameters(self) -> list[float]:
-        """Numbers of P so far, without the lists behind them."""
+        """PartNumbers of P so far, without the lists behind them."""
         return self.main.values
 
     def linked(self) -> Linked:
         """Return what is collected: P is the numbers, then each array once, then the lists of elements."""
         numbers, tail = self._numbers_and_arrays(), list[float]()
         held, lists = [*self.main.held], list[ListInP]()
-        waiting: list[tuple[Any, int, Listed]] = [(numbers, 0, listed) for listed in self.main.lists]
+        waiting: list[tuple[Any, int, ElementList]] = [(numbers, 0, listed) for listed in self.main.lists]
         while waiting:  # those of the open union are the last
             values, base, listed = waiting.pop(min(range(len(waiting)), key=lambda k: waiting[k][-1].is_open))
             place, own = len(numbers) + len(tail), listed.numbers
