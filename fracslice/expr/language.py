@@ -13,6 +13,7 @@ import ast
 import builtins
 import linecache
 import math
+from collections import deque
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, is_dataclass
 from enum import Enum
@@ -65,8 +66,12 @@ def fingerprint(function: Callable[..., Any]) -> Hashable:
 @lru_cache(maxsize=4096)
 def outer_names(code: CodeType) -> tuple[str, ...]:
     """Return the names that a function uses from outside, and their attributes."""
-    inner = (outer_names(c) for c in code.co_consts if isinstance(c, CodeType))
-    return tuple(sorted({*code.co_names, *code.co_freevars, *(n for names in inner for n in names)}))
+    names, waiting = set[str](), [code]
+    while waiting:
+        part = waiting.pop()
+        names.update(part.co_names, part.co_freevars)
+        waiting += [inner for inner in part.co_consts if isinstance(inner, CodeType)]
+    return tuple(sorted(names))
 
 
 def _mark(value: Any, attributes: tuple[str, ...] = ()) -> Hashable:
@@ -85,16 +90,18 @@ def identity(*values: Any) -> str:
     described = _Described()
     for value in values:
         described.add(value)
+    described.follow()
     described.add_records()
     return "\n".join(described.lines)
 
 
 class _Described:
-    """Lines on values and on everything that they refer to, each once."""
+    """Lines on values, then on everything that they refer to, each once."""
 
     def __init__(self) -> None:
         self.lines: list[str] = []
         self.seen: dict[tuple[int, tuple[str, ...]], Any] = {}
+        self.waiting = deque[tuple[Any, tuple[str, ...]]]()  # values whose parts are not described yet
         self.names = set[str]()  # names that the functions use
         self.records: list[Any] = []  # those whose attributes of these names are used
 
@@ -106,15 +113,24 @@ class _Described:
         self.lines.append(_label(value))
         if isinstance(value, FunctionType):
             names = outer_names(value.__code__)
-        if (id(value), names) in self.seen:
-            return
-        self.seen[id(value), names] = value
+        if (id(value), names) not in self.seen:
+            self.seen[id(value), names] = value
+            self.waiting.append((value, names))
+
+    def follow(self) -> None:
+        """Describe the parts of all values."""
+        while self.waiting:
+            self.describe(*self.waiting.popleft())
+
+    def describe(self, value: Any, names: tuple[str, ...]) -> None:
+        """Add the parts of a value."""
         if isinstance(value, FunctionType):
             outside = scope(value)
             self.names.update(names)
             self.lines += _source(value.__code__)
             self.add_named({name: outside[name] for name in names if name in outside}, names)
         elif type(value) is tuple:
+            self.lines.append(str(len(value)))
             for item in value:
                 self.add(item, names)
         elif isinstance(value, (ModuleType, type)):
@@ -140,6 +156,7 @@ class _Described:
                 self.add_named(
                     {name: getattr(record, name) for name in names if hasattr(record, name)}, names
                 )
+            self.follow()
 
 
 def _label(value: Any) -> str:
