@@ -446,6 +446,27 @@ def corners_by_vertex(
 ) -> tuple[NDArray[int64], NDArray[int64]]:
     """First corner of each vertex, [n + 1]; corners by vertex: corner k of triangle t is 3 t + k."""
 
+def fans(
+    triangles: NDArray[int32],
+    beyond: NDArray[int64],
+    vertices: NDArray[float64],
+    normals: NDArray[float64],
+    alike: NDArray[float64],
+    fixed: NDArray[bool_],
+    apexes: NDArray[int32],
+    thin: float,
+    sharp: float,
+    most: int,
+    threads: int = 0,
+) -> list[tuple[list[int], list[tuple[int, int, int]]] | None]:
+    """Disk around each apex, grown until all of it is seen from there, and the fan that replaces it.
+
+    None if there is no such disk, or if it would swallow a fixed vertex. `beyond`: triangle beyond each side,
+    or -1; `normals` of the surface at the triangles; `alike`: the same, rounded: of equal ones the first
+    counts; `thin`: minimum height of a triangle; `sharp`: minimum cosine between it and one of the normals;
+    `most`: maximum triangles of a disk.
+    """
+
 def connected_components(
     triangles: NDArray[int32], vertices: int, threads: int = 0
 ) -> tuple[NDArray[int32], int]:

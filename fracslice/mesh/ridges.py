@@ -9,15 +9,15 @@ fits best (Barequet and Sharir 1995, "Filling gaps in the boundary of a polyhedr
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import chain, combinations, islice, pairwise, product
+from itertools import chain, combinations, islice, product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._native import connected_components
+from .._native import connected_components, fans
 from ..volume import Plan
 from ..volume.bricks import values_at
 from ..work import Work
@@ -563,12 +563,12 @@ class _Sharpening:
     ) -> _Sharpened | None:
         """Replace bad triangles by fans around new vertices or corners; None if none can be replaced."""
         mesh, voxel = state.mesh, self._voxel
-        disks = _Disks(state, fixed, THIN * voxel, bad)
         apex = fixed.copy()
         apex[len(state.old.vertices) :] = True
         near = bad[np.argsort(~fixed[mesh.triangles[bad]].any(axis=1), kind="stable")].tolist()
         ways = (v for t in near for v in sorted(mesh.triangles[t].tolist(), key=lambda v: not fixed[v]))
-        found = [disk for v in dict.fromkeys(ways) if apex[v] and (disk := disks.grown(v))]
+        apexes = [v for v in dict.fromkeys(ways) if apex[v]]
+        found = _grow_disks(state, fixed, THIN * voxel, bad, apexes, self._work.threads)
         found = list({(*old, fan[0][2]): (old, fan) for old, fan in found}.values())
         if not found:
             return None
@@ -585,85 +585,44 @@ class _Sharpening:
         return state.fanned(sorted(gone), fans[stays], measured[stays]) if gone else None
 
 
-class _Disks:
-    """Disks of triangles, each seen in full from a vertex. Plain numbers, of triangles within `RINGS` of some
-    alone: disks are small.
+def _grow_disks(
+    state: _Sharpened,
+    fixed: NDArray[np.bool_],
+    thin: float,
+    some: NDArray[np.int64],
+    apexes: Sequence[int],
+    threads: int,
+) -> list[Disk]:
+    """Disks of triangles around vertices, each seen in full from there, with their fans.
+
+    Only triangles within `RINGS` of some are known, as disks are small.
     """
-
-    def __init__(
-        self, state: _Sharpened, fixed: NDArray[np.bool_], thin: float, some: NDArray[np.int64]
-    ) -> None:
-        self._thin, self._which = thin, _rings(state.mesh, some)
-        self._vertices, corners = np.unique(state.mesh.triangles[self._which], return_inverse=True)
-        corners = corners.reshape(-1, 3).astype(np.int64)
-        after = np.roll(corners, -1, axis=1)
-        keys, back = ((a << 32 | b).ravel() for a, b in ((corners, after), (after, corners)))
-        order = np.argsort(keys)
-        place = np.minimum(np.searchsorted(keys, back, sorter=order), len(keys) - 1)
-        beyond = np.where(keys[order[place]] == back, order[place] // 3, -1)
-        # flat, as lists of many small lists are slow to make
-        self._beyond, self._triangles = beyond.tolist(), corners.ravel().tolist()
-        self._order = np.argsort(corners, axis=None, kind="stable")
-        self._starts = np.searchsorted(corners.ravel()[self._order], np.arange(len(self._vertices) + 1))
-        self._points = state.mesh.vertices[self._vertices].ravel().tolist()
-        self._fixed = fixed[self._vertices].tolist()
-        measured = state.measured[self._which, :3].ravel()
-        self._normals, self._alike = measured.tolist(), np.round(measured, 3).tolist()
-
-    def grown(self, apex: int) -> Disk | None:
-        """A disk with the star of a vertex, grown until the fan around that vertex faces as the disk does:
-        its triangles and the fan. None if there is no such disk or it would swallow a corner.
-        """
-        found = self._grown(int(np.searchsorted(self._vertices, apex)))
-        if found is None:
-            return None
-        disk, fan = found
-        fans = self._vertices[np.array(fan)].tolist()
-        return self._which[disk].tolist(), [(a, b, c) for a, b, c in fans]
-
-    def _grown(self, apex: int) -> Disk | None:
-        """The same in numbers of this class."""
-        more = set((self._order[self._starts[apex] : self._starts[apex + 1]] // 3).tolist())
-        disk, normals = set[int](), dict[tuple[float, ...], list[float]]()
-        while more and len(disk) + len(more) <= MOST:
-            disk |= more
-            for t in sorted(more):
-                own = slice(3 * t, 3 * t + 3)
-                normals.setdefault(tuple(self._alike[own]), self._normals[own])
-            rim, more = list[tuple[int, int]](), set[int]()
-            for t in sorted(disk):
-                own = slice(3 * t, 3 * t + 3)
-                a, b, c = self._triangles[own]
-                for beyond, edge in zip(self._beyond[own], ((a, b), (b, c), (c, a)), strict=True):
-                    if beyond in disk:
-                        continue
-                    if apex not in edge and self._seen(edge, apex, normals.values()):
-                        rim.append(edge)
-                    elif beyond < 0:
-                        return None
-                    else:
-                        more.add(beyond)
-        return None if more else self._fan(sorted(disk), rim, apex)
-
-    def _seen(self, edge: tuple[int, int], apex: int, normals: Iterable[list[float]]) -> bool:
-        """Whether the triangle of an edge and a vertex faces as one of the normals says, and is not thin."""
-        (ax, ay, az), (bx, by, bz), (cx, cy, cz) = (self._points[3 * v : 3 * v + 3] for v in (*edge, apex))
-        ux, uy, uz, vx, vy, vz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az
-        x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-        wx, wy, wz = vx - ux, vy - uy, vz - uz
-        sides = ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz, wx * wx + wy * wy + wz * wz
-        square = x * x + y * y + z * z
-        least = SHARP * math.sqrt(square)
-        thick = square >= self._thin**2 * max(sides)
-        return thick and any(x * n[0] + y * n[1] + z * n[2] >= least for n in normals)
-
-    def _fan(self, disk: list[int], rim: list[tuple[int, int]], apex: int) -> Disk | None:
-        """The disk, and the fan around the apex; None if it is no disk."""
-        triangles = [self._triangles[3 * t : 3 * t + 3] for t in disk]
-        loop = _loop(triangles, rim)
-        if loop is None or any(self._fixed[v] for v in {*chain(*triangles)} - {*loop, apex}):
-            return None
-        return disk, [(here, there, apex) for here, there in pairwise([*loop, loop[0]])]
+    which = _rings(state.mesh, some)
+    vertices, corners = np.unique(state.mesh.triangles[which], return_inverse=True)
+    corners = corners.reshape(-1, 3).astype(np.int64)
+    after = np.roll(corners, -1, axis=1)
+    keys, back = ((a << 32 | b).ravel() for a, b in ((corners, after), (after, corners)))
+    order = np.argsort(keys)
+    place = np.minimum(np.searchsorted(keys, back, sorter=order), len(keys) - 1)
+    beyond = np.where(keys[order[place]] == back, order[place] // 3, -1).reshape(-1, 3)
+    normals = np.ascontiguousarray(state.measured[which, :3])
+    found = fans(
+        corners.astype(np.int32),
+        beyond,
+        state.mesh.vertices[vertices],
+        normals,
+        np.round(normals, 3),
+        fixed[vertices],
+        np.searchsorted(vertices, np.array(apexes, np.int64)).astype(np.int32),
+        thin,
+        SHARP,
+        MOST,
+        threads,
+    )
+    return [
+        (which[disk].tolist(), [(a, b, c) for a, b, c in vertices[np.array(fan)].tolist()])
+        for disk, fan in filter(None, found)
+    ]
 
 
 def _parted(values: NDArray[Any], of: NDArray[np.integer]) -> list[NDArray[Any]]:

@@ -3,9 +3,11 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
+#include <tbb/parallel_for.h>
 
 #include "../unlocked.h"
 #include "components.h"
+#include "disks.h"
 #include "topology.h"
 #include "input.h"
 #include "quantise.h"
@@ -41,6 +43,34 @@ std::span<const bool> marks_of(const Vector<bool>& marks, size_t count) {
 nb::tuple bind_links(const Rows<int32_t>& triangles, const Vector<bool>& counted, int threads) {
     EdgeCounts result = unlocked(threads, [&] { return edge_counts(triangles_of(triangles, counted.size()), counted.data()); });
     return nb::make_tuple(result.edges, result.open, result.non_manifold, result.misoriented, result.extra_fans);
+}
+
+// Of each vertex of `apexes` its disk and fan, or None.
+std::vector<std::optional<std::tuple<std::vector<int64_t>, std::vector<std::array<int32_t, 3>>>>> bind_fans(
+    const Rows<int32_t>& triangles, const Rows<int64_t>& beyond, const Rows<double>& vertices, const Rows<double>& normals,
+    const Rows<double>& alike, const Vector<bool>& fixed, const Vector<int32_t>& apexes, double thin, double sharp, size_t most,
+    int threads) {
+    const size_t count = triangles.shape(0);
+    require(beyond.shape(0) == count && normals.shape(0) == count && alike.shape(0) == count, "expected a row for each triangle");
+    require_below(span_of(triangles), vertices.shape(0), "a triangle names a vertex that does not exist");
+    require_below(span_of(beyond), count, "a side names a triangle that does not exist", -1);
+    require_below(span_of(apexes), vertices.shape(0), "an apex does not exist");
+    auto rows = [](const auto& array, auto row) {
+        using Row = decltype(row);
+        return std::span<const Row>{reinterpret_cast<const Row*>(array.data()), array.shape(0)};
+    };
+    using Vector3 = Disks::Vector3;
+    std::vector<std::optional<Disk>> found(apexes.size());
+    unlocked(threads, [&] {
+        const Disks disks(rows(triangles, Disks::Corners{}), rows(beyond, Disks::Sides{}), rows(vertices, Vector3{}),
+                          rows(normals, Vector3{}), rows(alike, Vector3{}), marks_of(fixed, vertices.shape(0)), {thin, sharp, most});
+        tbb::parallel_for(size_t(0), found.size(), [&](size_t k) { found[k] = disks.grown(apexes.data()[k]); });
+    });
+    std::vector<std::optional<std::tuple<std::vector<int64_t>, std::vector<std::array<int32_t, 3>>>>> result(found.size());
+    for (size_t k = 0; k < found.size(); ++k) {
+        if (found[k]) result[k].emplace(std::move(found[k]->triangles), std::move(found[k]->fan));
+    }
+    return result;
 }
 
 nb::tuple bind_corners(const Rows<int32_t>& triangles, size_t vertices, int threads) {
@@ -229,6 +259,8 @@ void bind_mesh(nb::module_& module) {
     using namespace nanobind::literals;
     module.def("edge_topology", &bind_links, "triangles"_a, "counted"_a, "threads"_a = 0);
     module.def("corners_by_vertex", &bind_corners, "triangles"_a, "vertices"_a, "threads"_a = 0);
+    module.def("fans", &bind_fans, "triangles"_a, "beyond"_a, "vertices"_a, "normals"_a, "alike"_a, "fixed"_a, "apexes"_a, "thin"_a,
+               "sharp"_a, "most"_a, "threads"_a = 0);
     module.def("connected_components", &bind_components, "triangles"_a, "vertices"_a, "threads"_a = 0);
     module.def("component_sizes", &bind_sizes, "vertices"_a, "triangles"_a, "labels"_a, "count"_a, "threads"_a = 0);
     module.def("turned", &bind_turned, "vertices"_a, "triangles"_a, "frame"_a, "threads"_a = 0);
