@@ -13,7 +13,6 @@ from __future__ import annotations
 import ast
 import linecache
 import operator
-import re
 import textwrap
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, is_dataclass, replace
@@ -25,6 +24,7 @@ from ..errors import KernelError
 from . import vocabulary
 from .graph import (
     Block,
+    Entry,
     FlowGraph,
     Function,
     MismatchError,
@@ -40,6 +40,7 @@ from .language import (
     check,
     depends_on_points,
     fingerprint,
+    fingerprints,
     identity,
     intrinsic_name,
     is_number,
@@ -48,7 +49,7 @@ from .language import (
     scope,
     stored_names,
 )
-from .loops import OPERATIONS, Loop, is_intrinsic
+from .loops import OPERATIONS, Loop, is_inline, is_intrinsic
 
 OPERATORS: dict[type, str] = {
     ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "truediv", ast.FloorDiv: "floordiv",
@@ -80,9 +81,14 @@ class Source:
     @classmethod
     def of(cls, function: Callable[..., Any], kind: str, *known: Any) -> Source:
         """Source of a function of Python; `known`: arguments that are part of its identity."""
-        place = f"{function.__code__.co_filename}:{{}}: {kind} {function.__name__}: "
         names, about = tuple(parameters(function)), identity(function, *known)
+        place = cls.place_of(function, kind)
         return cls(function.__name__, names, about, place, lambda: syntax(function), lambda: scope(function))
+
+    @staticmethod
+    def place_of(function: Callable[..., Any], kind: str) -> str:
+        """Place of a function, for errors."""
+        return f"{function.__code__.co_filename}:{{}}: {kind} {function.__name__}: "
 
     def error(self, node: Any, message: str) -> KernelError:
         """Error about a statement or an expression."""
@@ -126,19 +132,28 @@ def formula(function: Callable[..., Any] | Function, fixed: Fixed = ()) -> Funct
     language.
     """
     if isinstance(function, Function):
-        return _read_again(function, fixed, repr(fixed)) if fixed else function
+        return _read_again(FormulaReader, function, fixed, repr(fixed)) if fixed else function
     return _function(FormulaReader, function, fixed, function.__name__, _mark(function, fixed))
 
 
-def kernel_function(function: Callable[..., Any], fixed: Fixed) -> Function:
-    """Return a function of a kernel with some arguments fixed, such as records of what it does."""
-    source = Source.of(function, "kernel", *(value for _, value in fixed))
+def own_formula(function: Callable[..., Any], fixed: Fixed) -> Function:
+    """Return a formula of ours, unchecked, with some arguments fixed: records of what it computes.
+
+    Unlike a kernel function, it is read again by the readers of formulas, such as those of orbit traps.
+    """
+    source = Source.of(function, "formula", *(value for _, value in fixed))
     return source_function(FormulaReader, replace(source, is_own=True), fixed)
 
 
 def loop_function(loop: Loop) -> Function:
     """Return the function of a loop."""
     return _function(Reader, loop.function, loop.fixed, loop.name, _mark(loop.function, loop.fixed))
+
+
+def kernel_function(function: Callable[..., Any], fixed: Fixed = ()) -> Function:
+    """Return a function of a kernel with some arguments fixed: records of which `repr` says everything."""
+    plain = _function(KernelReader, function, (), function.__name__, fingerprints(function))
+    return _read_again(KernelReader, plain, fixed, repr(fixed)) if fixed else plain
 
 
 def _mark(function: Callable[..., Any], fixed: Fixed) -> object:
@@ -156,10 +171,10 @@ def _function(
 
 
 @lru_cache(maxsize=256)
-def _read_again(function: Function, fixed: Fixed, text: str) -> Function:
-    """Function whose text is written, with some arguments fixed; see `_mark`."""
+def _read_again(kind: type[Reader], function: Function, fixed: Fixed, text: str) -> Function:
+    """Function with some arguments fixed, which a text tells apart; see `_mark`."""
     about = identified(function.source.identity, text)
-    return source_function(FormulaReader, replace(function.source, identity=about), fixed)
+    return source_function(kind, replace(function.source, identity=about), fixed)
 
 
 def source_function(kind: type[Reader], source: Source, fixed: Fixed, **given: Any) -> Function:
@@ -180,29 +195,7 @@ def source_function(kind: type[Reader], source: Source, fixed: Fixed, **given: A
     return Function(source.name, names, about, read, source.error, source)
 
 
-def text_function(
-    name: str, names: Sequence[str], lines: Sequence[str], called: Mapping[str, Function]
-) -> Function:
-    """Return the function of some lines, which are written for a kernel.
-
-    `called`: functions that they may call, by name.
-    """
-    text = "\n    ".join([f"def {name}({', '.join(names)}):", *lines])
-    functions = {word: called[word] for word in dict.fromkeys(_WORD.findall(text)) if word in called}
-    about, place = identified(text, *functions.values()), f"<{name}>:{{}}: "
-    source = Source(name, tuple(names), about, place, lambda: _parsed(text), lambda: functions, True)
-    return source_function(FormulaReader, source, ())
-
-
 _VOCABULARY = vocabulary.ALL | {"int"}
-
-_WORD = re.compile(r"[A-Za-z_]\w*")
-
-
-def _parsed(text: str) -> ast.FunctionDef:
-    (tree,) = parse(text).body
-    assert isinstance(tree, ast.FunctionDef)
-    return tree
 
 
 @dataclass
@@ -221,15 +214,19 @@ class Reader(Writer):
 
     def read(self) -> FlowGraph:
         """Read the body."""
-        self.tree, self.scope = self.source.tree(), self.source.scope()
-        self.local = {*(a.arg for a in self.tree.args.args), *stored_names(self.tree)}
-        self.names["WIDTH"] = Value("constant", data=self.width.lanes)
-        body = body_of(self.tree)
+        body = self.opened()
         if self.statements(body):
             self.give(None)
             if self.returns:
                 self.fail(body[-1], "not every way through the function returns a value")
         return self.graph
+
+    def opened(self) -> list[ast.stmt]:
+        """Statements of the body, before the first is read."""
+        self.tree, self.scope = self.source.tree(), self.source.scope()
+        self.local = {*(a.arg for a in self.tree.args.args), *stored_names(self.tree)}
+        self.names["WIDTH"] = Value("constant", data=self.width.lanes)
+        return body_of(self.tree)
 
     # --- what is known ---
     def outside(self, name: str) -> Any:
@@ -257,19 +254,25 @@ class Reader(Writer):
                 return place[index] if type(place) is tuple and type(index) is int else _UNKNOWN
             case ast.UnaryOp(ast.USub(), ast.Constant(float(number))):
                 return -number
+            case ast.UnaryOp(ast.Not(), operand):
+                operand = self.known(operand)
+                return not operand if _decides(operand) else _UNKNOWN
             case ast.UnaryOp(op, operand):
                 return self.folded(op, operand)
             case ast.BinOp(left, op, right) if not isinstance(op, ast.Pow):
                 return self.folded(op, left, right)
+            case ast.BoolOp(op, parts):
+                terms = [self.known(part) for part in parts]
+                decide = all if isinstance(op, ast.And) else any
+                return decide(terms) if all(map(_decides, terms)) else _UNKNOWN
+            case ast.Compare(left, [ast.Eq()], [ast.Constant(str(word))]):
+                left = self.known(left)
+                return left == word if isinstance(left, str) else _UNKNOWN
             case ast.Compare(left, [op], [right]):
                 return self.folded(op, left, right)
             case ast.IfExp(test, yes, no):
                 test = self.known(test)
                 return _UNKNOWN if not _decides(test) else self.known(yes if test else no)
-            case ast.BoolOp(op, operands):
-                decided = [self.known(operand) for operand in operands]
-                if all(map(_decides, decided)):
-                    return (all if isinstance(op, ast.And) else any)(decided)
         return _UNKNOWN
 
     def folded(self, op: ast.AST, *operands: ast.expr) -> Any:
@@ -284,13 +287,15 @@ class Reader(Writer):
         known = self.known(node)
         if is_number(known):
             return self.constant(_plain(known))
+        if _is_stored(known):
+            return self.stored(known)
         match node:
             case ast.Name(name) if name in self.names:
                 return self.names[name]
             case ast.Name() | ast.Attribute():
                 raise MismatchError(f"{ast.unparse(node)!r} has no value here")
             case ast.Tuple(parts):
-                return self.add("tuple", *map(self.value, parts))
+                return self.add("tuple", *self.each(parts))
             case ast.UnaryOp(ast.UAdd(), operand):
                 return self.value(operand)
             case ast.UnaryOp(op, operand):
@@ -313,6 +318,25 @@ class Reader(Writer):
             case ast.Call(function, arguments):
                 return self.calling(node, function, arguments)
         raise MismatchError("it is not in the language")
+
+    def stored(self, known: Any) -> Value:
+        """Read numbers from P."""
+        if isinstance(known, tuple):
+            return self.add("tuple", *map(self.stored, known))
+        return self.entry(known) if isinstance(known, Entry) else self.constant(_plain(known))
+
+    def each(self, nodes: Sequence[ast.expr]) -> list[Value]:
+        """Values of expressions; ``*`` stands for the parts of a tuple."""
+        return [value for node in nodes for value in self.parts_of(node)]
+
+    def parts_of(self, node: ast.expr) -> Sequence[Value]:
+        """Value of an expression, or the parts of a tuple behind ``*``."""
+        if not isinstance(node, ast.Starred):
+            return [self.value(node)]
+        value = self.value(node.value)
+        if value.op != "tuple":
+            raise MismatchError(f"{ast.unparse(node.value)!r} is no tuple of known length")
+        return value.operands
 
     def truth(self, node: ast.expr) -> Value:
         return self.add("truth", self.value(node))
@@ -376,11 +400,11 @@ class Reader(Writer):
         called = self.known(function)
         name = self.operation(function, called)
         if name is not None:
-            return self.intrinsic(name, list(map(self.value, arguments)))
+            return self.intrinsic(name, self.each(arguments))
         if is_intrinsic(called):
-            return self.call(called.__name__, *map(self.value, arguments))
+            return self.call(called.__name__, *self.each(arguments))
         if isinstance(called, Function):
-            return self.call_counted(called, list(map(self.value, arguments)))
+            return self.call_counted(called, self.each(arguments))
         if not isinstance(called, FunctionType):
             raise MismatchError(f"{ast.unparse(function)!r} is no function")
         return self.call_function(called, arguments)
@@ -593,7 +617,12 @@ class Reader(Writer):
 
 def _decides(value: Any) -> bool:
     """True for a known value on which a branch is resolved."""
-    return isinstance(value, (int, float, tuple))
+    return value is not _UNKNOWN
+
+
+def _is_stored(value: Any) -> bool:
+    """True for numbers that are read from P."""
+    return isinstance(value, Entry) or (type(value) is tuple and any(map(_is_stored, value)))
 
 
 def is_record(value: Any) -> bool:
@@ -657,7 +686,63 @@ class FormulaReader(Reader):
         pairs = list(zip(parameters(called), map(self.known, arguments), strict=False))
         fixed = tuple((name, value) for name, value in pairs if is_record(value))
         given = [self.value(a) for a in arguments if not is_record(self.known(a))]
-        return self.call_counted(kernel_function(called, fixed) if fixed else formula(called), given)
+        return self.call_counted(own_formula(called, fixed) if fixed else formula(called), given)
 
     def expression(self, node: ast.expr) -> None:
         """The mark of a step of an orbit, which only some readers use."""
+
+
+class KernelReader(Reader):
+    """Reads functions of a kernel: they call formulas, and each other with records that are known."""
+
+    kind = "kernel function"
+
+    def call_function(self, called: Callable[..., Any], arguments: list[ast.expr]) -> Value:
+        if not is_inline(called):
+            return self.call_counted(formula(called), self.each(arguments))
+        given = [value for argument in arguments for value in self.given(argument)]
+        names = parameters(called)
+        if len(names) != len(given):
+            raise MismatchError(f"{called.__name__} takes {len(names)} values, found {len(given)}")
+        passed = dict(zip(names, given, strict=True))
+        known = {name: value for name, value in passed.items() if not isinstance(value, Value)}
+        inner = _InlineReader(self.width, source=_inline_source(called), fixed=known, graph=self.graph)
+        inner.names = {name: value for name, value in passed.items() if name not in known}
+        inner.block = self.block
+        value = inner.result()
+        self.block = inner.block
+        return value
+
+    def given(self, node: ast.expr) -> Sequence[Any]:
+        """An argument of an inline function: what it is if it is known and no number, else its value."""
+        known = self.known(node)
+        if known is _UNKNOWN or isinstance(known, (int, float)) or _is_stored(known):
+            return self.parts_of(node)
+        return [known]
+
+
+class _InlineReader(KernelReader):
+    """Reads a function into the graph of its caller."""
+
+    def result(self) -> Value:
+        """Read the body; return its value."""
+        self.ends: list[tuple[Block, Names]] = []  # with the values that are returned there
+        body = self.opened()
+        if self.statements(body):
+            self.fail(body[-1], "not every way through the function returns a value")
+        if len(self.ends) > 1:
+            self.joined(self.ends)
+        else:
+            ((self.block, self.names),) = self.ends
+        return self.names[""]
+
+    def returned(self, value: Value) -> None:
+        self.ends.append((self.block, {"": value}))
+
+
+@lru_cache(maxsize=256)
+def _inline_source(function: Callable[..., Any]) -> Source:
+    """Source of a function that is read with its callers, into whose identity it goes."""
+    tree = syntax(function)
+    place = Source.place_of(function, KernelReader.kind)
+    return Source(function.__name__, (), "", place, lambda: tree, lambda: scope(function))

@@ -130,6 +130,9 @@ class Function:
         """Evaluate the function on NumPy arrays."""
         return _ON_ARRAYS(self, *given)
 
+    def __repr__(self) -> str:
+        return self.identity
+
     def graph(self, width: Width) -> FlowGraph:
         """Return the body for a number of lanes."""
         if width not in self._graphs:
@@ -141,6 +144,14 @@ def identified(*parts: object) -> str:
     """Identity of what is made of some parts, which are text or have one."""
     texts = (part.identity if isinstance(part, Function) else str(part) for part in parts)
     return hashlib.sha256("\0".join(texts).encode()).hexdigest()[:32]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Number that is read from the parameters P where it is used."""
+
+    index: int
+    is_whole: bool = False
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -209,6 +220,17 @@ class Writer:
     def call(self, function: Function | str, *given: Value) -> Value:
         """Append a call."""
         return self.add("call", *given, data=function)
+
+    def entry(self, entry: Entry, origin: Value | None = None) -> Value:
+        """Read a number from P.
+
+        `origin`: where its index begins; without it at 0.
+        """
+        if "P" not in self.names:
+            raise MismatchError("P is expected among the arguments, from which a number is read")
+        index = self.constant(entry.index) if origin is None else self.add("add", origin, entry.index)
+        value = self.add("element", self.names["P"], index)
+        return self.add("int", value) if entry.is_whole else value
 
     def items(self, value: Value, count: int) -> list[Value]:
         """Parts of a tuple."""

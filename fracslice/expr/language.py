@@ -18,6 +18,7 @@ from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, is_dataclass
 from enum import Enum
 from functools import lru_cache
+from operator import itemgetter
 from threading import Lock
 from types import CodeType, FunctionType, ModuleType
 from typing import Any, NamedTuple, NoReturn
@@ -61,6 +62,27 @@ def fingerprint(function: Callable[..., Any]) -> Hashable:
     cells = zip(code.co_freevars, function.__closure__ or (), strict=True)
     around = {name: cell.cell_contents for name, cell in cells}
     return code, tuple(_mark(around.get(n, function.__globals__.get(n)), names) for n in names)
+
+
+def fingerprints(function: Callable[..., Any]) -> Hashable:
+    """Return the fingerprints of a function and of all functions that it calls."""
+    marks = {function: fingerprint(function)}
+    left = [function]
+    while left:
+        for called in _functions_in(marks[left.pop()]):
+            if called not in marks:
+                marks[called] = fingerprint(called)
+                left.append(called)
+    return tuple(marks.items())
+
+
+def _functions_in(mark: Any) -> Iterator[FunctionType]:
+    """Functions in a fingerprint."""
+    if isinstance(mark, FunctionType):
+        yield mark
+    elif isinstance(mark, tuple):
+        for part in mark:
+            yield from _functions_in(part)
 
 
 @lru_cache(maxsize=4096)
@@ -177,7 +199,8 @@ def _source(code: CodeType) -> list[str]:
 def _last_line(code: CodeType) -> int:
     """Last line of a function with an instruction."""
     inner = [_last_line(c) for c in code.co_consts if isinstance(c, CodeType)]
-    return max([code.co_firstlineno, *(line for *_, line in code.co_lines() if line), *inner])
+    lines: Iterator[int] = filter(None, map(itemgetter(2), code.co_lines()))
+    return max([code.co_firstlineno, *lines, *inner])
 
 
 EVALUATED: set[Callable[..., Any]] = set()

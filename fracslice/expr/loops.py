@@ -41,6 +41,22 @@ def is_intrinsic(value: Any) -> bool:
     return callable(value) and value in _INTRINSICS
 
 
+_INLINE: set[Callable[..., Any]] = set()
+
+
+def inline(function: Function) -> Function:
+    """Decorate a function that is read where it is called. Its operations are the caller's, so that products
+    are fused with sums across the call.
+    """
+    _INLINE.add(function)
+    return function
+
+
+def is_inline(function: Callable[..., Any]) -> bool:
+    """Return True if a function is read where it is called."""
+    return function in _INLINE
+
+
 @intrinsic
 def shares(count: int, step: int) -> range:
     """Range up to `count`, whose rounds the threads of a GPU share."""

@@ -15,7 +15,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, reduce
+from functools import cached_property, lru_cache, reduce
 from itertools import groupby, islice
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -23,8 +23,8 @@ import numpy as np
 
 from ..common.parameters import AUTO
 from ..errors import KernelError
-from ..expr.frontend import FormulaReader, formula, text_function
-from ..expr.graph import FlowGraph, Function, Program, Value, Width, Writer, identified, written
+from ..expr.frontend import FormulaReader, formula
+from ..expr.graph import Entry, FlowGraph, Function, Program, Value, Width, Writer, identified, written
 from ..expr.language import CHILD, Fixed, InMemory, OfPoint, words
 
 if TYPE_CHECKING:
@@ -98,9 +98,7 @@ class Linked:
 
 
 Passed = Any
-"""Where an argument lies in P, from its beginning: an index, of an integer in a list, or a tuple of these; or
-a `Called`.
-"""
+"""Where an argument lies in P, from its beginning: an `Entry`, or a tuple of these; or a `Called`."""
 
 
 @dataclass(frozen=True)
@@ -122,10 +120,7 @@ def load(writer: Writer, passed: Passed, origin: Value | None = None) -> Value:
         return writer.add("tuple", *(load(writer, part, origin) for part in passed))
     if isinstance(passed, Called):
         return writer.call(passed.function, *(writer.names[name] for name in POINT))
-    place = passed[0] if isinstance(passed, list) else passed
-    index = writer.constant(place) if origin is None else writer.add("add", origin, place)
-    value = writer.add("element", writer.names["P"], index)
-    return writer.add("int", value) if isinstance(passed, list) else value
+    return writer.entry(passed, origin)
 
 
 def append_numbers(value: Any, numbers: list[float]) -> Passed:
@@ -137,8 +132,7 @@ def append_numbers(value: Any, numbers: list[float]) -> Passed:
     if isinstance(value, tuple):
         return tuple(append_numbers(part, numbers) for part in value)
     numbers.append(float(value))
-    place = len(numbers) - 1
-    return [place] if isinstance(value, int) else place
+    return Entry(len(numbers) - 1, isinstance(value, int))
 
 
 @dataclass(frozen=True)
@@ -277,7 +271,7 @@ class Dialect(Protocol):
 
 @dataclass
 class PartNumbers:
-    """PartNumbers of P, and lists of elements that come after them."""
+    """Numbers of P, and lists of elements that come after them."""
 
     values: list[float] = field(default_factory=list)
     held: list[tuple[int, InMemory]] = field(default_factory=list)  # see `Linked`
@@ -294,13 +288,16 @@ class ElementList:
     numbers: PartNumbers = field(default_factory=PartNumbers)
 
 
-def link_tree(linker: Linker, root: Node, dialect: Dialect) -> str:
-    """Link a tree and append its numbers to P; return the text of its call."""
-    tree = _Tree(linker, dialect)
+def link_tree(linker: Linker, root: Node, dialect: Dialect) -> Function:
+    """Link a tree and append its numbers to P; return its function of x, y, z and P."""
     start = len(linker.parameters)
-    top = tree.linked(dialect.kept(root))
-    linker.functions[top.function.name] = top.function
-    return f"{top.function.name}(x, y, z, P, {start})"
+    top = _Tree(linker, dialect).linked(dialect.kept(root)).function
+
+    def write(writer: Writer) -> Value:
+        given = [writer.names[name] for name in (*POINT, "P")]
+        return writer.call(top, *given, writer.constant(start))
+
+    return written("tree", (*POINT, "P"), identified("tree", top, start), write)
 
 
 @dataclass
@@ -590,7 +587,7 @@ class Linker:
 
     def field(self, root: Node) -> None:
         """Write the field of a scene tree."""
-        self.write(FIELD, (*POINT, "P"), [f"return {link_tree(self, root, FieldDialect(self))}"])
+        self.functions[FIELD] = link_tree(self, root, FieldDialect(self))
 
     def part(self, prefix: str, key: tuple[Any, ...], make: Callable[[str], Subroutine]) -> Subroutine:
         """Return the function of a structure; make it once."""
@@ -598,16 +595,16 @@ class Linker:
             self._parts[prefix, *key] = make(f"{prefix}{len(self._parts)}")
         return self._parts[prefix, *key]
 
-    def argument(self, value: Any) -> str:
-        """Append a value to P; return the text that reads it."""
+    def argument(self, value: Any) -> Any:
+        """Append a number, a tuple of numbers or an array to P; return the entries that are read for it."""
         if isinstance(value, np.ndarray):
             self.tables.append((len(self.parameters), value))
             value = 0.0
-        return _read_text(append_numbers(value, self.parameters))
+        return append_numbers(value, self.parameters)
 
     @property
     def parameters(self) -> list[float]:
-        """PartNumbers of P so far, without the lists behind them."""
+        """Numbers of P so far, without the lists behind them."""
         return self.main.values
 
     def linked(self) -> Linked:
@@ -649,32 +646,24 @@ class Linker:
             )
         return np.concatenate([numbers, *(array.ravel() for _, array in arrays.values())])
 
-    def share(self, function: Callable[..., Any], fixed: Sequence[tuple[str, Any]] = ()) -> Function:
-        """Let texts call a function by its name."""
-        made = formula(function, tuple(fixed))
-        self.functions.setdefault(function.__name__, made)
-        return made
+    def bind(self, function: Callable[..., Any], values: dict[str, Any]) -> Function:
+        """Return the function of the arguments that have no value, in their order, and of P.
 
-    def write(self, name: str, names: Sequence[str], lines: Sequence[str]) -> None:
-        """Add a function whose text calls others by name."""
-        self.functions[name] = text_function(name, names, lines, self.functions)
-
-    def bind(self, name: str, function: Callable[..., Any], values: dict[str, Any]) -> None:
-        """Add the function ``name(rest..., P)`` that calls a given function.
-
-        Its arguments in `values` are read from P or fixed; the others stay open. An argument named P receives
-        P.
+        The others are read from P or fixed. An argument named P receives P.
         """
         fixed = {k: v.value for k, v in values.items() if isinstance(v, Fixed)}
         called = formula(function, tuple(fixed.items()))
-        passed = [self.argument(values[a]) if a in values else a for a in called.parameters]
-        rest = [a for a in called.parameters if a not in values and a != "P"]
-        lines = [f"return bound({', '.join(passed)})"]
-        self.functions[name] = text_function(name, [*rest, "P"], lines, {"bound": called})
+        given = (self.argument(values[a]) if a in values else a for a in called.parameters)
+        return _bound(called, tuple(given))
 
 
-def _read_text(passed: Passed) -> str:
-    """Text that reads an argument from P."""
-    if isinstance(passed, tuple):
-        return f"({', '.join(map(_read_text, passed))},)"
-    return f"int(P[{passed[0]}])" if isinstance(passed, list) else f"P[{passed}]"
+@lru_cache(maxsize=512)
+def _bound(called: Function, passed: tuple[Passed, ...]) -> Function:
+    """Function that calls another one with values from P and, where a name stands, its own arguments."""
+    rest = [name for name in passed if isinstance(name, str) and name != "P"]
+
+    def write(writer: Writer) -> Value:
+        given = (writer.names[p] if isinstance(p, str) else load(writer, p) for p in passed)
+        return writer.call(called, *given)
+
+    return written(f"bound_{called.name}", (*rest, "P"), identified("bound", called, repr(passed)), write)

@@ -21,7 +21,7 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 from ..expr import language
-from ..expr.frontend import Fixed, kernel_function
+from ..expr.frontend import Fixed, own_formula
 from ..expr.graph import Function
 from ..expr.language import identity
 from ..expr.runtime import kept_text
@@ -137,7 +137,7 @@ def field(steps: Round, form: Form) -> Function:
 @lru_cache(maxsize=256)
 def _field(stages: tuple[Stage, ...], form: Form) -> Function:
     fixed = (("stages", stages), ("form", form), ("order", tuple(range(len(stages)))))
-    return kernel_function(orbit_field, fixed)
+    return own_formula(orbit_field, fixed)
 
 
 def affine_image(matrix, w):  # type: ignore[no-untyped-def]
@@ -400,4 +400,4 @@ def size(steps: Round, first: int) -> Function:
 @lru_cache(maxsize=256)
 def _of_cells(function: Callable[..., Any], stages: tuple[Stage, ...], first: int, known: Fixed) -> Function:
     order = tuple(range(first, len(stages)))
-    return kernel_function(function, (("stages", stages), ("order", order), *known))
+    return own_formula(function, (("stages", stages), ("order", order), *known))

@@ -1,7 +1,7 @@
 """Kernel generation: scene, view and camera to one kernel that calls only the units in use.
 
-The generated text is straight-line code. Every calculation is in a unit of `fracslice.rendering.units`, bound
-to its parameters under a name. Effects that a scene does not use generate no code.
+The functions of the kernel are those of `units.surface`. What a scene uses is told to them by records, which
+are known when they are read: effects that a scene does not use generate no code.
 """
 
 from __future__ import annotations
@@ -13,16 +13,17 @@ from typing import Any
 
 import numpy as np
 
-from ..expr.vocabulary import maximum, minimum
+from ..expr.frontend import kernel_function
+from ..expr.graph import Function
 from ..fields.linker import Linked, Linker
 from ..fields.registry import Fixed, Node
 from ..scene.view import Camera, View
-from .lighting import Lighting, onward
-from .materials import Drawn, Look, glowing_bodies, wholly_met, write
-from .setup import Optics, footprint, ray_bound
+from .lighting import LightLinker
+from .materials import Drawn, Look, Materials
+from .setup import Optics, footprint
 from .units import camera as units
-from .units import march, shade
-from .units.march import background, normal, surface
+from .units import march
+from .units.surface import lit_background, lit_surface, shown_surface
 
 Unit = tuple[Callable[..., Any], dict[str, Any]]
 
@@ -99,8 +100,6 @@ CIRCLE = 1.4143 * 1.02
 """Radius of the circle around a pixel, half sides, with 2 % for the film's perspective."""
 
 
-SHARPER = 16.0
-"""Ratio of a pixel to the width over which normals of glass are taken: a wider edge is seen as a hairline."""
 FAINTEST = 0.002
 """Sum of the throughputs up to which a ray of mirrors and glass ends."""
 
@@ -148,54 +147,44 @@ class _Frame:
     def __post_init__(self) -> None:
         self.lit = self.view.shading.mode == "light"
         self.paths = self.view.shading.paths == "yes"
-        of = self.root, self.view, self.camera, self.seen
-        self.lighting = Lighting(self.linker, self.drawn, *of, self.inside)
+        self.materials = Materials(self.linker, self.root, self.paths)
+        self.lights = LightLinker(
+            self.linker, self.drawn, self.root, self.view, self.camera, self.seen, self.materials
+        )
 
     def linked(self) -> Frame:
         """Link everything and return the frame."""
-        linker = self.linker
+        linker, functions = self.linker, self.linker.functions
         linker.field(self.root)
         self.marching()
         camera_samples = self.cameras()
-        look = Look(linker, self.root, self.paths)
         far = len(linker.parameters)
-        for number in (self.seen.far, *self.seen.origin, CIRCLE * self.seen.cone):
-            linker.argument(number)
-        self.bounces = self.view.shading.bounces if look.bounces and self.lit else 0
-        write(linker, background, self.lighting.background())
-        write(linker, surface, self.surface(look))
+        linker.argument((self.seen.far, *self.seen.origin, CIRCLE * self.seen.cone))
+        self.bounces = self.view.shading.bounces if self.materials.bounces and self.lit else 0
+        functions["background"] = kernel_function(lit_background, (("behind", self.lights.background()),))
+        functions["surface"] = self.lit_surface() if self.lit else self.shown_surface()
         linked = linker.linked()
         samples = camera_samples, self.drawn.count
-        kind = self.sharp, self.lit, self.view.film.transparent, self.lighting.weighted
+        kind = self.sharp, self.lit, self.view.film.transparent, self.lights.is_weighted
         faintest = 0.0 if self.paths else FAINTEST
         return Frame(linked, *samples, self.bounces, *kind, faintest, far)
 
     def marching(self) -> None:
         """Bind the units that march rays and cones."""
-        seen, steepness = self.seen, 1 / ray_bound(self.root)
+        linker, seen, steepness = self.linker, self.seen, {"steepness": self.lights.steepness}
         box = self.root.bounds.box
         lo = tuple(max(a, e - seen.far) for a, e in zip(box.lo, self.camera.eye, strict=True))
         hi = tuple(min(a, e + seen.far) for a, e in zip(box.hi, self.camera.eye, strict=True))
-        self.linker.bind("span_box", march.span, {"lo": lo, "hi": hi})
-        part = wholly_met(glowing_bodies(self.root), self.camera.eye, seen) if self.paths else 1.0
-        width = {"cone": part * seen.cone, "least": max(part * seen.least, seen.rounding)}
-        rounded = {"rounding": seen.rounding, "glass": Fixed(self.inside)}
-        stepping = {"steepness": steepness, **width, **rounded}
-        self.linker.bind("step_ray", march.advance, stepping)
-        self.linker.bind("step_cone", march.widen, {"steepness": steepness})
-        self.linker.bind("width_at", _width, width)
-        if self.inside:
-            self.linker.bind("sharp_width", _sharp_width, {"rounding": seen.rounding})
-
-    @property
-    def inside(self) -> bool:
-        """True if some material is transparent, so that rays pass through the solid."""
-        return any(n.formula.name == "material" and n["clear"] > 0 for n in self.root.walk())
+        rounded = {"rounding": seen.rounding, "glass": Fixed(self.materials.inside)}
+        linker.functions["span_box"] = linker.bind(march.span, {"lo": lo, "hi": hi})
+        linker.functions["step_ray"] = linker.bind(
+            march.advance, {**steepness, **self.lights.widths(), **rounded}
+        )
+        linker.functions["step_cone"] = linker.bind(march.widen, steepness)
 
     def cameras(self) -> int:
         """Bind the camera; return the number of random numbers per camera ray."""
-        function, values = camera_unit(self.camera, self.seen.size)
-        self.linker.bind("camera_ray", function, values)
+        self.linker.functions["camera_ray"] = self.linker.bind(*camera_unit(self.camera, self.seen.size))
         return 2 if self.sharp else 4
 
     @property
@@ -204,51 +193,25 @@ class _Frame:
         camera = self.camera
         return not (camera.aperture or camera.stereo or camera.kind == "orthographic")
 
-    def surface(self, look: Look) -> list[str]:
-        """Lines of `units.march.surface`."""
+    def lit_surface(self) -> Function:
+        """Link the surface of a picture of light."""
+        look = self.materials.look()
+        if look.is_traced:
+            self.trace()
+        known = {"look": look, "lighting": self.lights.lighting(look, self.bounces), "fog": self.lights.fog()}
+        return kernel_function(lit_surface, tuple(known.items()))
+
+    def shown_surface(self) -> Function:
+        """Link the surface of a picture of a value."""
         mode = self.view.shading.mode
-        lines = ["h = width_at(path + t, P)"]
-        if mode in ("light", "normal") or (mode == "albedo" and look.textured):
-            self.linker.share(normal)
-            width = "sharp_width(h, P)" if self.inside and mode == "light" else "h"
-            lines.append(f"nx, ny, nz = normal(x, y, z, {width}, P)")
-        if mode == "light":
-            lines += look.lines()
-            if look.rough and self.lighting.weighted:
-                self.linker.share(shade.dulled)
-                lines.append("roughness = dulled(roughness, q)")
-            lines += self.lighting.lines(look)
-            if self.bounces:
-                lines += onward(self.linker, self.drawn, look, self.lighting.weighted)
-            if look.coated:
-                lines += [f"{c} = {c} + glaze{c}" for c in "rgb"]
-            lines += self.lighting.fog(self.bounces > 0)
-        else:
-            lines += self.shown(mode, look)
-        ray = "tr, tg, tb, ox, oy, oz, ex, ey, ez, es, eq" if self.bounces else ""
-        return [*lines, f"return (r, g, b), ({ray})"]
+        look = self.materials.coloured() if mode == "albedo" else Look()
+        if look.is_traced or mode == "trap":
+            self.trace()
+        width = self.linker.bind(march.hit_width, self.lights.widths())
+        forward = self.linker.argument(self.camera.forward)
+        known = {"look": look, "width": width, "mode": mode, "forward": forward}
+        return kernel_function(shown_surface, tuple(known.items()))
 
-    def shown(self, mode: str, look: Look) -> list[str]:
-        """Lines for the modes that show a value."""
-        if mode == "normal":
-            return [f"{c} = n{a}" for c, a in zip("rgb", "xyz", strict=True)]
-        if mode == "position":
-            return [f"{c} = {a}" for c, a in zip("rgb", "xyz", strict=True)]
-        if mode == "albedo":
-            return [*look.lines(), *(f"{c} = c{c}" for c in "rgb")]
-        if mode == "trap":
-            return [*look.trap(), "r, g, b = tone, tone, tone"]
-        value = {"steps": "steps", "distance": "t"}.get(mode)
-        along = zip(self.camera.forward, "xyz", strict=True)
-        value = value or " + ".join(f"{self.linker.argument(f)} * t * d{a}" for f, a in along)
-        return [f"r = {value} + 0.0 * t", "g = r", "b = r"]
-
-
-def _width(t, cone, least):  # type: ignore[no-untyped-def]
-    """Hit tolerance at distance t."""
-    return cone * t + least
-
-
-def _sharp_width(h, rounding):  # type: ignore[no-untyped-def]
-    """Half width over which a normal is taken where rays are bent, at least that of rounding's noise."""
-    return minimum(h, maximum(h / SHARPER, 32.0 * rounding))
+    def trace(self) -> None:
+        """Link the number of the material and the orbit trap."""
+        self.linker.functions["traced"] = self.materials.trace(self.root)

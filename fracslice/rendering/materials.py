@@ -12,15 +12,15 @@ import ast
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import from_linear
-from ..expr import language
-from ..expr.frontend import FormulaReader, formula, source_function
-from ..expr.graph import ON_ARRAYS, Evaluator, FlowGraph, Function, Value, Writer, identified
+from ..expr.frontend import FormulaReader, formula, kernel_function, source_function
+from ..expr.graph import ON_ARRAYS, Entry, Evaluator, FlowGraph, Function, Value, Writer, identified
 from ..expr.vocabulary import absolute, atan2, minimum, sqrt, where
 from ..fields.linker import (
     Arguments,
@@ -43,7 +43,7 @@ from .environments import load_picture
 from .setup import Optics
 from .units import shade
 from .units.camera import linear
-from .units.shade import highlight, triplanar
+from .units.surface import painted
 
 
 @dataclass
@@ -52,17 +52,16 @@ class Drawn:
 
     count: int = 0  # numbers in use
 
-    def names(self, count: int) -> list[str]:
-        """Reserve random numbers."""
+    def place(self, count: int) -> int:
+        """Reserve random numbers; return the place of the first."""
         self.count += count
-        return [f"u[{k}]" for k in range(self.count - count, self.count)]
+        return self.count - count
 
 
 MOST = 16
 """Bodies of their own; more than that are one."""
 THINNEST = 1e-3
 """Least side of a box, relative to its largest."""
-CHANNELS, AXES = "rgb", "xyz"
 
 
 def glowing_bodies(root: Node) -> list[tuple[float, ...]]:
@@ -111,62 +110,19 @@ def wholly_met(bodies: list[tuple[float, ...]], eye: Sequence[float], seen: Opti
     return min([1.0, *parts])
 
 
-def bind(linker: Linker, bodies: list[tuple[float, ...]]) -> list[str]:
-    """Bind the units; return the lines for the start v of rays that continue and the share sent to
-    bodies.
-    """
-    values = {"bodies": tuple(bodies), "count": Fixed(len(bodies))}
-    for function in (shade.sent_share, shade.towards_body, shade.body_density):
-        linker.bind(f"{function.__name__}_", function, values)
-    linker.share(shade.mixed_density)
-    start = [f"v{a} = {a} + 0.1 * h * n{a}" for a in AXES]  # above bodies that end at the surface
-    return [*start, "sent = sent_share_(vx, vy, vz, nx, ny, nz, P)"]
+class Bodies(NamedTuple):
+    """Units of the bodies that glow: share of rays that are sent to them, a direction, and its density."""
 
+    share: Function
+    towards: Function
+    density: Function
 
-def density(name: str, to: str) -> str:
-    """Return the line for the density of rays that continue in a direction.
-
-    `to`: first letter of the direction's components.
-    """
-    ray = ", ".join(f"{to}{a}" for a in AXES)
-    beside = f"body_density_(vx, vy, vz, nx, ny, nz, {ray}, P)"
-    return f"{name} = mixed_density(sent, {beside}, nx, ny, nz, dx, dy, dz, {ray}, roughness, share)"
-
-
-def scatter_lines(linker: Linker, drawn: Drawn, u: str, v: str, choice: str, facets: str) -> list[str]:
-    """Return the lines that choose between a reflected ray, a scattered one and one to a body.
-
-    `facets`: reflectance of microfacets; the colour is left open.
-    """
-    linker.share(highlight)
-    (w,) = drawn.names(1)
-    lines = [
-        f"away = {choice} < sent",
-        f"chosen = ({choice} - sent) / (1.0 - sent) < share",
-        f"picked = {choice} / maximum(sent, 1e-6)",
-        f"px, py, pz = towards_body_(vx, vy, vz, nx, ny, nz, {u}, {v}, {w}, picked, P)",
-        *(f"e{a} = where(away, p{a}, where(chosen, e{a}, w{a}))" for a in AXES),
-        "sharp = where(away, 0.0, where(chosen & (roughness <= 0.0), 1.0, 0.0))",
-        density("eq", "e"),
-        "spot, half = highlight(nx, ny, nz, dx, dy, dz, ex, ey, ez, roughness)",
-        "cosine = maximum(nx * ex + ny * ey + nz * ez, 0.0)",
-    ]
-    for c in CHANNELS:
-        lines += [
-            f"shine = where(roughness > 0.0, spot * {facets.format(c)}, 0.0)",
-            f"t{c} = where(sharp > 0.5, t{c} / maximum(share * (1.0 - sent), 1e-6), "
-            f"(c{c} * cosine + shine) / ({math.pi} * maximum(eq, 1e-9)))",
-        ]
-    return [
-        *lines,
-        "eq = where(sharp > 0.5, 0.0, eq)",
-        "alive = where(away, 1.0, minimum(mirrors + scatters, 1.0))",
-    ]
-
-
-def write(linker: Linker, function: Callable[..., Any], lines: Sequence[str]) -> None:
-    """Add a function of a scene, of some lines, with the name and the arguments of an intrinsic."""
-    linker.write(function.__name__, language.parameters(function), lines)
+    @classmethod
+    def linked(cls, linker: Linker, bodies: list[tuple[float, ...]]) -> Bodies:
+        """Bind the units to the numbers of the bodies."""
+        values = {"bodies": tuple(bodies), "count": Fixed(len(bodies))}
+        units = shade.sent_share, shade.towards_body, shade.body_density
+        return cls(*(linker.bind(unit, values) for unit in units))
 
 
 @dataclass
@@ -438,9 +394,49 @@ def _head_on(index: float) -> float:
     return ((index - 1) / (index + 1)) ** 2
 
 
+class PerMaterial(NamedTuple):
+    """What differs between materials: entries of P, or a `Colour`."""
+
+    first: Any
+    others: tuple[tuple[float, Any], ...]  # each with the least number of its material
+
+
+class Colour(NamedTuple):
+    """Colour of a material: a plain one or a palette, and a picture that it is multiplied by."""
+
+    plain: tuple[Entry, ...] | None
+    palette: Function | None
+    turns: tuple[Entry, Entry] | None  # factor and offset of the position in the palette
+    texture: Function | None
+
+
+class Look(NamedTuple):
+    """Materials of a scene, as `units.surface` reads them: None stands for what the scene does not use."""
+
+    colours: PerMaterial | None = None
+    is_traced: bool = False  # whether the number of the material or the orbit trap is needed
+    is_textured: bool = False
+    is_path: bool = False  # whether rays also continue where a surface scatters light
+    specular: PerMaterial | None = None
+    shininess: PerMaterial | None = None
+    glow: PerMaterial | None = None
+    reflect: PerMaterial | None = None
+    clear: PerMaterial | None = None  # and refraction; None if nothing is transparent
+    refraction: PerMaterial | None = None
+    absorb: PerMaterial | None = None
+    passed: PerMaterial | None = None  # part of the light that the surface of glass passes
+    roughness: PerMaterial | None = None  # and metallic; None if all reflect like Phong's
+    metallic: PerMaterial | None = None
+    coat: PerMaterial | None = None
+    vary: PerMaterial | None = None  # and the positions in the palette
+    turns: PerMaterial | None = None
+    lost: Function | None = None  # light that one reflection by microfacets loses; None if all are smooth
+    bodies: Bodies | None = None  # those that glow, of paths
+
+
 @dataclass
-class Look:
-    """Materials of a scene, and the kernel lines that load the material at a hit.
+class Materials:
+    """Materials of a scene, and the links from a kernel to them.
 
     With one material, its numbers are read from P. With several, `paint` selects among them.
     """
@@ -455,102 +451,95 @@ class Look:
         plain = material(self.root)
         self.all = self.nodes if covered else [plain, *self.nodes]
         self.paints = {id(n): self.all.index(n) if covered else k + 1 for k, n in enumerate(self.nodes)}
-        self.palettes = any(len(stops(n)) > 3 or n["vary"] for n in self.all)
-        self.textured = any(n["texture"] for n in self.all)
-        self.varies = any(n["vary"] for n in self.all)
-        self.coated = any(n["coat"] for n in self.all)
-        self.glows = any(n["glow"] for n in self.all)
-        self.bodies = glowing_bodies(self.root) if self.paths else []
-        self.inside = any(n["clear"] for n in self.all)
-        self.rough = any(n["roughness"] or n["vary"] for n in self.all)
-        self.glossy = self.paths or self.coated or self.rough or any(n["metallic"] for n in self.all)
-        self.bounces = self.inside or self.glossy or any(n["reflect"] for n in self.all)
+        self.inside = self.some("clear")
+        self.rough = self.some("roughness") or self.some("vary")
+        self.glossy = self.paths or self.some("coat") or self.rough or self.some("metallic")
+        self.bounces = self.inside or self.glossy or self.some("reflect")
 
-    @property
-    def facets(self) -> str:
-        """Reflectance of microfacets; the colour is left open."""
-        return "again{0} * tinted(half, k{0})" if self.rough else "tinted(half, k{0})"
+    def some(self, name: str) -> bool:
+        """True if a material has a property."""
+        return any(n[name] for n in self.all)
 
-    def lines(self) -> list[str]:
-        """Return the lines that set cr, cg, cb, specular, shininess and the other properties in use."""
-        lines = []
-        if len(self.all) > 1 or self.palettes:
-            lines += self.trap()
-        lines += self.chosen([self.colour(k, n) for k, n in enumerate(self.all)], ("cr", "cg", "cb"))
-        names = ["specular", "shininess"]
-        names += ["glow"] * self.glows + ["reflect"] * self.bounces + ["clear", "index"] * self.inside
-        names += ["roughness", "metallic"] * self.glossy + ["coat"] * self.coated
-        for name in names:
-            values = [[self.linker.argument(n[name])] for n in self.all]
-            lines += self.chosen([([], v) for v in values], (name,))
-        if self.varies:
-            lines += self.varied()
+    def look(self) -> Look:
+        """Link all properties."""
+        bodies = glowing_bodies(self.root) if self.paths else []
+        used = {"specular": True, "shininess": True, "glow": self.some("glow"), "reflect": self.bounces}
+        used |= dict.fromkeys(("clear", "absorb"), self.inside)
+        used |= dict.fromkeys(("roughness", "metallic"), self.glossy)
+        used |= {"coat": self.some("coat"), "vary": self.some("vary")}
+        linked: dict[str, Any] = {name: self.choice(name) for name, is_used in used.items() if is_used}
+        if self.some("vary"):
+            linked["turns"] = self.chosen(self.turns)
         if self.inside:
-            fading = [[self.linker.argument(a) for a in n["absorb"]] for n in self.all]
-            lines += self.chosen([([], v) for v in fading], ("absorbr", "absorbg", "absorbb"))
-        return lines
+            linked["refraction"] = self.choice("index")
+            linked["passed"] = self.chosen(
+                lambda n: self.linker.argument(n["clear"] * (1 - _head_on(n["index"])))
+            )
+        if self.rough:
+            linked["lost"] = self.linker.bind(shade.lost, {"table": reflected_shares()})
+        if bodies:
+            linked["bodies"] = Bodies.linked(self.linker, bodies)
+        return self.coloured()._replace(is_path=self.paths, **linked)
 
-    def trap(self) -> list[str]:
-        """Return the line that sets the material's number and the orbit trap."""
+    def coloured(self) -> Look:
+        """Link the colours alone."""
+        palettes = any(len(stops(n)) > 3 or n["vary"] for n in self.all)
+        is_traced = len(self.all) > 1 or palettes
+        return Look(self.chosen(self.colour), is_traced, self.some("texture"))
+
+    def choice(self, name: str) -> PerMaterial:
+        """Link a property."""
+        return self.chosen(lambda node: self.linker.argument(node[name]))
+
+    def chosen(self, link: Callable[[Node], Any]) -> PerMaterial:
+        """Link each material."""
+        first, *others = map(link, self.all)
+        return PerMaterial(first, tuple((k + 0.5, other) for k, other in enumerate(others)))
+
+    def trace(self, root: Node) -> Function:
+        """Return the function of field, material's number and orbit trap of a part of the scene."""
         dialect = TraceDialect(self.linker, materials=self.paints, traps=traps(self.root))
-        return [f"_, paint, tone = {link_tree(self.linker, self.root, dialect)}"]
+        return link_tree(self.linker, root, dialect)
 
-    def transparent(self) -> list[str]:
-        """Return the lines of `units.march.transparent`."""
-        part = transparent_part(self.root)
-        assert part
-        dialect = TraceDialect(self.linker, materials=self.paints, traps=traps(self.root))
-        lines = [f"f, paint, tone = {link_tree(self.linker, part, dialect)}", "t = 0.0 * x"]
-        values = [(*n["absorb"], n["clear"] * (1 - _head_on(n["index"]))) for n in self.all]
-        options: list[tuple[list[str], list[str]]] = [
-            ([], [self.linker.argument(v) for v in row]) for row in values
-        ]
-        return [*lines, *self.chosen(options, ("r", "g", "b", "kept")), "return f, r, g, b, kept"]
-
-    def colour(self, k: int, node: Node) -> tuple[list[str], list[str]]:
-        """Return the colour of a material.
-
-        `k`: index of the material.
-        """
-        colours = linear(stops(node))
-        lines, values = [], [f"p{k}{c}" for c in "rgb"]
+    def colour(self, node: Node) -> Colour:
+        """Link the colour of a material."""
+        colours, texture = linear(stops(node)), self.texture(node) if node["texture"] else None
         if len(colours) == 3:
-            values = [self.linker.argument(c) for c in colours]
-        else:
-            count = Fixed(len(colours) // 3)
-            self.linker.bind(f"palette{k}", shade.palette, {"stops": colours, "count": count})
-            turns = f"turns{k} = {self.turns(node)}"
-            lines = [turns, f"{', '.join(values)} = palette{k}(turns{k} - floor(turns{k}), P)"]
-        if not node["texture"]:
-            return lines, values
+            return Colour(self.linker.argument(colours), None, None, texture)
+        count = Fixed(len(colours) // 3)
+        palette = self.linker.bind(shade.palette, {"stops": colours, "count": count})
+        return Colour(None, palette, self.turns(node), texture)
+
+    def texture(self, node: Node) -> Function:
+        """Bind the unit of a picture on a material."""
         picture = load_picture(node["texture"], TEXELS, node.fail)
         width, height = picture.size
         given = {"light": picture.light, "width": width, "height": height, "tile": node["tile"]}
-        self.linker.bind(f"texture{k}", triplanar, given)
-        seen = [f"q{k}{c}" for c in "rgb"]
-        lines.append(f"{', '.join(seen)} = texture{k}(x, y, z, nx, ny, nz, P)")
-        return lines, [f"{value} * {q}" for value, q in zip(values, seen, strict=True)]
+        return self.linker.bind(shade.triplanar, given)
 
-    def turns(self, node: Node) -> str:
-        """Expression of the position in a palette, before its whole part is removed."""
-        return f"tone * {self.linker.argument(node['repeats'])} + {self.linker.argument(node['shift'])}"
+    def turns(self, node: Node) -> Any:
+        """Link factor and offset of the position in a palette."""
+        return self.linker.argument((node["repeats"], node["shift"]))
 
-    def varied(self) -> list[str]:
-        """Return the lines that change the roughness along the palette."""
-        self.linker.share(shade.varied)
-        turns: list[tuple[list[str], list[str]]] = [
-            ([], [self.turns(n), self.linker.argument(n["vary"])]) for n in self.all
-        ]
-        return [*self.chosen(turns, ("turn", "vary")), "roughness = varied(roughness, vary, turn)"]
 
-    def chosen(self, options: list[tuple[list[str], list[str]]], names: tuple[str, ...]) -> list[str]:
-        """Return the lines that set variables to the values of the material selected by `paint`."""
-        lines = [line for before, _ in options for line in before]
-        for i, name in enumerate(names):
-            lines.append(f"{name} = {options[0][1][i]} + 0.0 * t")
-            for k, (_, values) in enumerate(options[1:], 1):
-                lines.append(f"{name} = where(paint > {k - 0.5}, {values[i]}, {name})")
-        return lines
+MIDPOINTS = 24
+"""Points along each side of the unit square of random numbers."""
+
+
+@lru_cache(maxsize=1)
+def reflected_shares() -> NDArray[np.float64]:
+    """Return the table of `shade.lost`, by the midpoint rule over the directions that `shade.glossy` takes.
+
+    It is rounded, so that it is the same on any machine.
+    """
+    grid = np.linspace(0, 1, int(shade.CELLS) + 1)
+    points = (np.arange(MIDPOINTS) + 0.5) / MIDPOINTS
+    rough, root, u, v = np.meshgrid(grid, grid, points, points, indexing="ij", sparse=True)
+    z = np.maximum(root * root, 1e-4)
+    none = 0.0 * z
+    ray, normal = (np.sqrt(1 - z * z), none, -z), (none, none, 1 + none)
+    *_, weight, _ = shade.glossy(*ray, *normal, rough, u, v)  # type: ignore[no-untyped-call]
+    return np.asarray(weight.mean((2, 3)).round(5))
 
 
 MATERIAL, PALETTE = "material", "viridis"
@@ -604,16 +593,12 @@ def _plain(node: Node) -> Node:
 def _link_painting(root: Node) -> tuple[Mapping[str, Function], NDArray[np.float64]]:
     """Functions and parameters of the function of linear red, green and blue, material number and tone."""
     linker = Linker()
-    look = Look(linker, root)
-    dialect = TraceDialect(linker, materials=look.paints, traps=traps(root))
-    colours = [look.colour(k, node) for k, node in enumerate(look.all)]
-    lines = [
-        f"_, paint, tone = {link_tree(linker, root, dialect)}",
-        "t = 0.0 * x",
-        *look.chosen(colours, ("cr", "cg", "cb")),
-        "return cr, cg, cb, paint, tone",
-    ]
-    linker.write(_FUNCTION, ("x", "y", "z", "P"), lines)
+    materials = Materials(linker, root)
+    for node in materials.all:
+        if node["texture"]:
+            raise node.fail("texture: expected none where vertices have colours, but no normals")
+    linker.functions["traced"] = materials.trace(root)
+    linker.functions[_FUNCTION] = kernel_function(painted, (("look", materials.coloured()),))
     return linker.functions, linker.linked().parameters
 
 

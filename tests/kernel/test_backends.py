@@ -87,7 +87,7 @@ def test_only_what_is_used_is_linked() -> None:
 
     plain = link(sphere()).program
     assert link(transform(sphere())).program == plain
-    assert [part.name for part in plain.parts] == ["N0"] and list(plain.functions) == ["N0", FIELD]
+    assert [part.name for part in plain.parts] == ["N0"] and list(plain.functions) == [FIELD]
 
 
 def test_second_process_compiles_nothing(tmp_path, monkeypatch) -> None:  # type: ignore[no-untyped-def]

@@ -8,6 +8,7 @@ import sys
 from dataclasses import dataclass
 from enum import IntEnum
 from types import ModuleType
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -15,9 +16,9 @@ import pytest
 from fracslice.errors import KernelError
 from fracslice.expr import frontend
 from fracslice.expr import loops as intrinsics
-from fracslice.expr.frontend import loop_function
-from fracslice.expr.graph import NOTHING, Width, text
-from fracslice.expr.loops import Loop, load, loop, store
+from fracslice.expr.frontend import kernel_function, loop_function
+from fracslice.expr.graph import NOTHING, Entry, Width, text
+from fracslice.expr.loops import Loop, inline, load, loop, store
 from fracslice.expr.runtime import lane_count
 from fracslice.fields.cpu import load_functions
 from fracslice.fields.devices import ArrayField
@@ -189,3 +190,77 @@ def test_the_identity_of_a_function_is_the_same_in_every_process() -> None:
         for _ in range(2)
     )
     assert one == other and "COUNT" in one and " at 0x" not in one
+
+
+FACTOR = 2.0
+
+
+class Lamp(NamedTuple):
+    kind: str
+    power: Entry | None = None
+    chance: int = 1
+
+
+@inline
+def scaled(factor, c):  # type: ignore[no-untyped-def]
+    return tuple(factor * c[k] for k in range(2))
+
+
+@inline
+def brightened(c, P, lamp):  # type: ignore[no-untyped-def]
+    a, b = scaled(FACTOR, c)
+    if not lamp.power or lamp.kind == "sky":
+        return a
+    return a + lamp.power * b
+
+
+@inline
+def added(a, b):  # type: ignore[no-untyped-def]
+    return a + b
+
+
+def lit(x, y, u, P, lamp):  # type: ignore[no-untyped-def]
+    c = x, y
+    return added(*scaled(brightened(c, P, lamp), (u[lamp.chance], 0.0)))
+
+
+def unlit(x, y, u, P, lamp):  # type: ignore[no-untyped-def]
+    return brightened(x, P)
+
+
+def untied(x, y, u, P, lamp):  # type: ignore[no-untyped-def]
+    return added(*u)
+
+
+def test_inline_functions_are_read_into_their_caller_and_records_decide() -> None:
+    """One block without calls, in which products are fused with sums; numbers come from P."""
+    x, y, u, numbers = np.array([1.0, 2.0]), np.array([3.0, 5.0]), (0.0, 0.5), np.array([0.0, 7.0])
+    lamp, sky = (kernel_function(lit, (("lamp", Lamp(kind, Entry(1))),)) for kind in ("lamp", "sky"))
+    np.testing.assert_array_equal(lamp(x, y, u, numbers), 0.5 * (2 * x + 7 * 2 * y))
+    np.testing.assert_array_equal(sky(x, y, u, numbers), x)
+    assert "call" not in text(lamp) and "b1" not in text(lamp)
+    assert "element P" not in text(sky) and text(sky).count("element") == 1
+    assert kernel_function(lit, (("lamp", Lamp("lamp", Entry(1))),)) is lamp
+    assert kernel_function(lit, (("lamp", Lamp("lamp", Entry(2))),)).identity != lamp.identity
+
+
+def test_a_kernel_function_follows_what_its_inline_functions_see(monkeypatch: pytest.MonkeyPatch) -> None:
+    known = (("lamp", Lamp("sky")),)
+    before = kernel_function(lit, known)
+    assert before(1.0, 0.0, (0.0, 1.0), ()) == 2
+    monkeypatch.setattr(sys.modules[__name__], "FACTOR", 3.0)
+    after = kernel_function(lit, known)
+    assert after.identity != before.identity
+    assert after(1.0, 0.0, (0.0, 1.0), ()) == 3
+
+
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [(unlit, "brightened takes 3 values, found 2"), (untied, "'u' is no tuple of known length")],
+)
+def test_what_an_inline_function_does_not_take_is_named(function, message: str) -> None:  # type: ignore[no-untyped-def]
+    line = function.__code__.co_firstlineno + 1
+    with pytest.raises(
+        KernelError, match=rf"test_loops.py:{line}: kernel function {function.__name__}: .*{message}"
+    ):
+        kernel_function(function, (("lamp", Lamp("sky")),)).graph(Width(4))

@@ -9,8 +9,7 @@ import pytest
 
 from fracslice.formulas import Node, box, difference, mandelbulb, material, plane, sphere, transform, union
 from fracslice.rendering import Renderer, materials
-from fracslice.rendering.lighting import reflected_shares
-from fracslice.rendering.materials import glowing_bodies
+from fracslice.rendering.materials import glowing_bodies, reflected_shares
 from fracslice.rendering.units.camera import linear
 from fracslice.rendering.units.shade import glossy, highlight, lost, varied
 from fracslice.scene.view import Camera, Light, Shading, View

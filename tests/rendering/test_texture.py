@@ -11,6 +11,7 @@ from PIL import Image
 from fracslice.errors import SceneError
 from fracslice.formulas import box, material
 from fracslice.rendering import Renderer
+from fracslice.rendering.materials import paint
 from fracslice.rendering.units.camera import linear
 from fracslice.scene import reads
 from fracslice.scene.view import Camera, Shading, View
@@ -60,6 +61,12 @@ def test_a_texture_multiplies_the_colour_and_changes_no_source(tmp_path: Path) -
     *_, last = renderers[0].passes(1)
     assert last.image[1, 1] == pytest.approx((linear((0.5,))[0], 1, 0), abs=0.02)
     assert renderers[0]._frame.linked.program == renderers[1]._frame.linked.program
+
+
+def test_a_texture_is_none_for_the_vertices_of_a_mesh(tmp_path: Path) -> None:
+    file = checker(tmp_path / "a.png")
+    with pytest.raises(SceneError, match="texture: expected none where vertices have colours"):
+        paint(material(box(), texture=file), np.zeros((1, 3)), "material", Work())
 
 
 def test_a_texture_that_is_missing_is_named() -> None:

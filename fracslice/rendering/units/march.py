@@ -17,6 +17,8 @@ __all__ = [
     "step_cone",
     "step_ray",
     "surface",
+    "traced",
+    "traced_glass",
     "transparent",
 ]
 
@@ -33,6 +35,21 @@ def transparent(x, y, z, P):
 
     Returns f, r, g, b, kept green and blue per scene unit.
     """
+    raise NotImplementedError
+
+
+@intrinsic
+def traced(x, y, z, P):
+    """Evaluate the materials of the scene.
+
+    Returns the field, the number of the material and the orbit trap.
+    """
+    raise NotImplementedError
+
+
+@intrinsic
+def traced_glass(x, y, z, P):
+    """Evaluate the materials of the transparent parts of the scene; see `traced`."""
     raise NotImplementedError
 
 
@@ -161,6 +178,22 @@ def advance(
     after = where(kept, t + step, t - stride + before)
     after = where(hit, t + where(radius < 0.0, ahead, 0.0), after)
     return after, where(kept, radius, before), where(kept, step, before), where(hit, -1.0, 1.0)
+
+
+def hit_width(t, cone, least):
+    """Return the hit tolerance at distance t.
+
+    `cone`, `least`: half width of a pixel at distance 1 and at distance 0.
+    """
+    return cone * t + least
+
+
+def sharp_width(h, rounding, sharper):
+    """Return half the width over which a normal is taken where rays are bent, at least that of noise.
+
+    `h`: half width of a pixel; `sharper`: its ratio to the width.
+    """
+    return minimum(h, maximum(h / sharper, 32.0 * rounding))
 
 
 def touching(x, y, z, nx, ny, nz, lift, P, steepness):

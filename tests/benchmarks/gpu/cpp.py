@@ -89,7 +89,8 @@ class _Functions:
         graph = function.graph(THREAD)
         known = {value: f"a{k}" for k, value in enumerate(graph.arguments)}
         blocks = {block: f"b{k}" for k, block in enumerate(graph.blocks)}
-        values = [v for block in graph.blocks for v in (*block.parameters, *block.body)]
+        bodies = _bodies(graph.blocks)
+        values = [v for block in graph.blocks for v in (*block.parameters, *bodies[block])]
         known |= {value: f"v{k}" for k, value in enumerate(values)}
 
         def shown(value: Value) -> str:
@@ -102,11 +103,11 @@ class _Functions:
             first = next(iter(_passed(graph.blocks, block)), [])
             for parameter, value in zip(block.parameters, first, strict=True):
                 yield f"std::decay_t<decltype({shown(value)})> {known[parameter]};"
-            for value in block.body:
+            for value in bodies[block]:
                 yield f"std::decay_t<decltype({self.expression(value, shown)})> {known[value]};"
         for block in graph.blocks:
             yield f"{blocks[block]}:;"
-            for value in block.body:
+            for value in bodies[block]:
                 yield f"{known[value]} = {self.expression(value, shown)};"
             match block.exit:
                 case Jump(target, passed):
@@ -136,6 +137,21 @@ class _Functions:
         if value.op in SIGNS:
             return f"({given[0]} {SIGNS[value.op]} {given[1]})"
         return WORDS[value.op].format(*given)
+
+
+def _bodies(blocks: Sequence[Block]) -> dict[Block, list[Value]]:
+    """Values of blocks, without tuples that are only taken apart."""
+    used = set[Value]()
+    for block in blocks:
+        match block.exit:
+            case Jump(_, passed):
+                used.update(passed)
+            case Return(Value() as value):
+                used.add(value)
+    for value in reversed([value for block in blocks for value in block.body]):
+        if value.op != "tuple" or value in used:
+            used.update(value.operands)
+    return {block: [v for v in block.body if v.op != "tuple" or v in used] for block in blocks}
 
 
 def _passed(blocks: Sequence[Block], target: Block) -> Iterator[list[Value]]:
