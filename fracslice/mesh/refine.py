@@ -263,6 +263,28 @@ def stars(triangles: NDArray[np.int32], some: NDArray[np.int64]) -> NDArray[np.i
     return result
 
 
+def placed(
+    mesh: Mesh, some: NDArray[np.int64], there: NDArray[np.float64], up: NDArray[np.float64], thin: float
+) -> Mesh:
+    """A mesh with some vertices at other places, where all triangles around them face upwards and are not
+    thin, but for vertices on its rim.
+    """
+    edges = edges_of(mesh.triangles)
+    rim = np.bincount(edges.sides.ravel(), minlength=len(edges.ends)) == 1
+    inner = ~np.isin(some, edges.ends[rim])
+    some, there, up = some[inner], there[inner], up[inner] / np.linalg.norm(up[inner], axis=1, keepdims=True)
+    star = stars(mesh.triangles, some)
+    while len(some):
+        vertices = mesh.vertices.copy()
+        vertices[some] = there
+        wide, normals = measures(vertices[mesh.triangles[star]], thin)
+        good = (wide & ((normals * up[:, None]).sum(axis=2) > LEAST)).all(axis=1)
+        if good.all():
+            return Mesh(vertices, mesh.triangles)
+        some, there, up, star = some[good], there[good], up[good], star[good]
+    return mesh
+
+
 def contracted(
     mesh: Mesh, ends: NDArray[np.int64], fixed: NDArray[np.bool_], short: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
@@ -308,8 +330,8 @@ def _shrinking(
     low, high = np.minimum(corners, keep[:, None, None]), np.maximum(corners, keep[:, None, None])
     common = np.isin(low << 32 | high, keys) & (corners != vanish[:, None, None]) & once[..., None]
     moved = np.where(corners == vanish[:, None, None], keep[:, None, None], corners)
-    wide, normals = _measures(mesh.vertices[corners], thin)
-    wider, others = _measures(mesh.vertices[moved], thin)
+    wide, normals = measures(mesh.vertices[corners], thin)
+    wider, others = measures(mesh.vertices[moved], thin)
     middle = np.where((wide & once)[..., None], normals, 0).sum(axis=1)
     middle /= np.maximum(np.linalg.norm(middle, axis=1, keepdims=True), 1e-300)
     even = (normals * middle[:, None]).sum(axis=2) > EVEN, (others * middle[:, None]).sum(axis=2) > EVEN
@@ -318,7 +340,7 @@ def _shrinking(
     return ways[good], corners.reshape(len(good), 3 * star.shape[1])[good]
 
 
-def _measures(corners: NDArray[np.float64], thin: float) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+def measures(corners: NDArray[np.float64], thin: float) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
     """Whether triangles are wider, and their unit normals."""
     flat = corners.reshape(-1, 3, 3)
     wide = heights(flat) > thin

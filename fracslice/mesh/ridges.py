@@ -31,6 +31,7 @@ from .refine import (
     edges_of,
     on_creases,
     on_three,
+    placed,
     split_edges,
     stars,
     with_neighbours,
@@ -169,16 +170,14 @@ def _creased(
 def _settled(planned: Plan, pieces: Pieces, work: Work) -> Pieces:
     """The same surface with vertices on its flat sides, from which contouring keeps them for the sake of
     rounding.
-
-    Their tangential coordinates stay, so that triangles around them keep their sides.
     """
     kernel, voxel, result = planned.root.kernel("cpu", "float64"), planned.voxel, pieces.anew()
     step = 2 * KEPT * voxel
     for number in range(len(pieces)):
-        mesh, vertices = pieces.mesh(number), pieces.mesh(number).vertices.copy()
-        off = values_at(kernel, np.ascontiguousarray(vertices.T), work)
+        mesh = pieces.mesh(number)
+        off = values_at(kernel, np.ascontiguousarray(mesh.vertices.T), work)
         few = np.flatnonzero((np.abs(off) > STILL * voxel) & (np.abs(off) < 2 * KEPT * voxel))
-        p, f = np.ascontiguousarray(vertices[few].T), off[few]
+        p, f = np.ascontiguousarray(mesh.vertices[few].T), off[few]
         up, down = (
             np.array([values_at(kernel, p + sign * way[:, None], work) for way in step * np.eye(3)])
             for sign in (1, -1)
@@ -186,8 +185,9 @@ def _settled(planned: Plan, pieces: Pieces, work: Work) -> Pieces:
         slope, bend = (up - down) / (2 * step), np.abs(up + down - 2 * f).max(axis=0)
         square = (slope**2).sum(axis=0)
         flat = (bend < FLAT * step * np.sqrt(square)) & (np.abs(f) < KEPT * voxel * np.sqrt(square))
-        vertices[few[flat]] -= (f * slope / np.maximum(square, 1e-300)).T[flat]
-        result.add(Piece(Mesh(vertices, mesh.triangles), pieces.ends[number]), pieces.fresh[number])
+        there = mesh.vertices[few] - (f * slope / np.maximum(square, 1e-300)).T
+        settled = placed(mesh, few[flat], there[flat], slope.T[flat], APART / 4 * voxel)
+        result.add(Piece(settled, pieces.ends[number]), pieces.fresh[number])
     return result
 
 
