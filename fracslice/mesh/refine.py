@@ -253,6 +253,17 @@ EVEN = 0.98
 """Minimum cosine between triangles around a vertex that vanishes, before and after."""
 
 
+CROWDED = 64
+"""Most triangles around a vertex that is looked at together with others."""
+
+
+def uncrowded(triangles: NDArray[np.int32], some: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Those of some vertices that have few triangles."""
+    counts = np.bincount(triangles.ravel(), minlength=some.max(initial=0) + 1)
+    few: NDArray[np.int64] = some[counts[some] <= CROWDED]
+    return few
+
+
 def stars(triangles: NDArray[np.int32], some: NDArray[np.int64]) -> NDArray[np.int64]:
     """Triangles at some vertices, the last ones repeated in rows of those that have fewer, [n, k]."""
     order = np.argsort(triangles, axis=None, kind="stable")
@@ -271,7 +282,7 @@ def placed(
     """
     edges = edges_of(mesh.triangles)
     rim = np.bincount(edges.sides.ravel(), minlength=len(edges.ends)) == 1
-    inner = ~np.isin(some, edges.ends[rim])
+    inner = ~np.isin(some, edges.ends[rim]) & np.isin(some, uncrowded(mesh.triangles, some))
     some, there, up = some[inner], there[inner], up[inner] / np.linalg.norm(up[inner], axis=1, keepdims=True)
     star = stars(mesh.triangles, some)
     while len(some):
@@ -321,7 +332,7 @@ def _shrinking(
     """
     keys, (keep, vanish) = edges_of(mesh.triangles).keys, ways.T
     low, high = ways.min(axis=1), ways.max(axis=1)
-    there = np.isin(low << 32 | high, keys)
+    there = np.isin(low << 32 | high, keys) & np.isin(vanish, uncrowded(mesh.triangles, vanish))
     ways, keep, vanish = ways[there], keep[there], vanish[there]
     star = stars(mesh.triangles, vanish)
     once = np.diff(star, axis=1, prepend=-1) != 0

@@ -34,6 +34,7 @@ from .refine import (
     placed,
     split_edges,
     stars,
+    uncrowded,
     with_neighbours,
 )
 from .shells import Pieces, rows
@@ -185,8 +186,8 @@ def _settled(planned: Plan, pieces: Pieces, work: Work) -> Pieces:
         slope, bend = (up - down) / (2 * step), np.abs(up + down - 2 * f).max(axis=0)
         square = (slope**2).sum(axis=0)
         flat = (bend < FLAT * step * np.sqrt(square)) & (np.abs(f) < KEPT * voxel * np.sqrt(square))
-        there = mesh.vertices[few] - (f * slope / np.maximum(square, 1e-300)).T
-        settled = placed(mesh, few[flat], there[flat], slope.T[flat], APART / 4 * voxel)
+        few, there, up = few[flat], (p - f * slope / np.maximum(square, 1e-300)).T[flat], slope.T[flat]
+        settled = placed(mesh, few, there, up, APART / 4 * voxel)
         result.add(Piece(settled, pieces.ends[number]), pieces.fresh[number])
     return result
 
@@ -862,7 +863,7 @@ def _bent(mesh: Mesh, edges: Edges) -> NDArray[np.int64]:
     one, other = edges.beside.T
     bent = edges.sides.ravel()[edges.pairs[:, 0]][(flat[one] * flat[other]).sum(axis=1) < BENT]
     rim = np.bincount(edges.sides.ravel(), minlength=len(edges.ends)) == 1
-    return np.setdiff1d(edges.ends[bent], edges.ends[rim])
+    return uncrowded(mesh.triangles, np.setdiff1d(edges.ends[bent], edges.ends[rim]))
 
 
 def _alone(
