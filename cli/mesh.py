@@ -57,9 +57,7 @@ class MeshFileOptions(ClusterOptions, MeshOptions):
     without = frozenset()
 
     source: str = argument("SCENE|MODEL")
-    output: str = output(
-        "FILE", f"A file of {alternatives(*ENDINGS)}; or .vdb, for the samples of the field."
-    )
+    output: str = output("FILE", f"A file of {alternatives(*ENDINGS)}; or .vdb, for distances on a grid.")
     seconds: float | None = option(
         SECONDS, "Mesh the scene at this time of its <animation>, such as 2.5s.", "--time"
     )
@@ -121,7 +119,7 @@ def make_files(given: MeshFileOptions, parts: Callable[[Scene, Work], Parts] = w
     check_outputs(given)
     if Path(given.output).suffix.lower() == GRID:
         names = {"chord", "simplify", "faces", "colour", "cluster", "shard", "store"}
-        refuse_options(names, "only for meshes, and a .vdb file holds samples")
+        refuse_options(names, "only for meshes, and a .vdb file holds distances on a grid")
     if given.implicit:
         refuse_what_needs_triangles(given.output)
     scene = load_scene(given.source, given.settings)
@@ -253,17 +251,10 @@ def check_outputs(given: MeshFileOptions) -> None:
 
 
 def write_grid(result: Result, path: str, about: dict[str, str]) -> None:
-    """Write the samples, in mm, as an OpenVDB file."""
-    import shutil
+    """Write distances in a narrow band, in mm, as an OpenVDB file."""
+    from fracslice.volume.level_sets import grid_of, save
 
-    from fracslice.common.files import replacing, temporary_folder
-    from fracslice.volume.bricks import write_vdb
-
-    with temporary_folder() as folder, replacing(path) as file:
-        whole = folder / f"grid{GRID}"
-        write_vdb(result.bricks_mm, whole, about)
-        with whole.open("rb") as grid:
-            shutil.copyfileobj(grid, file)
+    save(grid_of(result.bricks_mm), path, about)
 
 
 def write_report(report: Report, path: str) -> None:

@@ -22,13 +22,16 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from secrets import token_hex
-from typing import Any, BinaryIO, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, BinaryIO, Literal, NamedTuple
 
 import numpy as np
 from isal.isal_zlib import crc32, crc32_combine
 from numpy.typing import NDArray
 
 from ..errors import ExportError
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
 
 try:
     import grp
@@ -75,6 +78,31 @@ def open_regular(path: str | Path) -> Iterator[BinaryIO]:
         if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
             raise OSError(errno.EINVAL, "expected a file, found a pipe or a device", os.fspath(path))
         yield file
+
+
+MOST_PIXELS = 1 << 26
+"""Most pixels of a picture that is read."""
+
+
+def open_picture(file: BinaryIO, formats: tuple[str, ...]) -> Image:
+    """Open a picture in some of Pillow's formats, of a size that can be read; its pixels are not read yet.
+
+    Raises `ValueError` for too many pixels, and what Pillow raises.
+    """
+    from PIL import Image
+
+    try:
+        picture = Image.open(file, formats=formats)
+    except Image.DecompressionBombError:  # its words are of an attack
+        raise ValueError(f"too many pixels: expected at most {MOST_PIXELS} of them") from None
+    require_pixels(*picture.size)
+    return picture
+
+
+def require_pixels(width: int, height: int) -> None:
+    """Raise `ValueError` for a picture without pixels, or with too many."""
+    if not 0 < width * height <= MOST_PIXELS:
+        raise ValueError(f"{width} x {height} pixels: expected at most {MOST_PIXELS} of them")
 
 
 def read_bytes(path: str | Path) -> bytes:

@@ -81,8 +81,9 @@ class Solid(InMemory):
         """Solid of a checked mesh."""
         vertices, triangles = mesh.vertices, mesh.triangles
         # Triangles that are near each other lie together in memory.
-        mesh = Mesh(vertices, triangles[build(mesh, halved=True).order]).in_order()
-        native = _native.Solid(mesh.vertices, mesh.triangles, *build(mesh, halved=True))
+        order, *boxes = build(mesh, halved=True)
+        mesh = Mesh(vertices, triangles[order]).in_order()
+        native = _native.Solid(mesh.vertices, mesh.triangles, np.arange(len(order)), *boxes)
         low, high = mesh.bounds.tolist()
         digest = int(key("solid", vertices, triangles)[:16], 16)
         return cls(digest, native, Box(tuple(low), tuple(high)))

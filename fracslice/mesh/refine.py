@@ -18,6 +18,7 @@ from ..work import Work
 from .contouring import anywhere, project
 from .fit import OFF, UPRIGHT, Fit, Fitted
 from .model import Mesh, self_intersecting_triangles
+from .tips import heights
 
 STEPS = 6
 NEAREST = 4e-3
@@ -60,8 +61,9 @@ def on_creases(
         move = _nearest(normals, ((points - there[:, None]) * normals).sum(axis=2))
         size = np.linalg.norm(move, axis=1)
         there = there + move * np.minimum(1, length / np.maximum(size, 1e-300))[:, None]
+        along = _unit(np.cross(normals[:, 0], normals[:, 1]))[:, None]
         directions = points - there[:, None]
-        directions /= np.maximum(np.linalg.norm(directions, axis=2, keepdims=True), 1e-300)
+        directions = _unit(directions - (directions * along).sum(axis=2, keepdims=True) * along)
         spacing = np.maximum(np.minimum(2 * size, spacing / 2), NEAREST * length)
         points = there[:, None] + spacing[:, None, None] * directions
     result = ((first * normals).sum(axis=2) > SAME).all(axis=1) & (size < NEAREST / 4 * length)
@@ -96,12 +98,32 @@ def on_three(
         off = ((points - there[:, None]) * normals).sum(axis=2)
         move = np.linalg.solve(np.where(result[:, None, None], normals, np.eye(3)), off[..., None])[..., 0]
         there, moved = there + move, np.linalg.norm(move, axis=1)
-        directions = points - there[:, None]
-        directions /= np.maximum(np.linalg.norm(directions, axis=2, keepdims=True), 1e-300)
         spacing = np.maximum(np.minimum(2 * moved, spacing / 2), NEAREST * size)
-        points = there[:, None] + spacing[:, None, None] * directions
+        points = there[:, None] + spacing[:, None, None] * _midways(normals, points - there[:, None])
     result &= ((first * normals).sum(axis=2) > SAME).all(axis=1) & (moved < NEAREST / 4 * size)
     return there, result
+
+
+def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit vectors; zero where there is no direction."""
+    result: NDArray[np.float64] = vectors / np.maximum(
+        np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300
+    )
+    return result
+
+
+def _midways(normals: NDArray[np.float64], ways: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit vectors from corners into their three sides, midway between the sharp edges on both sides of
+    `ways`: differences of the field do not reach beyond these.
+
+    `normals`, `ways`: float64 (n, 3, 3).
+    """
+    one = _unit(np.cross(normals, np.roll(normals, -1, axis=1)))
+    other = _unit(np.cross(normals, np.roll(normals, 1, axis=1)))
+    turn = (np.cross(one, other) * normals).sum(axis=2)
+    shares = (np.cross(a, b) * normals for a, b in ((ways, other), (one, ways)))
+    first, second = (np.where(share.sum(axis=2) * turn < 0, -1.0, 1.0)[..., None] for share in shares)
+    return _unit(first * one + second * other)
 
 
 def _nearest(normals: NDArray[np.float64], off: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -225,6 +247,122 @@ def _split_triangles(
     one = np.where(shorter, np.stack([a, p, q], 1), np.stack([a, p, c], 1))
     other = np.where(shorter, np.stack([a, q, c], 1), np.stack([p, q, c], 1))
     return [corner, one, other]
+
+
+EVEN = 0.98
+"""Minimum cosine between triangles around a vertex that vanishes, before and after."""
+
+
+CROWDED = 64
+"""Most triangles around a vertex that is looked at together with others."""
+
+
+def uncrowded(triangles: NDArray[np.int32], some: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Those of some vertices that have few triangles."""
+    counts = np.bincount(triangles.ravel(), minlength=some.max(initial=0) + 1)
+    few: NDArray[np.int64] = some[counts[some] <= CROWDED]
+    return few
+
+
+def stars(triangles: NDArray[np.int32], some: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Triangles at some vertices, the last ones repeated in rows of those that have fewer, [n, k]."""
+    order = np.argsort(triangles, axis=None, kind="stable")
+    starts = np.searchsorted(triangles.ravel()[order], np.stack([some, some + 1]))
+    most = np.diff(starts, axis=0).max(initial=1)
+    places = np.minimum(starts[0][:, None] + np.arange(most), starts[1][:, None] - 1)
+    result: NDArray[np.int64] = order[places] // 3
+    return result
+
+
+def placed(
+    mesh: Mesh, some: NDArray[np.int64], there: NDArray[np.float64], up: NDArray[np.float64], thin: float
+) -> Mesh:
+    """A mesh with some vertices at other places, where all triangles around them face upwards and are not
+    thin, but for vertices on its rim.
+    """
+    edges = edges_of(mesh.triangles)
+    rim = np.bincount(edges.sides.ravel(), minlength=len(edges.ends)) == 1
+    inner = ~np.isin(some, edges.ends[rim]) & np.isin(some, uncrowded(mesh.triangles, some))
+    some, there, up = some[inner], there[inner], up[inner] / np.linalg.norm(up[inner], axis=1, keepdims=True)
+    star = stars(mesh.triangles, some)
+    while len(some):
+        vertices = mesh.vertices.copy()
+        vertices[some] = there
+        wide, normals = measures(vertices[mesh.triangles[star]], thin)
+        good = (wide & ((normals * up[:, None]).sum(axis=2) > LEAST)).all(axis=1)
+        if good.all():
+            return Mesh(vertices, mesh.triangles)
+        some, there, up, star = some[good], there[good], up[good], star[good]
+    return mesh
+
+
+def contracted(
+    mesh: Mesh, ends: NDArray[np.int64], fixed: NDArray[np.bool_], short: float
+) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """Triangles that are left without some short edges at vertices of flat sides, and their corners.
+
+    `ends`: int64 (n, 2).
+    """
+    left, triangles, stay = np.arange(len(mesh.triangles)), mesh.triangles, fixed.copy()
+    edges = edges_of(triangles)
+    stay[edges.ends[np.bincount(edges.sides.ravel(), minlength=len(edges.ends)) == 1]] = True
+    ways = np.stack([ends, ends[:, ::-1]], axis=1).reshape(-1, 2)
+    ways = ways[~stay[ways[:, 1]]]
+    for _ in range(PASSES):
+        ways, vertices = _shrinking(Mesh(mesh.vertices, triangles), ways, short / 2)
+        claims = np.full(len(mesh.vertices), len(ways))
+        np.minimum.at(claims, vertices, np.arange(len(ways))[:, None])
+        now = (claims[vertices] == np.arange(len(ways))[:, None]).all(axis=1)
+        if not now.any():
+            break
+        place = np.arange(len(mesh.vertices), dtype=np.int32)
+        place[ways[now, 1]] = ways[now, 0]
+        triangles, ways = place[triangles], ways[~now]
+        whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
+        left, triangles = left[whole], triangles[whole]
+    return left, triangles
+
+
+def _shrinking(
+    mesh: Mesh, ways: NDArray[np.int64], thin: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs of vertices of which the second can become the first, and all vertices around the second, [n, k].
+
+    The triangles around it, but for thin ones, face one way, and all do then, and are not thin.
+    """
+    keys, (keep, vanish) = edges_of(mesh.triangles).keys, ways.T
+    low, high = ways.min(axis=1), ways.max(axis=1)
+    there = np.isin(low << 32 | high, keys) & np.isin(vanish, uncrowded(mesh.triangles, vanish))
+    ways, keep, vanish = ways[there], keep[there], vanish[there]
+    star = stars(mesh.triangles, vanish)
+    once = np.diff(star, axis=1, prepend=-1) != 0
+    corners = mesh.triangles[star].astype(np.int64)
+    both = (corners == keep[:, None, None]).any(axis=2)
+    low, high = np.minimum(corners, keep[:, None, None]), np.maximum(corners, keep[:, None, None])
+    common = np.isin(low << 32 | high, keys) & (corners != vanish[:, None, None]) & once[..., None]
+    moved = np.where(corners == vanish[:, None, None], keep[:, None, None], corners)
+    wide, normals = measures(mesh.vertices[corners], thin)
+    wider, others = measures(mesh.vertices[moved], thin)
+    middle = np.where((wide & once)[..., None], normals, 0).sum(axis=1)
+    middle /= np.maximum(np.linalg.norm(middle, axis=1, keepdims=True), 1e-300)
+    even = (normals * middle[:, None]).sum(axis=2) > EVEN, (others * middle[:, None]).sum(axis=2) > EVEN
+    good = wide.any(axis=1) & (even[0] | ~wide).all(axis=1) & ((even[1] & wider) | both).all(axis=1)
+    good &= ((both & once).sum(axis=1) == 2) & (common.sum(axis=(1, 2)) == 4)
+    return ways[good], corners.reshape(len(good), 3 * star.shape[1])[good]
+
+
+def measures(corners: NDArray[np.float64], thin: float) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+    """Whether triangles are wider, and their unit normals."""
+    flat = corners.reshape(-1, 3, 3)
+    wide = heights(flat) > thin
+    return wide.reshape(corners.shape[:-2]), _normals(flat).reshape(corners.shape[:-1])
+
+
+def _normals(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit normals of triangles, [m, 3]."""
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    result: NDArray[np.float64] = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
+    return result
 
 
 ROUNDS = 12

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from .. import _native
 from ..common.cache import key
-from ..common.files import open_regular
+from ..common.files import open_picture, open_regular
 from ..errors import MeshError
 from ..expr.language import InMemory
 from .models import require_unchanged
 
-LARGEST, MOST = 1 << 26, 1 << 22
-"""Most pixels of a file, and most that are kept."""
+MOST = 1 << 22
+"""Most pixels of a picture that are kept."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,20 +118,17 @@ def _heights(file: str, sha256: str, black: float, white: float) -> NDArray[np.f
 
 def grey(file: str) -> NDArray[np.float64]:
     """Levels of a picture of 8 or 16 bits, 0 of black to 1 of white; pixels of a large one are averaged."""
-    from PIL import Image
-
     try:
         with open_regular(file) as opened, warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of Pillow: what is wrong is an error here
-            picture = Image.open(opened, formats=("PNG", "JPEG", "WEBP", "TIFF"))
-            width, height = picture.size
-            if width * height > LARGEST:
-                raise MeshError(f"{width} x {height} pixels: expected at most {LARGEST} of them")
+            picture = open_picture(opened, ("PNG", "JPEG", "WEBP", "TIFF"))
             deep = picture.mode.startswith("I")
             image = picture.convert("F" if deep else "L")
-            if (times := math.ceil(math.sqrt(width * height / MOST))) > 1:
+            if (times := math.ceil(math.sqrt(math.prod(picture.size) / MOST))) > 1:
                 image = image.reduce(times)
             return np.asarray(image, np.float64) / (65535 if deep else 255)
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        reason = getattr(error, "strerror", None) or "not a picture that can be read"
-        raise MeshError(f"{reason}; expected a .png, .jpg, .webp or .tif file") from None
+    except OSError as error:
+        reason = error.strerror or "not a picture that can be read"
+    except (ValueError, SyntaxError) as error:
+        reason = " ".join(str(error).split()) or "not a picture that can be read"
+    raise MeshError(f"{reason}; expected a .png, .jpg, .webp or .tif file") from None

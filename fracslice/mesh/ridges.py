@@ -25,7 +25,18 @@ from .cleaning import quantise, used_vertices
 from .contouring import BLUNT, Piece
 from .fit import OFF, UPRIGHT, Fit
 from .model import Mesh, Nearest, component_sizes, self_intersecting_triangles
-from .refine import Edges, edges_of, on_creases, on_three, split_edges, with_neighbours
+from .refine import (
+    Edges,
+    contracted,
+    edges_of,
+    on_creases,
+    on_three,
+    placed,
+    split_edges,
+    stars,
+    uncrowded,
+    with_neighbours,
+)
 from .shells import Pieces, rows
 from .tips import Cap, heights, replace_by_fans, spans, tips_to_end
 
@@ -33,6 +44,11 @@ APART = 5e-5
 """Distance between vertices, voxels, below which rounding may join them; contouring keeps twice that."""
 LARGE = 1 << 24
 """Triangles above which a surface stays as it is: pieces that sharp edges span are joined, in memory."""
+
+KEPT, FLAT = 1.5e-4, 1e-5
+"""Distance, voxels, below which contouring moves vertices away from samples, and greatest change of the slope
+around them, relative to it, on a side that counts as flat.
+"""
 
 SAMPLE, MOSTLY = 64, 0.5
 """Blunt cells that are examined first, and the least share of their edges that must lead to a sharp edge. On
@@ -49,6 +65,14 @@ its greatest distance from what is added there, voxels.
 
 GAP = 0.01
 """Distance of the middle of a mesh edge from the surface, voxels, above which it is examined."""
+
+BENT, SNAP, STILL = 0.98, 0.04, 1e-7
+"""Maximum cosine between triangles at vertices that may belong to sharp edges; distance, voxels, below which
+they move there, and below which they are there.
+"""
+
+SHORT = 0.01
+"""Length of a mesh edge, voxels, below which it is contracted where a triangle is bad."""
 
 REACHED = 1e-3
 """Distance from the mesh, voxels, below which it has a point of a sharp edge already."""
@@ -86,6 +110,9 @@ MANY, FEWER = 1 << 13, 3
 RIM = 20
 """Maximum corners of a rim that is triangulated anew."""
 
+PAIRS = [0, 1], [1, 2], [0, 2]
+"""Of three sides that meet in a corner."""
+
 INWARDS = 0.8 * np.eye(3) + np.full((3, 3), 0.2 / 3)
 """Barycentric coordinates of points near the corners of a triangle."""
 
@@ -111,6 +138,7 @@ def with_ridges(
         return pieces, tips
     if not _creased(planned, pieces, blunt, tips, work):
         return pieces, tips
+    pieces = _settled(planned, pieces, work)
     mesh, numbers = _around(planned, pieces, blunt, tips, CUBE)
     crumb = _crumbs(mesh, planned.voxel)
     whole = Mesh(mesh.vertices, mesh.triangles[crumb < 0]).in_order()
@@ -138,6 +166,30 @@ def _creased(
     mesh, _ = _around(planned, pieces, some, tips, 1.0)
     missed = _Missed(planned, work).of(mesh, edges_of(mesh.triangles), SAMPLE)
     return len(missed.edges) > MOSTLY * missed.sided
+
+
+def _settled(planned: Plan, pieces: Pieces, work: Work) -> Pieces:
+    """The same surface with vertices on its flat sides, from which contouring keeps them for the sake of
+    rounding.
+    """
+    kernel, voxel, result = planned.root.kernel("cpu", "float64"), planned.voxel, pieces.anew()
+    step = 2 * KEPT * voxel
+    for number in range(len(pieces)):
+        mesh = pieces.mesh(number)
+        off = values_at(kernel, np.ascontiguousarray(mesh.vertices.T), work)
+        few = np.flatnonzero((np.abs(off) > STILL * voxel) & (np.abs(off) < 2 * KEPT * voxel))
+        p, f = np.ascontiguousarray(mesh.vertices[few].T), off[few]
+        up, down = (
+            np.array([values_at(kernel, p + sign * way[:, None], work) for way in step * np.eye(3)])
+            for sign in (1, -1)
+        )
+        slope, bend = (up - down) / (2 * step), np.abs(up + down - 2 * f).max(axis=0)
+        square = (slope**2).sum(axis=0)
+        flat = (bend < FLAT * step * np.sqrt(square)) & (np.abs(f) < KEPT * voxel * np.sqrt(square))
+        few, there, up = few[flat], (p - f * slope / np.maximum(square, 1e-300)).T[flat], slope.T[flat]
+        settled = placed(mesh, few, there, up, APART / 4 * voxel)
+        result.add(Piece(settled, pieces.ends[number]), pieces.fresh[number])
+    return result
 
 
 def _around(
@@ -205,6 +257,22 @@ class _Points:
     sided: int
 
 
+@dataclass(frozen=True, eq=False)
+class _Added:
+    """Corners, and points of sharp edges that take the place of vertices nearby."""
+
+    hosts: NDArray[np.int64]  # triangles that are split, or complements of vertices that are replaced
+    points: NDArray[np.float64]
+    cornered: NDArray[np.bool_]  # whether they are corners
+
+    def joined(self, others: _Added, apart: float) -> _Added:
+        """These and those others that are not as near to one of them."""
+        new = _away(others.points, self.points, apart)
+        hosts = np.concatenate([self.hosts, others.hosts[new]])
+        points = np.concatenate([self.points, others.points[new]])
+        return _Added(hosts, points, np.concatenate([self.cornered, others.cornered[new]]))
+
+
 class _Missed:
     """Finds the points of sharp edges and the corners that a mesh lacks."""
 
@@ -228,9 +296,7 @@ class _Missed:
         on = self._on_surface(points)
         return _Points(far[on], points[on], int(sided.sum()))
 
-    def corners(
-        self, mesh: Mesh, which: NDArray[np.int64]
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
+    def corners(self, mesh: Mesh, which: NDArray[np.int64]) -> tuple[_Added, NDArray[np.int64]]:
         """Corners of the surface near triangles, each once and with its nearest triangle, and the vertices
         that are at corners already.
         """
@@ -258,7 +324,49 @@ class _Missed:
             new = np.linalg.norm(points[kept] - points[k], axis=1).min(initial=math.inf) > apart
             if new and nearest[k] not in nearest[kept]:
                 kept.append(k)
-        return nearest[kept], points[kept], np.unique(vertices[known])
+        return _Added(nearest[kept], points[kept], np.ones(len(kept), bool)), np.unique(vertices[known])
+
+    def beside(self, mesh: Mesh, edges: Edges) -> tuple[_Added, NDArray[np.int64]]:
+        """Points of sharp edges and corners in place of inner vertices that are a little off them, and the
+        vertices that are at corners.
+        """
+        some = _bent(mesh, edges)
+        around = mesh.corners[stars(mesh.triangles, some)].mean(axis=2)
+        sides, sharp = self._sides(around)
+        sided = sharp[:, 0]
+        some, around, sides, sharp = some[sided], around[sided], sides[sided], sharp[sided]
+        here = mesh.vertices[some]
+        points, found = on_three(self.fit, around, self._voxel)
+        away = np.where(found, np.linalg.norm(points - here, axis=1), math.inf)
+        cornered = (away < SNAP * self._voxel) & self._on_surface(points)
+        away[~cornered] = math.inf
+        ends = here[:, None] + np.array([[-0.5], [0.5]]) * self._voxel * np.eye(3)[0]
+        for k, pair in enumerate(PAIRS):
+            feet, found = on_creases(self.fit, ends, sides[:, pair])
+            off = np.linalg.norm(feet - here, axis=1)
+            nearer = found & sharp[:, k] & ~cornered & (off < away) & self._on_surface(feet)
+            points[nearer], away[nearer] = feet[nearer], off[nearer]
+        near = away < SNAP * self._voxel
+        some, points, cornered, away = some[near], points[near], cornered[near], away[near]
+        order = np.lexsort((away, ~cornered))
+        order = order[_alone(mesh, some[order], points[order], 2 * APART * self._voxel)]
+        moves = order[away[order] > STILL * self._voxel]
+        still = cornered & (away <= STILL * self._voxel)
+        return _Added(~some[moves], points[moves], cornered[moves]), some[still]
+
+    def _sides(self, around: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """The three of some points each whose tangent planes differ most, [n, 3, 3], and which pairs do."""
+        normals = self.fit.planes(around.reshape(-1, 3))[:, :3].reshape(around.shape)
+        each = np.arange(len(around))
+        first = second = np.zeros(len(around), np.int64)
+        for _ in range(2):
+            first, second = (normals * normals[each, first][:, None]).sum(axis=2).argmin(axis=1), first
+        across = np.cross(normals[each, first], normals[each, second])
+        third = np.abs((normals * across[:, None]).sum(axis=2)).argmax(axis=1)
+        which = each[:, None], np.stack([first, second, third], axis=1)
+        own = normals[which]
+        sharp = [(own[:, a] * own[:, b]).sum(axis=1) < SHARP for a, b in PAIRS]
+        return around[which], np.stack(sharp, axis=1)
 
     def _on_surface(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether points are on the surface: planes also meet outside of what a third one cuts off."""
@@ -291,6 +399,12 @@ class _Sharpened:
         rest[:, 0] = 1
         return cls(old, mesh, parents, np.column_stack([mesh.normals / sizes, rest]))
 
+    def after(self, before: _Sharpened) -> _Sharpened:
+        """The same as a part of what `before` was made of; this one was made of that."""
+        kept = np.maximum(self.parents, 0)
+        parents = np.where(self.parents < 0, self.parents, before.parents[kept])
+        return replace(self, old=before.old, parents=parents)
+
     def measured_at(self, which: NDArray[np.int64], fit: Fit) -> _Sharpened:
         """The same with measures of some triangles."""
         measured = self.measured.copy()
@@ -305,11 +419,11 @@ class _Sharpened:
         parents = np.concatenate([np.maximum(self.parents[keep], -1), np.full(len(fans), FAN)])
         return _Sharpened(self.old, mesh, parents, np.concatenate([self.measured[keep], measured]))
 
-    def bad(self, voxel: float, least: float = UP) -> NDArray[np.int64]:
+    def bad(self, voxel: float, least: float = UP, thin: float = THIN) -> NDArray[np.int64]:
         """New triangles whose cosine with the surface is too small, or which are too thin."""
         new = np.flatnonzero(self.parents < 0)
-        thin = heights(self.mesh.corners[new]) < THIN * voxel
-        bad: NDArray[np.int64] = new[thin | (self.measured[new, UPRIGHT] < least)]
+        flat = heights(self.mesh.corners[new]) < thin * voxel
+        bad: NDArray[np.int64] = new[flat | (self.measured[new, UPRIGHT] < least)]
         return bad
 
     def new_vertices(self) -> NDArray[np.float64]:
@@ -365,9 +479,9 @@ class _Sharpened:
 
 @dataclass(frozen=True, eq=False)
 class _Cornered:
-    """A part of a surface with some corners."""
+    """A part of a surface with some added points."""
 
-    corners: NDArray[np.int64]  # numbers of the corners, the first vertices that were added
+    added: NDArray[np.int64]  # their numbers; they are the first new vertices
     mesh: Mesh  # the part
     parents: NDArray[np.int64]  # triangle that each one was; -1 for new ones
     edges: Edges  # its edges
@@ -378,32 +492,36 @@ class _Sharpening:
     """Attempts to add points of sharp edges to a part of a surface."""
 
     def __init__(self, planned: Plan, mesh: Mesh, tips: NDArray[np.float64], work: Work) -> None:
-        self._mesh, self._voxel, self._work, self._missed = mesh, planned.voxel, work, _Missed(planned, work)
+        self._planned, self._mesh, self._tips, self._work = planned, mesh, tips, work
+        self._voxel, self._missed = planned.voxel, _Missed(planned, work)
         self._fit, self._fixed = self._missed.fit, np.isin(rows(mesh.vertices), rows(tips))
 
-    def made(self) -> _Sharpened | None:
-        """The part with as many of the points as there can be; None for none."""
+    def made(self, rough: float = ROUGH) -> _Sharpened | None:
+        """The part with as many of the points as there can be; None for none, or for a rough surface."""
         mesh = self._mesh
         edges = edges_of(mesh.triangles)
         sided = np.zeros(len(edges.ends), bool)
         sided[self._missed.of(mesh, edges).edges] = True
-        hosts, corners, there = self._missed.corners(mesh, np.flatnonzero(sided[edges.sides].any(axis=1)))
-        self._fixed[there] = True
+        corners, there = self._missed.corners(mesh, np.flatnonzero(sided[edges.sides].any(axis=1)))
+        beside, still = self._missed.beside(mesh, edges)
+        added = beside.joined(corners, GAP * self._voxel)
+        self._fixed[there] = self._fixed[still] = True
         banned, reach, given = np.empty((0, 3)), NEAR * self._voxel, None
-        stays, before = np.ones(len(corners), bool), math.inf
+        stays, before = np.ones(len(added.points), bool), math.inf
         for attempt in range(1, RETRIES + 1):
             self._work.check()
-            if given is None or not stays[given.corners].all():
-                given = self._given(hosts, corners, np.flatnonzero(stays))
+            if given is None or not stays[given.added].all():
+                given = self._given(added, np.flatnonzero(stays))
             splits = _away(given.missed.points, banned, reach)
             if not splits.any() and not stays.any():
                 return None
-            result, fixed = self._with(given, splits)
+            result, fixed = self._with(given, splits, added.cornered)
             wrong = self._wrong(result)
             if not len(wrong):
-                return self._patched(result, fixed)
+                made = self._patched(result, fixed)
+                return made if rough > ROUGH else self._again(made)
             fewer, before = len(wrong) < before, len(wrong)
-            if before >= ROUGH * len(result.new_vertices()):
+            if before >= rough * len(result.new_vertices()):
                 return None
             if attempt == RETRIES or (attempt == FEWER and len(given.missed.edges) > MANY):
                 break
@@ -416,8 +534,13 @@ class _Sharpening:
                 continue
             banned = np.concatenate([banned, spots])
             reach *= GROWTH
-            stays = _away(corners, banned, reach)
+            stays = _away(added.points, banned, reach)
         return self._sound(result, wrong, fixed)
+
+    def _again(self, before: _Sharpened) -> _Sharpened:
+        """The part once more: fans leave some vertices beside sharp edges."""
+        made = _Sharpening(self._planned, before.mesh, self._tips, self._work).made(math.inf)
+        return before if made is None else made.after(before)
 
     def _sound(
         self, state: _Sharpened, wrong: NDArray[np.int64], fixed: NDArray[np.bool_]
@@ -431,18 +554,20 @@ class _Sharpening:
             wrong = self._wrong(state)
         return self._patched(state, fixed)
 
-    def _given(
-        self, hosts: NDArray[np.int64], corners: NDArray[np.float64], which: NDArray[np.int64]
-    ) -> _Cornered:
-        """The part with some corners, which split their triangles, and the points that it lacks."""
-        old, count = self._mesh, len(self._mesh.triangles)
-        number = (len(old.vertices) + np.arange(len(which))).astype(np.int32)
-        a, b, c = old.triangles[hosts[which]].T
-        new = [np.stack([p, q, number], axis=1) for p, q in ((a, b), (b, c), (c, a))]
-        keep = np.setdiff1d(np.arange(count), hosts[which])
-        triangles = np.concatenate([old.triangles[keep], *new])
-        mesh = Mesh(np.concatenate([old.vertices, corners[which]]), triangles)
-        parents = np.concatenate([keep, np.full(len(triangles) - len(keep), -1)])
+    def _given(self, added: _Added, which: NDArray[np.int64]) -> _Cornered:
+        """The part with some added points, and the points that it lacks."""
+        old, hosts = self._mesh, added.hosts[which]
+        number, splits = (len(old.vertices) + np.arange(len(which))).astype(np.int32), hosts >= 0
+        place = np.arange(len(old.vertices), dtype=np.int32)
+        place[~hosts[~splits]] = number[~splits]
+        placed = place[old.triangles]
+        a, b, c = placed[hosts[splits]].T
+        new = [np.stack([p, q, number[splits]], axis=1) for p, q in ((a, b), (b, c), (c, a))]
+        keep = np.setdiff1d(np.arange(len(placed)), hosts[splits])
+        triangles = np.concatenate([placed[keep], *new])
+        mesh = Mesh(np.concatenate([old.vertices, added.points[which]]), triangles)
+        same = (placed[keep] == old.triangles[keep]).all(axis=1)
+        parents = np.concatenate([np.where(same, keep, -1), np.full(len(triangles) - len(keep), -1)])
         edges = edges_of(triangles)
         missed = self._missed.of(mesh, edges)
         inner = np.bincount(edges.sides.ravel(), minlength=len(edges.ends))[missed.edges] == 2
@@ -454,7 +579,9 @@ class _Sharpening:
         away = Nearest(given.mesh).points(given.missed.points, self._work.threads)
         return away < REACHED * self._voxel
 
-    def _with(self, given: _Cornered, splits: NDArray[np.bool_]) -> tuple[_Sharpened, NDArray[np.bool_]]:
+    def _with(
+        self, given: _Cornered, splits: NDArray[np.bool_], cornered: NDArray[np.bool_]
+    ) -> tuple[_Sharpened, NDArray[np.bool_]]:
         """The part with corners and some of the points of sharp edges, and which vertices are corners."""
         mesh, edges, points = given.mesh, given.edges, given.missed.points[splits]
         split = np.zeros(len(edges.ends), bool)
@@ -462,12 +589,13 @@ class _Sharpening:
         whole = ~split[edges.sides].any(axis=1)
         mesh, origin = split_edges(mesh, edges.sides, split, points)
         parents = np.where(whole, given.parents, -1)[origin]
+        fixed = np.zeros(len(mesh.vertices), bool)
+        fixed[: len(self._fixed)] = self._fixed
+        fixed[len(self._fixed) : len(self._fixed) + len(given.added)] = cornered[given.added]
         state = _Sharpened.plain(self._mesh, mesh, parents).measured_at(
             np.flatnonzero(parents < 0), self._fit
         )
-        fixed = np.zeros(len(mesh.vertices), bool)
-        fixed[: len(self._fixed)] = self._fixed
-        fixed[len(self._fixed) + np.arange(len(given.corners))] = True
+        state = self._contracted(state, fixed)
         bad = state.bad(self._voxel)
         for _ in range(TURNS):
             self._work.check()
@@ -479,13 +607,25 @@ class _Sharpening:
             state, bad = following, np.intersect1d(following.bad(self._voxel), near)
         return state, fixed
 
+    def _contracted(self, state: _Sharpened, fixed: NDArray[np.bool_]) -> _Sharpened:
+        """The part without the very short edges of bad triangles."""
+        edges, short = edges_of(state.mesh.triangles), SHORT * self._voxel
+        some = np.unique(edges.sides[state.bad(self._voxel)])
+        lengths = np.linalg.norm(np.diff(state.mesh.vertices[edges.ends[some]], axis=1)[:, 0], axis=1)
+        ends = edges.ends[some[lengths < short]]
+        left, triangles = contracted(state.mesh, ends, fixed, short)
+        changed = (triangles != state.mesh.triangles[left]).any(axis=1)
+        parents = np.where(changed, -1, state.parents[left])
+        mesh, measured = Mesh(state.mesh.vertices, triangles), state.measured[left]
+        return _Sharpened(state.old, mesh, parents, measured).measured_at(np.flatnonzero(changed), self._fit)
+
     def _wrong(self, state: _Sharpened) -> NDArray[np.int64]:
         """New triangles that are turned over or too thin, or intersect others after quantisation."""
         mesh = state.mesh
         as_written = quantise(mesh, used_vertices(mesh), threads=self._work.threads).mesh
         new = state.parents < 0
         crossing = self_intersecting_triangles(as_written, threads=self._work.threads, among=new)
-        bad = state.bad(self._voxel, 0.0)
+        bad = state.bad(self._voxel, 0.0, 2 * APART)
         return np.union1d(bad[~self._across(state, bad)], np.flatnonzero(crossing))
 
     def _across(self, state: _Sharpened, some: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -674,6 +814,30 @@ def _loop(triangles: list[list[int]], rim: list[tuple[int, int]]) -> list[int] |
     vertices, count = {*chain(*triangles)}, len(triangles)
     euler = len(vertices) - (3 * count + len(rim)) // 2 + count
     return loop[:-1] if loop[-1] == loop[0] and not following and euler == 1 else None
+
+
+def _bent(mesh: Mesh, edges: Edges) -> NDArray[np.int64]:
+    """Vertices at which triangles face differently, but for those on the rim of a part."""
+    flat = mesh.normals / np.maximum(np.linalg.norm(mesh.normals, axis=1, keepdims=True), 1e-300)
+    one, other = edges.beside.T
+    bent = edges.sides.ravel()[edges.pairs[:, 0]][(flat[one] * flat[other]).sum(axis=1) < BENT]
+    rim = np.bincount(edges.sides.ravel(), minlength=len(edges.ends)) == 1
+    return uncrowded(mesh.triangles, np.setdiff1d(edges.ends[bent], edges.ends[rim]))
+
+
+def _alone(
+    mesh: Mesh, some: NDArray[np.int64], points: NDArray[np.float64], least: float
+) -> NDArray[np.int64]:
+    """Numbers of the vertices that come to lie apart from the others; the first ones have precedence."""
+    from scipy.spatial import cKDTree
+
+    used = np.unique(mesh.triangles)
+    rank = np.full(len(mesh.vertices), -1)
+    rank[some] = np.arange(len(some))
+    placed = mesh.vertices.copy()
+    placed[some] = points
+    pairs = rank[used[cKDTree(placed[used]).query_pairs(least, output_type="ndarray")]]
+    return np.setdiff1d(np.arange(len(some)), pairs.max(axis=1, initial=-1))
 
 
 def _rings(mesh: Mesh, some: NDArray[np.int64]) -> NDArray[np.int64]:

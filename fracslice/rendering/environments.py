@@ -16,13 +16,13 @@ from typing import BinaryIO
 import numpy as np
 
 from ..common.arrays import to_linear
-from ..common.files import open_regular
+from ..common.files import open_picture, open_regular, require_pixels
 from ..errors import SceneError
 
 _SIZE = re.compile(rb"-Y (\d{1,6}) \+X (\d{1,6})")
 FORMATS = "a .hdr, .exr, .png, .jpg or .webp file"
-LARGEST, BAND = 1 << 26, 1 << 20
-"""Most pixels of a file, and pixels that are in memory as light at once."""
+BAND = 1 << 20
+"""Pixels that are in memory as light at once."""
 
 Rows = tuple[int, int, Callable[[int, int], np.ndarray]]
 """Height and width of a picture, and a function of its rows from one to another, called in their order:
@@ -74,8 +74,7 @@ def _load_image(path: str, most: int, _: tuple[int, int]) -> LinearImage:
     with open_regular(path) as file, warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of Pillow: what is wrong is an error here
         height, width, rows = kinds.get(Path(path).suffix.lower(), _display_picture)(file)
-        if not 0 < height * width <= LARGEST:
-            raise ValueError(f"{width} x {height} pixels: expected at most {LARGEST} of them")
+        require_pixels(width, height)
         times = _halvings(height, width, most)
         step = max(BAND // width >> times, 1) << times
         bands = [_shrunk(rows(y, min(y + step, height)), times) for y in range(0, height, step)]
@@ -111,13 +110,8 @@ def _halve(light: np.ndarray) -> np.ndarray:
 
 def _display_picture(file: BinaryIO) -> Rows:
     """Picture for screens, by Pillow."""
-    from PIL import Image
-
     levels = to_linear(np.arange(256, dtype=np.float32) / np.float32(255))
-    try:
-        image = Image.open(file, formats=("PNG", "JPEG", "WEBP"))
-    except Image.DecompressionBombError:  # its words are of an attack
-        raise ValueError(f"too many pixels: expected at most {LARGEST} of them") from None
+    image = open_picture(file, ("PNG", "JPEG", "WEBP"))
     width, height = image.size
     return height, width, lambda y, end: levels[np.asarray(image.crop((0, y, width, end)).convert("RGB"))]
 

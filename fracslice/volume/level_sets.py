@@ -366,8 +366,13 @@ def solid_grid(planned: Plan, scale: float, kind: Kind, work: Work | None = None
     bricks = sample_scene(planned, work)
     x, y, z = (scale * c for c in bricks.origin)
     placed = replace(bricks, origin=(x, y, z), voxel=scale * bricks.voxel)
+    return grid_of(placed, kind)
+
+
+def grid_of(bricks: Bricks, kind: Kind = "surface") -> Grid:
+    """Grid of samples, named for its kind: distances in a narrow band, or densities from 0 to 1."""
     try:
-        grid = to_grid(placed).narrow_band()
+        grid = to_grid(bricks).narrow_band()
         grid = grid.fog() if kind == "density" else grid
     except ValueError as error:
         raise VolumeError(f"the grid of the samples {error}") from None

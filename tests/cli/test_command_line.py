@@ -109,17 +109,26 @@ def test_a_shipped_scene_is_known_by_its_name(tmp_path, capfd):
     assert (tmp_path / "m.ply").exists()
 
 
-def test_a_vdb_file_holds_the_samples_in_mm(ball, tmp_path):
+def test_a_vdb_file_holds_distances_in_mm(ball, tmp_path):
     report = tmp_path / "b.json"
     assert (
         fracslice("mesh", ball, "-o", tmp_path / "b.vdb", "--resolution", 24, "-q", "--report", report) == 0
     )
     bricks = read_vdb(tmp_path / "b.vdb")
     assert bricks.voxel == pytest.approx(json.loads(report.read_text())["voxel_mm"])
-    row = int(np.argmin(bricks.values.min(axis=1)))
-    x, y, z = bricks.origin + bricks.voxel * bricks.ijk[row]
-    distance = np.linalg.norm([x, y, z - 10]) - 10
-    assert bricks.values[row, 0] == pytest.approx(distance, abs=0.1)
+    x, y, z = (
+        bricks.origin + bricks.voxel * (bricks.ijk[:, None] + np.indices((8, 8, 8)).reshape(3, -1).T)
+    ).T
+    distance, band = np.sqrt(x**2 + y**2 + (z - 10) ** 2).T - 10, 3 * bricks.voxel
+    assert abs(bricks.values - distance.clip(-band, band)).max() < 0.15 * bricks.voxel
+
+
+def test_a_vdb_file_of_a_fractal_holds_distances_too(tmp_path):
+    """It held the field's values, which are up to 5 times as steep."""
+    assert fracslice("mesh", "mandelbulb", "-o", tmp_path / "b.vdb", "--resolution", 48, "-q") == 0
+    grid = read_vdb(tmp_path / "b.vdb")
+    slopes = abs(np.diff(grid.values.reshape(-1, 8, 8, 8), axis=3)) / grid.voxel
+    assert abs(grid.values).max() == pytest.approx(3 * grid.voxel) and slopes.max() < 3
 
 
 def test_a_file_of_that_name_goes_before_a_shipped_scene(ball, tmp_path, monkeypatch):

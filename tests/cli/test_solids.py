@@ -75,3 +75,9 @@ def test_the_example_is_a_scene_of_its_model() -> None:
     assert [node["place"] for node in root.walk() if node.formula.name == "model"] == ["bed", "bed"]
     assert root.bounds.box.size[2] == pytest.approx(80, abs=0.1)
     assert (root.distance([(-5, 5, 0.6), (-5, 5, -1), (0, -20, 40)]) < 0).tolist() == [True, False, False]
+
+
+def test_the_geode_is_half_of_a_stone_without_its_fractal() -> None:
+    root = read(Path(__file__).parents[2] / "examples" / "stone.xml").root
+    points = [(0, 0, 1), (0, 0, -8), (20, 0, 0), (0, 0, -13), (0, 0, -17)]
+    assert (root.distance(points) < 0).tolist() == [False, False, True, True, False]

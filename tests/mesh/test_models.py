@@ -23,6 +23,7 @@ from fracslice.fields.devices import enclosure, for_field, reference
 from fracslice.fields.linker import link
 from fracslice.formulas import Node, box, model, shell, sphere, transform, twist, union
 from fracslice.mesh import Mesh, models
+from fracslice.mesh.model import Nearest
 from fracslice.scene import read, reads, to_xml
 from tests.examples import BRACKET
 
@@ -352,3 +353,19 @@ def test_far_away_a_model_is_a_point() -> None:
     for far in (1e3, 1e6, 1e9, 1e13, 1e22, 1e31):
         values = solid.native.distances(np.full((4, 3), far))
         np.testing.assert_allclose(values, 3**0.5 * far, rtol=0.01 if far < 1e6 else 1e-5)
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_a_turned_cube_is_the_same_cube(seed: int) -> None:
+    """Edges were off by 9e-3 mm, as vertices within 0.04 voxels of them stayed where they were."""
+    turn = trimesh.transformations.random_rotation_matrix(np.random.default_rng(seed).random(3))
+    cube = trimesh.creation.box((10, 10, 10)).apply_transform(turn)
+    made = make_mesh(from_trimesh(cube), resolution=30)
+    mesh = Mesh(made.vertices - made.vertices.min(0) + cube.vertices.min(0), made.triangles)
+    own = mesh.vertices @ turn[:3, :3]
+    off = abs(abs(own).max(1) - 5)
+    assert off.max() < 1e-4 and (off > 2e-6).sum() <= 4  # float32, but for corners of samples in a side
+    ends = cube.vertices[cube.edges_unique[cube.edges_unique_length < 10.1]]
+    on = np.linspace(ends[:, 0], ends[:, 1], 300).reshape(-1, 3)
+    assert len(ends) == 12 and Nearest(mesh).points(on).max() < 2e-6
+    assert made.report.problems == () and made.volume == pytest.approx(1000, rel=1e-6)

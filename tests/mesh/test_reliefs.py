@@ -150,7 +150,8 @@ def huge(path: Path) -> str:
     """Header of a picture of 10^9 pixels."""
     chunk = b"IHDR" + struct.pack(">IIBBBBB", 31623, 31623, 8, 0, 0, 0, 0)
     data = struct.pack(">I", 13) + chunk + struct.pack(">I", zlib.crc32(chunk))
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + data)
+    pixels = struct.pack(">I", 0) + b"IDAT" + struct.pack(">I", zlib.crc32(b"IDAT"))
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + data + pixels)
     return str(path)
 
 
@@ -160,7 +161,7 @@ def test_pictures_are_refused_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "words.png").write_text("no picture")
     (tmp_path / "empty.png").touch()
     cases = {
-        huge(tmp_path / "huge.png"): "expected",
+        huge(tmp_path / "huge.png"): "too many pixels: expected at most 67108864 of them",
         str(tmp_path / "half.png"): "not a picture",
         str(tmp_path / "words.png"): "not a picture",
         str(tmp_path / "empty.png"): "not a picture",
