@@ -78,6 +78,7 @@ from fracslice.formulas import (
     split_p,
     struts,
     superquadric,
+    sweep,
     tetrabrot,
     text,
     thread,
@@ -173,6 +174,7 @@ EXAMPLES: dict[str, Node] = {
     "extrude": extrude(WASHER, size=1.4, height=0.6),
     "text": text("o8", FONT, depth=0.4),
     "revolve": revolve(WASHER, size=0.6, offset=0.4),
+    "sweep": sweep(WASHER, size=0.4, points="-0.7 -0.6 0, 0.7 -0.5 0.1, 0.2 0.7 0", closed="yes"),
     "heightmap": heightmap(HILLS, size=1.5, height=0.4, base=0.1),
     "lithophane": lithophane(HILLS, thinnest=0.1, thickest=0.3),
     "lithophane wall": lithophane(HILLS, form="cylinder", thinnest=0.1, thickest=0.3, degrees=200),
@@ -253,7 +255,7 @@ EXAMPLES: dict[str, Node] = {
 }
 
 OF_FILES = {
-    "model", "extrude", "revolve", "text", "volume", "heightmap", "lithophane", "lithophane wall",
+    "model", "extrude", "revolve", "sweep", "text", "volume", "heightmap", "lithophane", "lithophane wall",
     "lithophane ball", "relief",
 }  # fmt: skip
 """Examples that native code computes, on the CPU alone; each is of a file."""
@@ -274,7 +276,7 @@ REPRESENTATIVES = {
     "lambda bulb", "lithophane wall", "mandelbox -1.5", "mandelbulb", "mandelbulb 7.5", "many", "material",
     "menger", "mirror", "model", "octahedron flake", "perlin noise", "prism", "pseudo kleinian",
     "quaternion julia 4", "repeat overlapping", "revolve", "rounded box", "schwarz_d wall", "shell",
-    "smooth intersection", "smooth union", "snowflake", "sphere", "superquadric", "text", "thread",
+    "smooth intersection", "smooth union", "snowflake", "sphere", "superquadric", "sweep", "text", "thread",
     "transform", "tree", "twist x", "volume",
 }  # fmt: skip
 """Examples of which none is built like another; tests that are stamped on all have the others in a night."""

@@ -1339,6 +1339,40 @@ def superquadric(size: Sequence[float] = (1.0, 1.0, 1.0), exponent: float = 4.0)
     Node
     """
 
+def sweep(file: str, size: float | None = None, anchor: Literal['centre', 'origin'] = 'centre', path: str | None = None, length: float | None = None, place: Literal['centre', 'as is'] = 'centre', points: str | Sequence[Sequence[float]] | None = None, closed: Literal['no', 'yes'] = 'no', sha256: str | None = None, path_sha256: str | None = None) -> Node:
+    """What an SVG file fills, swept along a path: seen along the path, its x is to the right, and its y up,
+    towards z where the path starts (Wang, Juettler, Zheng and Liu 2008, "Computation of Rotation Minimizing
+    Frames"). Corners are mitred. L = 1: an exact distance, but for curves, which are segments within 1/20000
+    of the longest side of the outline, or of the path. Where a path meets itself, parts are united.
+
+    Parameters
+    ----------
+    file : the name of a file
+        an SVG file, in the folder of the scene
+    size : a number > 0
+        the longest side of the outline; without it, a scene unit is a millimetre
+    anchor : centre or origin, default 'centre'
+        the point of the outline that is on the path: the centre of its box, or the origin of its file
+    path : the name of a file
+        an SVG file whose lines are the path, in the folder of the scene
+    length : a number > 0
+        longest side of that path; without it, a scene unit is a millimetre
+    place : centre or as is, default 'centre'
+        that path centred at the origin, or where its file has it, y up
+    points : points such as 0 0 0, 5 0 0, 5 5 2
+        corners of the path, in place of a file
+    closed : no or yes, default 'no'
+        whether points are joined to a ring
+    sha256 : the SHA-256 of the file, 64 hexadecimal digits
+        hash of the file, by which a file that has changed is noticed
+    path_sha256 : the SHA-256 of the file, 64 hexadecimal digits
+        hash of the file of the path, in the same way
+
+    Returns
+    -------
+    Node
+    """
+
 def tetrabrot(iterations: Union[int, Literal['auto']] = 'auto') -> Node:
     """The Tetrabrot (Rochon 2000, "A generalized Mandelbrot set for bicomplex numbers").
 

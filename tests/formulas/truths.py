@@ -234,6 +234,12 @@ TRUTHS: dict[str, list[Truth]] = {
     ],
     "relief": [Equal(EXAMPLES["relief"], raised, sign=True)],
     "revolve": [Volume(EXAMPLES["revolve"], 2 * pi * 0.7 * 0.6**2 * (1 - 0.5 / 4))],
+    "sweep": [
+        Equal(
+            f.sweep(WASHER["file"], size=1.4, points="0 0 -0.3, 0 0 0.3"),
+            f.extrude(WASHER["file"], size=1.4, height=0.6),
+        )
+    ],
     "text": [Equal(EXAMPLES["text"].changed(size=2, depth=0.8), f.transform(EXAMPLES["text"], scale=2))],
     "extrude": [Volume(WASHER, 1.4**2 * (1 - 0.5 / 4) * 0.6), Equal(WASHER, HOLED, sign=True)],
     "volume": [Equal(EXAMPLES["volume"], L_SHAPE, sign=True)],

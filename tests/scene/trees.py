@@ -17,6 +17,7 @@ from fracslice.common.parameters import (
     File,
     Label,
     Number,
+    Points,
     Vector,
 )
 from fracslice.errors import SceneError
@@ -66,6 +67,7 @@ _POSSIBLE: dict[type, Any] = {
     File: lambda kind: st.sampled_from((BRACKET, GRID, HILLS)) if kind.inside else st.none(),
     Digest: lambda kind: st.none(),
     Label: lambda kind: st.sampled_from(("LUMEN", "surface", "<&lt;", "e\u0301")),
+    Points: lambda kind: st.just(((0.0, 0.0, 0.0), (1.0, 0.5, 0.0))),
     Axis: lambda kind: st.sampled_from("xyz"),
 }
 
