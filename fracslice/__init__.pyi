@@ -12,6 +12,7 @@ from .formulas import Node as Node
 from .formulas import abox as abox
 from .formulas import amazing_surf as amazing_surf
 from .formulas import apollonian as apollonian
+from .formulas import beams as beams
 from .formulas import bend as bend
 from .formulas import benesi as benesi
 from .formulas import bounds as bounds
@@ -65,6 +66,7 @@ from .formulas import quaternion_power as quaternion_power
 from .formulas import relief as relief
 from .formulas import repeat as repeat
 from .formulas import revolve as revolve
+from .formulas import scaffold as scaffold
 from .formulas import schwarz_d as schwarz_d
 from .formulas import schwarz_p as schwarz_p
 from .formulas import shell as shell

@@ -18,6 +18,7 @@ from fracslice.formulas import (
     abox,
     amazing_surf,
     apollonian,
+    beams,
     bend,
     benesi,
     bounds,
@@ -71,6 +72,7 @@ from fracslice.formulas import (
     relief,
     repeat,
     revolve,
+    scaffold,
     schwarz_d,
     schwarz_p,
     shell,
@@ -118,6 +120,8 @@ GRID = str(Path(__file__).parent / "models" / "bracket.vdb")
 """The same, not turned, as distances at samples 0.1 apart, on its faces and between."""
 WASHER = str(Path(__file__).parent / "models" / "washer.svg")
 """A square of 2 mm with a hole of a diamond of 0.5 square mm, in the middle."""
+TRUSS = str(Path(__file__).parent / "models" / "truss.csv")
+"""Six beams of a tetrahedron, and a ball."""
 HILLS = str(Path(__file__).parent / "models" / "hills.png")
 """A picture of 16 x 9 pixels of 8 bits."""
 
@@ -175,6 +179,11 @@ EXAMPLES: dict[str, Node] = {
     "text": text("o8", FONT, depth=0.4),
     "revolve": revolve(WASHER, size=0.6, offset=0.4),
     "sweep": sweep(WASHER, size=0.4, points="-0.7 -0.6 0, 0.7 -0.5 0.1, 0.2 0.7 0", closed="yes"),
+    "beams": beams(TRUSS, thickness=0.15, smooth=0.2),
+    "scaffold": scaffold(box(size=(1.2, 0.9, 1.0)), count=12, thickness=0.2),
+    "scaffold on a surface": scaffold(
+        sphere(0.8), of="delaunay", where="surface", count=12, thickness=0.2, smooth=0.1
+    ),
     "heightmap": heightmap(HILLS, size=1.5, height=0.4, base=0.1),
     "lithophane": lithophane(HILLS, thinnest=0.1, thickest=0.3),
     "lithophane wall": lithophane(HILLS, form="cylinder", thinnest=0.1, thickest=0.3, degrees=200),
@@ -255,10 +264,11 @@ EXAMPLES: dict[str, Node] = {
 }
 
 OF_FILES = {
+    "beams", "scaffold", "scaffold on a surface",
     "model", "extrude", "revolve", "sweep", "text", "volume", "heightmap", "lithophane", "lithophane wall",
     "lithophane ball", "relief",
 }  # fmt: skip
-"""Examples that native code computes, on the CPU alone; each is of a file."""
+"""Examples that native code computes, on the CPU alone; each shape is of a file."""
 
 _TURNED = "return scale * turn(fold(w, 1), (0, 0, 1), 20) + c"
 _EGG = "return sqrt(x**2 + y**2 + (flat * z)**2) - 1"
@@ -269,6 +279,7 @@ DEFINED = {
 """Formulas as a scene defines them; they are not registered."""
 
 REPRESENTATIVES = {
+    "beams", "scaffold",
     "a distance", "a step", "abox", "apollonian", "bend", "bounds", "bristorbrot julia", "burning ship",
     "cone", "cosine bulb", "deep", "difference", "extrude", "foam of walls", "gear", "gyroid wall",
     "heightmap", "honeycomb",

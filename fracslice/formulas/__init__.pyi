@@ -102,6 +102,33 @@ def apollonian(level: int = 4, swell: float = 1.02) -> Node:
     Node
     """
 
+def beams(file: str, thickness: float = 0.1, smooth: float = 0.0, size: float | None = None, place: Literal['as is', 'centre', 'bed'] = 'as is', units: Literal['um', 'µm', 'mm', 'cm', 'in', 'm'] = 'mm', sha256: str | None = None) -> Node:
+    """Beams between points, round and with round ends, as a file has them. L = 1: an exact distance outside,
+    and inside of what is in one beam alone. With seams, f is that for which max(0, f + smooth - d)^2, summed
+    over the distances d of all beams, is smooth^2; they fill less than `smooth`.
+
+    Parameters
+    ----------
+    file : the name of a file
+        a graph, in the folder of the scene: .csv, .json, lines of .obj or edges of .ply
+    thickness : a number > 0, default 0.1
+        diameter of beams whose radius the file does not state
+    smooth : a number >= 0, default 0.0
+        width of rounded seams: where distances of beams differ by less than this they are blended (0: none)
+    size : a number > 0
+        longest side of the box of all ends; without it, a scene unit is a millimetre
+    place : as is, centre or bed, default 'as is'
+        where the file has it, with the box of all ends centred at the origin, or there from z = 0
+    units : um, µm, mm, cm, in or m, default 'mm'
+        unit of the file
+    sha256 : the SHA-256 of the file, 64 hexadecimal digits
+        hash of the file, by which a file that has changed is noticed
+
+    Returns
+    -------
+    Node
+    """
+
 def bend(*elements: Node, degrees: float, axis: Literal['x', 'y', 'z'] = 'z') -> Node:
     """The element bent: a straight axis becomes an arc (Barr 1984, "Global and Local Deformations of Solid
     Primitives").
@@ -1204,6 +1231,33 @@ def revolve(file: str, size: float | None = None, offset: float = 0.0, place: Li
         centred at the origin, or from z = 0
     sha256 : the SHA-256 of the file, 64 hexadecimal digits
         hash of the file, by which a file that has changed is noticed
+
+    Returns
+    -------
+    Node
+    """
+
+def scaffold(*elements: Node, of: Literal['voronoi', 'delaunay'] = 'voronoi', where: Literal['inside', 'surface'] = 'inside', count: int = 100, thickness: float = 0.1, smooth: float = 0.0, seed: int = 0) -> Node:
+    """Beams along the edges of Voronoi 1908 cells or of Delaunay 1934 tetrahedra of points that are spread
+    evenly in the element, or on its surface (Edelsbrunner and Shah 1997, "Triangulating topological spaces"),
+    which they follow. L = maximum of 1 and the element's; on the surface, 1.
+
+    Parameters
+    ----------
+    *elements : Node
+        What it is applied to; several are a union.
+    of : voronoi or delaunay, default 'voronoi'
+        edges of the cells of what is nearest to each point, or lines from points to their neighbours
+    where : inside or surface, default 'inside'
+        points in the element, whose beams end at its surface, or on it
+    count : a whole number from 5 to 20000, default 100
+        number of points
+    thickness : a number > 0, default 0.1
+        diameter of the beams
+    smooth : a number >= 0, default 0.0
+        width of rounded seams: where distances of beams differ by less than this they are blended (0: none)
+    seed : a whole number from 0 to 2147483647, default 0
+        number that chooses another arrangement
 
     Returns
     -------

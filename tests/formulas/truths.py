@@ -224,6 +224,19 @@ def raised(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 
 TRUTHS: dict[str, list[Truth]] = {
+    "beams": [
+        Equal(
+            EXAMPLES["beams"].changed(smooth=0, size=3, thickness=0.45 / 1.4),
+            f.transform(EXAMPLES["beams"].changed(smooth=0), scale=3 / 1.4),
+            sign=True,
+        )
+    ],
+    "scaffold": [
+        Equal(
+            EXAMPLES["scaffold"],
+            f.intersection(EXAMPLES["scaffold"], EXAMPLES["scaffold"].children[0]),
+        )
+    ],
     "heightmap": [plate(EXAMPLES["heightmap"], 0.1, 0.5)],
     "lithophane": [plate(EXAMPLES["lithophane"], 0.3, 0.1)],
     "infill": [

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace fracslice::mesh {
 namespace {
@@ -12,8 +13,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-Beams::Beams(std::span<const double> balls, double seam) : seam_(seam), entry_(entry_of(this)) {
-    for (size_t i = 0; i < balls.size(); i += 8) beams_.push_back(beam_of(&balls[i]));
+Beams::Beams(std::span<const double> balls, std::span<const int32_t> chains, double seam) : seam_(seam), entry_(entry_of(this)) {
+    for (size_t i = 0; i < chains.size(); ++i) beams_.push_back(beam_of(&balls[8 * i])), beams_[i].chain = chains[i];
     while (leaves_ * kBeams < beams_.size()) leaves_ *= 2;
     boxes_.resize(2 * leaves_), first_.assign(leaves_ + 1, beams_.size());
     halve(1, beams_);
@@ -33,7 +34,7 @@ Beams::Beam Beams::beam_of(const double* balls) {
     beam.length = std::sqrt(square), beam.radius = one[3];
     if (std::abs(other[3] - one[3]) >= beam.length) {  // the larger ball holds the other one
         const double* larger = one[3] >= other[3] ? one : other;
-        std::copy_n(larger, 3, beam.from);
+        std::copy_n(larger, 3, beam.from), std::fill_n(beam.axis, 3, 0.0);
         beam.length = 0, beam.radius = larger[3];
         return beam;
     }
@@ -118,17 +119,23 @@ double Beams::operator()(const double* p, size_t& found) const {
 }
 
 double Beams::blended(const double* p, double nearest) const {
-    thread_local std::vector<double> near;
+    struct Near {
+        int32_t chain;
+        double begin;  // f from which on it has a part
+    };
+    thread_local std::vector<Near> near;
     near.clear();
     const double limit = nearest + seam_;
     search(p, limit, false, [&](size_t i) {
-        if (const double distance = to_beam(p, i); distance < limit) near.push_back(distance - seam_);
+        if (const double distance = to_beam(p, i); distance < limit) near.push_back({beams_[i].chain, distance - seam_});
     });
+    std::sort(near.begin(), near.end(), [](const Near& a, const Near& b) { return std::pair(a.chain, a.begin) < std::pair(b.chain, b.begin); });
+    near.erase(std::unique(near.begin(), near.end(), [](const Near& a, const Near& b) { return a.chain == b.chain; }), near.end());
     // The sum is convex and grows with f: Newton's steps from the right end where it no longer shrinks.
     for (double f = nearest, before = kInfinity; near.size() > 1;) {
         double sum = -seam_ * seam_, slope = 0;
-        for (double begin : near) {
-            const double part = std::max(0.0, f - begin);
+        for (const Near& one : near) {
+            const double part = std::max(0.0, f - one.begin);
             sum += part * part, slope += 2 * part;
         }
         before = f, f -= sum / slope;

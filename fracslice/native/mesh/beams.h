@@ -10,15 +10,16 @@ namespace fracslice::mesh {
 
 // Each beam is all balls between one at each of its ends, of radii that change evenly. The distance is the least of the exact
 // ones of all beams, which are found by a tree of boxes; with a seam it is the f of
-//     sum over beams of max(0, f + seam - distance)^2 = seam^2,
-// which is the distance of one beam where the others are farther off by the seam, is less where they are not, has a continuous
-// gradient, and a Lipschitz constant of 1, as its gradient is a weighted mean of theirs.
+//     sum over chains of max(0, f + seam - distance)^2 = seam^2,
+// which is the distance of one chain of beams where the others are farther off by the seam, is less where they are not, and has a
+// Lipschitz constant of 1, as its gradient is a weighted mean of theirs.
 class Beams {
   public:
     static constexpr size_t kAxes = 3;
 
-    // Balls [n, 2, 4] of at least one beam: the centre of each end and its radius.
-    Beams(std::span<const double> balls, double seam);
+    // Balls [n, 2, 4] of at least one beam, the centre of each end and its radius; and the chain of each beam, between which and
+    // others of its own there is no seam.
+    Beams(std::span<const double> balls, std::span<const int32_t> chains, double seam);
     Beams(const Beams&) = delete;
     Beams& operator=(const Beams&) = delete;
 
@@ -32,6 +33,7 @@ class Beams {
         double length, radius, slope;  // radius at the start, and by how much it shrinks along the axis
         double apart;  // by how much the nearest ball is nearer to the start than a point is, per distance from the axis
         double low[3], high[3];
+        int32_t chain;
     };
     struct Box {
         double low[3], high[3];

@@ -193,7 +193,9 @@ class BoundBeams {
   public:
     using Balls = nb::ndarray<const double, nb::shape<-1, 2, 4>, nb::c_contig, nb::device::cpu>;
 
-    BoundBeams(const Balls& balls, double seam) : beams_((require(balls.size() > 0, "expected at least one beam"), span_of(balls)), seam) {}
+    BoundBeams(const Balls& balls, const Vector<int32_t>& chains, double seam)
+        : beams_((require(balls.size() > 0 && balls.shape(0) == chains.size(), "expected at least one beam, each of a chain"), span_of(balls)),
+                 span_of(chains), seam) {}
 
     uintptr_t address() const { return reinterpret_cast<uintptr_t>(beams_.entry()); }
     nb::object distances(const Rows<double>& points) const { return distances_of(beams_, points); }
@@ -269,7 +271,7 @@ void bind_reduction(nb::module_& module) {
         .def("distances", &BoundSolids::distances, "points"_a)
         .def_prop_ro("address", &BoundSolids::address);
     nb::class_<BoundBeams>(module, "Beams")
-        .def(nb::init<const BoundBeams::Balls&, double>(), "balls"_a, "seam"_a)
+        .def(nb::init<const BoundBeams::Balls&, const Vector<int32_t>&, double>(), "balls"_a, "chains"_a, "seam"_a)
         .def("distances", &BoundBeams::distances, "points"_a)
         .def_prop_ro("address", &BoundBeams::address);
     nb::class_<BoundOutline>(module, "Outline")
