@@ -25,6 +25,7 @@ from .formulas import cone as cone
 from .formulas import cosine_bulb as cosine_bulb
 from .formulas import cylinder as cylinder
 from .formulas import difference as difference
+from .formulas import displace as displace
 from .formulas import extrude as extrude
 from .formulas import fischer_koch_s as fischer_koch_s
 from .formulas import flake as flake
@@ -76,6 +77,7 @@ from .formulas import struts as struts
 from .formulas import superquadric as superquadric
 from .formulas import tetrabrot as tetrabrot
 from .formulas import text as text
+from .formulas import thicken as thicken
 from .formulas import thread as thread
 from .formulas import torus as torus
 from .formulas import transform as transform

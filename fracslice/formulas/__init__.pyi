@@ -355,6 +355,24 @@ def difference(*elements: Node, smooth: float | str | Callable[..., Any] = 0.0) 
     Node
     """
 
+def displace(*elements: Node, by: float | str | Callable[..., Any]) -> Node:
+    """The element whose surface moves by an expression in x, y and z (Cook 1984, "Shade trees"). L = the
+    element's plus the bound of the expression's slope, or 1 if that is more. The result is clipped at the box
+    of the element, grown by the largest displacement there; the field of an escape-time fractal as by
+    `<offset>`.
+
+    Parameters
+    ----------
+    *elements : Node
+        What it is applied to; several are a union.
+    by : a number, or an expression such as 0.1+0.02*z
+        how far outward the surface moves at each point, in scene units; negative: inward
+
+    Returns
+    -------
+    Node
+    """
+
 def extrude(file: str, size: float | None = None, height: float = 1.0, place: Literal['centre', 'bed', 'as is'] = 'centre', sha256: str | None = None) -> Node:
     """What an SVG file fills, extruded along z (Quilez 2008, "Distance functions"). L = 1: an exact distance,
     but for curves, which are segments within 1/20000 of the longest side. Strokes, clipping and masks do not
@@ -391,7 +409,7 @@ def fischer_koch_s(period: float = 1.0, thickness: float | str | Callable[..., A
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
     volume_fraction : a number > 0 and < 1
-        share of space that is solid, within 0.2 % of it; the thickness follows
+        share of space that is solid, within 0.2 % of it; the thickness follows, or the period of a thickness
 
     Returns
     -------
@@ -430,7 +448,7 @@ def frd(period: float = 1.0, thickness: float | str | Callable[..., Any] = 0.1, 
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
     volume_fraction : a number > 0 and < 1
-        share of space that is solid, within 0.2 % of it; the thickness follows
+        share of space that is solid, within 0.2 % of it; the thickness follows, or the period of a thickness
 
     Returns
     -------
@@ -475,7 +493,7 @@ def gyroid(period: float = 1.0, thickness: float | str | Callable[..., Any] = 0.
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
     volume_fraction : a number > 0 and < 1
-        share of space that is solid, within 0.2 % of it; the thickness follows
+        share of space that is solid, within 0.2 % of it; the thickness follows, or the period of a thickness
 
     Returns
     -------
@@ -549,9 +567,10 @@ def honeycomb(kind: Literal['435', '534', '535', '353'] = '534', thickness: floa
     Node
     """
 
-def infill(*elements: Node, shell: float | str | Callable[..., Any]) -> Node:
+def infill(*elements: Node, shell: float | str | Callable[..., Any], denser: float = 0.0, within: float = 1.0) -> Node:
     """The first element, of which a wall stays whole, and behind it what the other elements fill, such as a
-    lattice. L = maximum of the elements'.
+    lattice. L = maximum of the elements'; with `denser`, the fillers' plus denser / 2 / within times that of
+    the first element.
 
     Parameters
     ----------
@@ -559,6 +578,10 @@ def infill(*elements: Node, shell: float | str | Callable[..., Any]) -> Node:
         What it is made of.
     shell : a number > 0, or an expression such as 0.1+0.02*z
         thickness of the wall that stays whole, in scene units
+    denser : a number, default 0.0
+        how much thicker what fills it is at the surface of the first element, by less deeper inside
+    within : a number > 0, default 1.0
+        depth from which on it is as thick as given
 
     Returns
     -------
@@ -593,7 +616,7 @@ def iwp(period: float = 1.0, thickness: float | str | Callable[..., Any] = 0.1, 
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
     volume_fraction : a number > 0 and < 1
-        share of space that is solid, within 0.2 % of it; the thickness follows
+        share of space that is solid, within 0.2 % of it; the thickness follows, or the period of a thickness
 
     Returns
     -------
@@ -784,7 +807,7 @@ def lidinoid(period: float = 1.0, thickness: float | str | Callable[..., Any] = 
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
     volume_fraction : a number > 0 and < 1
-        share of space that is solid, within 0.2 % of it; the thickness follows
+        share of space that is solid, within 0.2 % of it; the thickness follows, or the period of a thickness
 
     Returns
     -------
@@ -1004,7 +1027,7 @@ def neovius(period: float = 1.0, thickness: float | str | Callable[..., Any] = 0
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
     volume_fraction : a number > 0 and < 1
-        share of space that is solid, within 0.2 % of it; the thickness follows
+        share of space that is solid, within 0.2 % of it; the thickness follows, or the period of a thickness
 
     Returns
     -------
@@ -1277,7 +1300,7 @@ def schwarz_d(period: float = 1.0, thickness: float | str | Callable[..., Any] =
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
     volume_fraction : a number > 0 and < 1
-        share of space that is solid, within 0.2 % of it; the thickness follows
+        share of space that is solid, within 0.2 % of it; the thickness follows, or the period of a thickness
 
     Returns
     -------
@@ -1297,7 +1320,7 @@ def schwarz_p(period: float = 1.0, thickness: float | str | Callable[..., Any] =
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
     volume_fraction : a number > 0 and < 1
-        share of space that is solid, within 0.2 % of it; the thickness follows
+        share of space that is solid, within 0.2 % of it; the thickness follows, or the period of a thickness
 
     Returns
     -------
@@ -1345,7 +1368,7 @@ def split_p(period: float = 1.0, thickness: float | str | Callable[..., Any] = 0
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
     volume_fraction : a number > 0 and < 1
-        share of space that is solid, within 0.2 % of it; the thickness follows
+        share of space that is solid, within 0.2 % of it; the thickness follows, or the period of a thickness
 
     Returns
     -------
@@ -1368,7 +1391,7 @@ def struts(kind: Literal['cubic', 'bcc', 'fcc', 'octet', 'kelvin'] = 'octet', pe
     thickness : a number > 0, or an expression such as 0.1+0.02*z, default 0.1
         diameter of the struts
     volume_fraction : a number > 0 and < 1
-        share of space that is solid, within 0.2 % of it; the thickness follows
+        share of space that is solid, within 0.2 % of it; the thickness follows, or the period of a thickness
 
     Returns
     -------
@@ -1465,6 +1488,25 @@ def text(text: str, font: str, size: float = 1.0, depth: float = 1.0, place: Lit
         where on its axes a variable font is, such as wght=700, wdth=80
     sha256 : the SHA-256 of the file, 64 hexadecimal digits
         hash of the font, by which a file that has changed is noticed
+
+    Returns
+    -------
+    Node
+    """
+
+def thicken(*elements: Node, by: float, within: float = 1.0) -> Node:
+    """The first element, such as a lattice, thicker inside the others, and by less the farther from them: its
+    density follows a solid, a model, a text or the heights of a picture. L = the first element's plus
+    by / 2 / within times the others', or 1 if that is more. The result is clipped at the grown box.
+
+    Parameters
+    ----------
+    *elements : Node
+        What it is made of.
+    by : a number
+        how much thicker the first element is on both sides together; negative: thinner
+    within : a number > 0, default 1.0
+        distance from the others from which on it is as it was
 
     Returns
     -------

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import reduce
 from typing import Any
 
-from ..common.parameters import REQUIRED, SMALLEST
+from ..common.parameters import REQUIRED, SMALLEST, Number
 from ..expr.vocabulary import absolute, maximum, minimum
 from ..fields.box import Box
 from ..fields.registry import Node, csg_operator
@@ -188,12 +188,22 @@ def shell_select(node: Node):  # type: ignore[no-untyped-def]
 @csg_operator(
     (2, 2),
     shell=Variable(REQUIRED, "thickness of the wall that stays whole, in scene units", above=0),
+    denser=Number(
+        0.0, "how much thicker what fills it is at the surface of the first element, by less deeper inside"
+    ),
+    within=Number(1.0, "depth from which on it is as thick as given", above=0),
 )
 def infill(a, b, shell):  # type: ignore[no-untyped-def]
     """The first element, of which a wall stays whole, and behind it what the other elements fill, such as a
-    lattice. L = maximum of the elements'.
+    lattice. L = maximum of the elements'; with `denser`, the fillers' plus denser / 2 / within times that of
+    the first element.
     """
     return maximum(a, minimum(-(a + shell), b))
+
+
+def graded_infill(a, b, shell, more, slope):  # type: ignore[no-untyped-def]
+    thicker = more * minimum(maximum(1.0 + slope * a, 0.0), 1.0)
+    return maximum(a, minimum(-(a + shell), b - thicker))
 
 
 def conservative_infill(a, b, shell):  # type: ignore[no-untyped-def]
@@ -203,22 +213,97 @@ def conservative_infill(a, b, shell):  # type: ignore[no-untyped-def]
 
 @infill.select
 def infill_select(node: Node):  # type: ignore[no-untyped-def]
-    exterior_only = node.is_conservative and node.children[0].bounds.exterior_only
-    return conservative_infill if exterior_only else infill.function
+    if node.is_conservative and node.children[0].bounds.exterior_only:
+        return conservative_infill
+    return graded_infill if node["denser"] else infill.function
 
 
-def hollow_arguments(node: Node) -> dict[str, object]:
-    return {name: as_argument(value) for name, value in node.values.items()}
+@infill.check
+def infill_check(node: Node) -> None:
+    if node["denser"] and any(child.bounds.exterior_only for child in node.children):
+        raise node.fail("denser: expected elements with distances on both sides, and no fractals")
 
 
-def hollow_slope(node: Node) -> float:
-    slopes = map(slope_of, node.values.values())
-    return max(child.bounds.lipschitz for child in node.children) + sum(slopes)
+@infill.arguments
+def infill_arguments(node: Node) -> dict[str, object]:
+    given = {"shell": as_argument(node["shell"])}
+    if node.function is graded_infill:
+        given |= {"more": node["denser"] / 2, "slope": 1 / node["within"]}
+    return given
 
 
-for _operator in (shell, infill):
-    _operator.arguments(hollow_arguments)
-    _operator.slope(hollow_slope)
+@infill.slope
+def infill_slope(node: Node) -> float:
+    """The wall's field and the fillers' are those whose slopes grow, each alone."""
+    solid, filler = (child.bounds.lipschitz for child in node.children)
+    graded = filler + abs(node["denser"]) / 2 / node["within"] * solid
+    return float(max(solid + slope_of(node["shell"]), graded))
+
+
+@csg_operator(
+    (2, 2),
+    by=Number(REQUIRED, "how much thicker the first element is on both sides together; negative: thinner"),
+    within=Number(1.0, "distance from the others from which on it is as it was", above=0),
+)
+def thicken(a, b, more, slope, beyond):  # type: ignore[no-untyped-def]
+    """The first element, such as a lattice, thicker inside the others, and by less the farther from them: its
+    density follows a solid, a model, a text or the heights of a picture. L = the first element's plus
+    by / 2 / within times the others', or 1 if that is more. The result is clipped at the grown box.
+    """
+    return maximum(a - more * minimum(maximum(1.0 - slope * b, 0.0), 1.0), beyond)
+
+
+def endless_thicken(a, b, more, slope):  # type: ignore[no-untyped-def]
+    return a - more * minimum(maximum(1.0 - slope * b, 0.0), 1.0)
+
+
+@thicken.select
+def thicken_select(node: Node):  # type: ignore[no-untyped-def]
+    return thicken.function if _beyond(node.bounds.box) else endless_thicken
+
+
+@thicken.arguments
+def thicken_arguments(node: Node) -> dict[str, object]:
+    given = {"more": node["by"] / 2, "slope": 1 / node["within"]}
+    if beyond := _beyond(node.bounds.box):
+        given["beyond"] = Varying(beyond).argument
+    return given
+
+
+def _beyond(box: Box) -> str:
+    """Expression of the largest coordinate relative to a box; of none where it is unbounded."""
+    sides = zip("xyz", box.lo, box.hi, strict=True)
+    ends = [
+        f"max({low!r} - {name}, {name} - {high!r})" for name, low, high in sides if math.isfinite(high - low)
+    ]
+    return reduce(lambda one, other: f"max({one}, {other})", ends) if ends else ""
+
+
+@thicken.bounds
+def thicken_bounds(node: Node) -> Box:
+    return node.children[0].bounds.box.grown(max(node["by"] / 2, 0.0))
+
+
+@thicken.slope
+def thicken_slope(node: Node) -> float:
+    first, other = (child.bounds.lipschitz for child in node.children)
+    return float(max(1.0, first + abs(node["by"]) / 2 / node["within"] * other))
+
+
+@thicken.check
+def thicken_check(node: Node) -> None:
+    if any(child.bounds.exterior_only for child in node.children):
+        raise node.fail("expected elements with distances on both sides, and no fractals")
+
+
+@shell.arguments
+def shell_arguments(node: Node) -> dict[str, object]:
+    return {"thickness": as_argument(node["thickness"])}
+
+
+@shell.slope
+def shell_slope(node: Node) -> float:
+    return node.children[0].bounds.lipschitz + slope_of(node["thickness"])
 
 
 @difference.bounds

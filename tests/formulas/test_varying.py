@@ -15,7 +15,7 @@ from fracslice.expr.frontend import formula
 from fracslice.fields.box import Box
 from fracslice.fields.devices import reference
 from fracslice.fields.varying import Variable, Varying
-from fracslice.formulas import Node, box, gyroid, infill, mandelbulb, shell, sphere, struts, union
+from fracslice.formulas import Node, box, displace, gyroid, infill, mandelbulb, shell, sphere, struts, union
 from fracslice.scene import scene, to_xml
 
 pytestmark = pytest.mark.once
@@ -70,6 +70,8 @@ def test_the_slope_is_proved_and_not_far_off(text: str, steepest: float) -> None
         union(*BALLS, box(), smooth="0.1*abs(x)"),
         BALLS[0].intersection(BALLS[1], smooth="0.2*x"),
         box().difference(*BALLS, smooth="0.3-0.2*y"),
+        displace(sphere(0.8), by="0.1*sin(5*x)*cos(4*y)"),
+        displace(box().scale((0.5, 0.5, 2)), by="0.1+0.05*z"),
     ],
 )
 def test_fields_keep_their_bounds(root: Node) -> None:
@@ -118,6 +120,20 @@ def test_functions_of_points_are_expressions() -> None:
 
     assert sphere().shell(ring).bounds.lipschitz == pytest.approx(1 + 0.1 * math.sqrt(2))
     assert repr(known) == "gyroid(thickness='(0.1 + (0.2 * abs(z)))')"
+
+
+def test_a_surface_is_displaced() -> None:
+    moved = displace(sphere(), by=lambda p: 0.1 * p.z)
+    z = POINTS[2]
+    np.testing.assert_allclose(
+        reference(moved)(*POINTS), np.linalg.norm(POINTS, axis=0) - 1 - 0.1 * z, atol=1e-12
+    )
+    assert 1.1 < moved.bounds.box.hi[2] < 1.13
+    assert reference(displace(sphere(), by=0.2))(*POINTS) == pytest.approx(
+        reference(sphere(1.2))(*POINTS), abs=1e-12
+    )
+    with pytest.raises(SceneError, match="expected one with a limit, such as min"):
+        displace(sphere(), by="2*z").bounds  # noqa: B018
 
 
 def test_values_in_a_box_are_enclosed() -> None:

@@ -245,6 +245,8 @@ TRUTHS: dict[str, list[Truth]] = {
             f.union(f.shell(BALL, thickness=0.1), f.intersection(BALL, f.gyroid())),
         )
     ],
+    "displace": [Equal(f.displace(BALL, by=0.1), f.offset(BALL, distance=0.1))],
+    "thicken": [Equal(f.thicken(BALL, BALL, by=0.2, within=0.5), f.sphere(0.7 + 1 / 12), sign=True)],
     "relief": [Equal(EXAMPLES["relief"], raised, sign=True)],
     "revolve": [Volume(EXAMPLES["revolve"], 2 * pi * 0.7 * 0.6**2 * (1 - 0.5 / 4))],
     "sweep": [
