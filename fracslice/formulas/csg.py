@@ -121,7 +121,8 @@ def csg_arguments(node: Node) -> dict[str, object]:
 
 def csg_check(node: Node) -> None:
     if isinstance(node["smooth"], Varying) and any(child.bounds.exterior_only for child in node.children):
-        raise node.fail(f"smooth={node['smooth']!r}: expected a number, as an element is a fractal")
+        reason = "an element is a fractal, whose slope away from its surface is measured and not proved"
+        raise node.fail(f"smooth={node['smooth']!r}: expected a number, as {reason}")
 
 
 def csg_slope(node: Node) -> float:
