@@ -58,6 +58,7 @@ from .formulas import neovius as neovius
 from .formulas import noise as noise
 from .formulas import octahedron as octahedron
 from .formulas import offset as offset
+from .formulas import onion as onion
 from .formulas import orbit as orbit
 from .formulas import plane as plane
 from .formulas import prism as prism

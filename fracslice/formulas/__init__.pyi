@@ -1095,6 +1095,24 @@ def offset(*elements: Node, distance: float) -> Node:
     Node
     """
 
+def onion(*elements: Node, period: float, thickness: float | str | Callable[..., Any]) -> Node:
+    """Walls within the element that follow its surface, one below the other, the first with the surface as
+    its outer face (after Quilez 2008, "Distance functions"). L = the element's.
+
+    Parameters
+    ----------
+    *elements : Node
+        What it is applied to; several are a union.
+    period : a number > 0
+        distance from wall to wall
+    thickness : a number > 0, or an expression such as 0.1+0.02*z
+        of the walls
+
+    Returns
+    -------
+    Node
+    """
+
 def plane(normal: Sequence[float] = (0.0, 0.0, 1.0), offset: float = 0.0) -> Node:
     """The half-space behind a plane. L = 1: an exact distance.
 

@@ -1,4 +1,4 @@
-"""CSG operators: union, intersection, difference, shell and infill."""
+"""CSG operators: union, intersection, difference, and what hollows and fills."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import reduce
 from typing import Any
 
 from ..common.parameters import REQUIRED, SMALLEST, Number
-from ..expr.vocabulary import absolute, maximum, minimum
+from ..expr.vocabulary import absolute, floor, maximum, minimum
 from ..fields.box import Box
 from ..fields.registry import Node, csg_operator
 from ..fields.varying import Variable, Varying, as_argument, slope_of
@@ -187,6 +187,44 @@ def shell_select(node: Node):  # type: ignore[no-untyped-def]
 
 
 @csg_operator(
+    (1, 1),
+    period=Number(REQUIRED, "distance from wall to wall", above=0),
+    thickness=Variable(REQUIRED, "of the walls", above=0),
+)
+def onion(a, period, over, thickness):  # type: ignore[no-untyped-def]
+    """Walls within the element that follow its surface, one below the other, the first with the surface as
+    its outer face (after Quilez 2008, "Distance functions"). L = the element's.
+    """
+    deep = maximum(-a, 0.0)
+    below = deep - period * floor(deep * over)
+    return maximum(a, minimum(absolute(below - 0.5 * thickness) - 0.5 * thickness, period - below))
+
+
+def conservative_onion(a):  # type: ignore[no-untyped-def]
+    """Conservative bound of the distance to an onion, where the element's field is an exterior bound only."""
+    return maximum(a, 0.0)
+
+
+@onion.select
+def onion_select(node: Node):  # type: ignore[no-untyped-def]
+    return conservative_onion if node.is_conservative and node.bounds.exterior_only else onion.function
+
+
+@onion.arguments
+def onion_arguments(node: Node) -> dict[str, object]:
+    if node.function is conservative_onion:
+        return {}
+    period = node["period"]
+    return {"period": period, "over": 1 / period, "thickness": as_argument(node["thickness"])}
+
+
+@onion.check
+def onion_check(node: Node) -> None:
+    if not isinstance(node["thickness"], Varying) and node["thickness"] >= node["period"]:
+        raise node.fail(f"thickness={node['thickness']:g}: expected less than period={node['period']:g}")
+
+
+@csg_operator(
     (2, 2),
     shell=Variable(REQUIRED, "thickness of the wall that stays whole, in scene units", above=0),
     denser=Number(
@@ -302,6 +340,7 @@ def shell_arguments(node: Node) -> dict[str, object]:
     return {"thickness": as_argument(node["thickness"])}
 
 
+@onion.slope
 @shell.slope
 def shell_slope(node: Node) -> float:
     return node.children[0].bounds.lipschitz + slope_of(node["thickness"])
@@ -309,6 +348,7 @@ def shell_slope(node: Node) -> float:
 
 @difference.bounds
 @shell.bounds
+@onion.bounds
 @infill.bounds
 def first_bounds(node: Node) -> Box:
     return node.children[0].bounds.box

@@ -15,6 +15,7 @@ from fracslice.formulas import (
     gyroid,
     infill,
     mandelbulb,
+    onion,
     schwarz_p,
     shell,
     sphere,
@@ -123,6 +124,18 @@ def test_a_lattice_is_thicker_in_another_element() -> None:
     assert thinner.bounds.box.hi == (1, 1, 1) and thinner.distance((0, 0, 0.99)) > 0
 
 
+def test_walls_of_an_onion_follow_the_surface() -> None:
+    root = onion(sphere(1.2), period=0.3, thickness=0.1)
+    distance_kept(root)
+    points = np.random.default_rng(2).uniform(-1.3, 1.3, (3, 20_000))
+    depth = 1.2 - np.linalg.norm(points, axis=0)
+    np.testing.assert_array_equal(reference(root)(*points) < 0, (depth > 0) & (depth % 0.3 < 0.1))
+    distance_kept(onion(box(size=(2, 1.5, 1)), period=0.3, thickness="0.1+0.05*z"))
+    hollow = onion(mandelbulb(iterations=4), period=0.1, thickness=0.03)
+    inside = reference(mandelbulb(iterations=4))(*points) < 0
+    assert inside.any() and (reference(hollow.conservative())(*points)[inside] <= 0).all()
+
+
 def test_several_fillers_are_united() -> None:
     ball, one, other = sphere(), gyroid(), schwarz_p()
     assert infill(ball, one, other, shell=0.1) == infill(ball, one | other, shell=0.1)
@@ -166,6 +179,7 @@ SCENE = '<scene version="1"><solid size="20mm">\n{}</solid></scene>'
             '<thicken by="0.1"><gyroid/></thicken>',
             ":2: <thicken> takes at least 2 elements inside it, found 1",
         ),
+        ('<onion period="1" thickness="1"><box/></onion>', "thickness=1: expected less than period=1"),
         ('<thicken by="1"><gyroid/><mandelbulb/></thicken>', "<thicken> expected elements with distances"),
     ],
 )

@@ -246,6 +246,15 @@ TRUTHS: dict[str, list[Truth]] = {
         )
     ],
     "displace": [Equal(f.displace(BALL, by=0.1), f.offset(BALL, distance=0.1))],
+    "onion": [
+        Equal(
+            f.onion(f.sphere(0.7), period=0.3, thickness=0.1),
+            f.union(
+                f.shell(f.sphere(0.7), thickness=0.1), f.shell(f.sphere(0.4), thickness=0.1), f.sphere(0.1)
+            ),
+            sign=True,
+        )
+    ],
     "thicken": [Equal(f.thicken(BALL, BALL, by=0.2, within=0.5), f.sphere(0.7 + 1 / 12), sign=True)],
     "relief": [Equal(EXAMPLES["relief"], raised, sign=True)],
     "revolve": [Volume(EXAMPLES["revolve"], 2 * pi * 0.7 * 0.6**2 * (1 - 0.5 / 4))],
