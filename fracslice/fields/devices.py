@@ -50,7 +50,8 @@ def for_field(root: Node, device: Device) -> Device:
     if device == "cpu":
         return device
     for node in root.solids():
-        if any(isinstance(value, InMemory) for value in node.arguments.values()):
+        known = not node.formula.exterior_only  # a fractal has none, and its depth may be open
+        if known and any(isinstance(value, InMemory) for value in node.arguments.values()):
             warn(f"a scene with a <{node.formula.name}> is computed on the CPU, in whose memory that is")
             return "cpu"
     return device
