@@ -110,7 +110,7 @@ def beams(file: str, thickness: float = 0.1, smooth: float = 0.0, size: float | 
     Parameters
     ----------
     file : the name of a file
-        a graph, in the folder of the scene: .csv, .json, lines of .obj or edges of .ply
+        a graph, in the folder of the scene: .csv, .json, lines of .obj, edges of .ply, beams of .3mf
     thickness : a number > 0, default 0.1
         diameter of beams whose radius the file does not state
     smooth : a number >= 0, default 0.0

@@ -14,7 +14,7 @@ from .models import identify_file, reading
 if TYPE_CHECKING:
     from ..mesh.scaffolds import Beams
 
-ENDINGS = {".csv", ".json", ".obj", ".ply"}
+ENDINGS = {".3mf", ".csv", ".json", ".obj", ".ply"}
 """Files of graphs that are read."""
 
 _SMOOTH = Number(
@@ -27,7 +27,7 @@ _SMOOTH = Number(
 @shape(
     file=File(
         REQUIRED,
-        "a graph, in the folder of the scene: .csv, .json, lines of .obj or edges of .ply",
+        "a graph, in the folder of the scene: .csv, .json, lines of .obj, edges of .ply, beams of .3mf",
         inside=True,
     ),
     thickness=Number(0.1, "diameter of beams whose radius the file does not state", above=0),
@@ -52,6 +52,12 @@ def beams(x, y, z, beams):  # type: ignore[no-untyped-def]
 
 
 identify_file(beams, "file", ENDINGS, "a file of beams")
+
+
+@beams.check
+def beams_check(node: Node) -> None:
+    if node["units"] != "mm" and node["file"].lower().endswith(".3mf"):
+        raise node.fail(f'units="{node["units"]}": expected none, as the file states its own')
 
 
 @beams.arguments

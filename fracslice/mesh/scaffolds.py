@@ -28,6 +28,7 @@ from ..expr.language import InMemory
 from ..fields.box import Box
 from ..fields.devices import reference
 from ..fields.registry import Node
+from ..formats._3mf import read_beams
 from ..formats.ply import numbers_of, read_tables
 from .models import require_unchanged
 
@@ -171,7 +172,15 @@ def _read_ply(file: str) -> BeamGraph:
     return made._replace(radii=vertex["radius"].astype(np.float64)[pairs])
 
 
+def _read_3mf(file: str) -> BeamGraph:
+    """Beam lattices of the build."""
+    balls = read_beams(file)
+    pairs = np.arange(2 * len(balls)).reshape(-1, 2)
+    return BeamGraph(balls[..., :3].reshape(-1, 3), pairs, balls[..., 3])
+
+
 READERS: dict[str, Callable[[str], BeamGraph]] = {
+    ".3mf": _read_3mf,
     ".csv": _read_csv,
     ".json": _read_json,
     ".obj": _read_obj,

@@ -109,6 +109,45 @@ def test_files_of_beams_are_read(name: str, tmp_path: Path) -> None:
     assert root.changed(place="centre", units="cm").bounds.box.centre[0] == pytest.approx(0, abs=4.1)
 
 
+def lattice_3mf(path: Path, radius: float = 0.2) -> str:
+    """A lattice of lib3mf's in cm, twice in the build, once turned and half as large."""
+    lib3mf = pytest.importorskip("lib3mf")
+    lib = lib3mf.get_wrapper()
+    model = lib.CreateModel()
+    model.SetUnit(lib3mf.ModelUnit.CentiMeter)
+    mesh = model.AddMeshObject()
+    for point in POINTS:
+        vertex = lib3mf.Position()
+        vertex.Coordinates[:] = point
+        mesh.AddVertex(vertex)
+    lattice = mesh.BeamLattice()
+    lattice.SetMinLength(1e-4)
+    for k, pair in enumerate(PAIRS):
+        made_of = lib3mf.Beam()
+        made_of.Indices[:], made_of.Radii[:] = pair, (radius, radius * (1 + k))
+        lattice.AddBeam(made_of)
+    turned = lib3mf.Transform()
+    for row, values in enumerate([(0, 0.5, 0), (-0.5, 0, 0), (0, 0, 0.5), (9, 0, 0)]):
+        turned.Fields[row][:] = values
+    model.AddBuildItem(mesh, lib.GetIdentityTransform())
+    model.AddBuildItem(mesh, turned)
+    model.QueryWriter("3mf").WriteToFile(str(path))
+    return str(path)
+
+
+def test_beam_lattices_of_3mf_files_are_read(tmp_path: Path) -> None:
+    root = beams(lattice_3mf(tmp_path / "a.3mf"))
+    radii = np.array([[0.2, 0.2], [0.2, 0.4], [0.2, 0.6]])
+    balls = 10 * np.concatenate([np.array(POINTS, float)[np.array(PAIRS)], radii[..., None]], -1)
+    other = balls / 2
+    other[..., :2] = other[..., 1::-1] * (-1, 1) + (90, 0)
+    points = RNG.uniform(-10, 90, (500, 3))
+    known = distances(np.concatenate([balls, other]), points)
+    assert reference(root)(*points.T) == pytest.approx(known, abs=1e-4)
+    with pytest.raises(SceneError, match=r"units=.cm.: expected none, as the file states its own"):
+        beams(str(tmp_path / "a.3mf"), units="cm")
+
+
 def test_a_capsule_is_one_beam(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("0 ,0,0,1,2,3,0.25,0.25")
     points = RNG.uniform(-1, 3, (3, 500))
@@ -197,7 +236,8 @@ BAD = {
         "l 1 a": "not a whole file of beams",
     },
     "a.ply": {"ply\nformat": "not a whole file of beams", FILES["a.ply"][:-20]: "not a whole file of beams"},
-    "a.stl": {"solid": "not a file of beams that can be read; known are .csv, .json, .obj, .ply"},
+    "a.3mf": {"PK": "not a whole 3MF file"},
+    "a.stl": {"solid": "not a file of beams that can be read; known are .3mf, .csv, .json, .obj, .ply"},
 }  # fmt: skip
 
 
