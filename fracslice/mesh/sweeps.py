@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from shapely import Geometry
 
 SHARPEST = math.cos(math.radians(165))
-"""Cosine of the sharpest turn: a corner beyond it is a spike."""
+"""Cosine of the sharpest turn that is mitred: a corner beyond it is a spike."""
 MOST_PARTS = 1000
 """Most parts of a path whose corners are too narrow for mitres."""
 SHORTEST = 1e-9
@@ -309,10 +309,9 @@ def _mitred(path: Path) -> _Segments:
     before, after = np.roll(along, 1, 0), np.roll(along, -1, 0)
     if not path.closed:
         before[0], after[-1] = along[0], along[-1]
-    cosines, cosines_after = (np.einsum("ij,ij->i", along, other)[:, None] for other in (before, after))
-    if cosines.min() < SHARPEST:
-        back = " ".join(f"{x:.4g}" for x in corners[cosines.argmin()])
-        raise MeshError(f"the path turns back at {back}: expected turns of less than 165 degrees")
+    cosines, cosines_after = (
+        np.maximum(np.einsum("ij,ij->i", along, other), SHARPEST)[:, None] for other in (before, after)
+    )
     across, turn = _carried(along, path.closed)
     far, up = np.append(0, np.cumsum(lengths)), np.cross(along, across)
     angles = (turn / far[-1] * part[:, None] for part in (far[:-1], far[1:]))
@@ -323,9 +322,9 @@ def _mitred(path: Path) -> _Segments:
 
 def _splits(outline: Profile, segments: _Segments, closed: bool) -> NDArray[np.bool_]:
     """Starts of segments where mitres would cut more than the segments, and that of an open path."""
-    split = np.zeros(len(segments.along), bool)
-    split[0] = not closed
     sharp = 1 - np.einsum("ij,ij->i", segments.along, np.roll(segments.along, 1, 0))
+    split: NDArray[np.bool_] = sharp > 1 - SHARPEST
+    split[0] |= not closed
     least = SHORTEST * outline.reach
     while True:
         after = np.roll(split, -1)
@@ -338,6 +337,8 @@ def _splits(outline: Profile, segments: _Segments, closed: bool) -> NDArray[np.b
 
 def _corner(outline: Profile, segments: _Segments, split: NDArray[np.bool_], corner: int) -> list[Mesh]:
     """Mesh of what a mitre adds on the outer side of a corner, and goes on as far as the outline is wide."""
+    if segments.along[corner] @ segments.along[corner - 1] < SHARPEST:
+        return []
     across, up = segments.across[corner], np.cross(segments.across[corner], segments.along[corner])
     right, high = (float(segments.tilt[corner] @ side) for side in (across, up))
     if math.hypot(right, high) < SHORTEST or (outer := outline.beyond(right, high)) is None:
@@ -385,8 +386,11 @@ def _carried(along: NDArray[np.float64], closed: bool) -> tuple[NDArray[np.float
     right = np.cross(first, up)
     across = [right / np.linalg.norm(right)]
     for one, other in zip(along, [*along[1:], *along[:closed]], strict=False):
-        halving = one + other
-        now = across[-1] - halving * (2 * (across[-1] @ halving) / (halving @ halving))
+        halving, before = one + other, across[-1]
+        if (square := halving @ halving) > SHORTEST:
+            now = before - halving * (2 * (before @ halving) / square)
+        else:
+            now = -before  # after a half turn around what is up
         now = now - other * (now @ other)
         across.append(now / np.linalg.norm(now))
     if not closed:
