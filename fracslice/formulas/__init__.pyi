@@ -1437,9 +1437,9 @@ def superquadric(size: Sequence[float] = (1.0, 1.0, 1.0), exponent: float = 4.0)
 def sweep(file: str, size: float | None = None, anchor: Literal['centre', 'origin'] = 'centre', path: str | None = None, length: float | None = None, place: Literal['centre', 'as is'] = 'centre', points: str | Sequence[Sequence[float]] | None = None, closed: Literal['no', 'yes'] = 'no', sha256: str | None = None, path_sha256: str | None = None) -> Node:
     """What an SVG file fills, swept along a path: seen along the path, its x is to the right, and its y up,
     towards z where the path starts (Wang, Juettler, Zheng and Liu 2008, "Computation of Rotation Minimizing
-    Frames"). Corners below 165 degrees are mitred. L = 1: an exact distance, but for curves, which are segments
-    within 1/20000 of the longest side of the outline, or of the path. Where a path meets itself, or bends more
-    tightly than the outline is wide, parts are united: inside, the distance is then a bound.
+    Frames"). Corners below 165 degrees are mitred. L = 1: an exact distance, but for curves, which are
+    segments within 1/20000 of the longest side of the outline, or of the path. Where a path meets itself, or
+    bends more tightly than the outline is wide, parts are united: inside, the distance is then a bound.
 
     Parameters
     ----------

@@ -130,9 +130,9 @@ def _revolved(node: Node) -> Outline:
 def sweep(x, y, z, solids):  # type: ignore[no-untyped-def]
     """What an SVG file fills, swept along a path: seen along the path, its x is to the right, and its y up,
     towards z where the path starts (Wang, Juettler, Zheng and Liu 2008, "Computation of Rotation Minimizing
-    Frames"). Corners below 165 degrees are mitred. L = 1: an exact distance, but for curves, which are segments
-    within 1/20000 of the longest side of the outline, or of the path. Where a path meets itself, or bends more
-    tightly than the outline is wide, parts are united: inside, the distance is then a bound.
+    Frames"). Corners below 165 degrees are mitred. L = 1: an exact distance, but for curves, which are
+    segments within 1/20000 of the longest side of the outline, or of the path. Where a path meets itself, or
+    bends more tightly than the outline is wide, parts are united: inside, the distance is then a bound.
     """
     return solid_distance(x, y, z, solids)
 
