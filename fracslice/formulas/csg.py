@@ -224,6 +224,9 @@ def onion_check(node: Node) -> None:
         raise node.fail(f"thickness={node['thickness']:g}: expected less than period={node['period']:g}")
 
 
+# Far away, fillers without end may be no numbers, which are then the first operand, and not chosen.
+
+
 @csg_operator(
     (2, 2),
     shell=Variable(REQUIRED, "thickness of the wall that stays whole, in scene units", above=0),
@@ -237,17 +240,17 @@ def infill(a, b, shell):  # type: ignore[no-untyped-def]
     lattice. L = maximum of the elements'; with `denser`, the fillers' plus denser / 2 / within times that of
     the first element.
     """
-    return maximum(a, minimum(-(a + shell), b))
+    return maximum(minimum(b, -(a + shell)), a)
 
 
 def graded_infill(a, b, shell, more, slope):  # type: ignore[no-untyped-def]
     thicker = more * minimum(maximum(1.0 + slope * a, 0.0), 1.0)
-    return maximum(a, minimum(-(a + shell), b - thicker))
+    return maximum(minimum(b - thicker, -(a + shell)), a)
 
 
 def conservative_infill(a, b, shell):  # type: ignore[no-untyped-def]
     """Conservative bound of the distance to an infill, where the first field is an exterior bound only."""
-    return maximum(a, minimum(minimum(-(a + shell), b), 0.0))
+    return maximum(minimum(minimum(b, -(a + shell)), 0.0), a)
 
 
 @infill.select

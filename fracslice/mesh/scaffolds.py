@@ -36,7 +36,7 @@ MOST = 1 << 20
 """Most beams."""
 DRAWN, ROUNDS = 12, 12
 """Points that are drawn for each that is left, and how often these move to the middles of their cells."""
-STEPS, PARTS = 40, 6
+STEPS, PARTS = 60, 6
 """Halvings of an interval with a root, and parts of a beam along a surface."""
 
 
@@ -242,7 +242,7 @@ class _Field:
 
     def on_surface(self, points: NDArray[np.float64], steps: int = 6) -> NDArray[np.float64]:
         """Points moved along the gradient to the surface, [n, 3]."""
-        step = 1e-6 * max(self.bounds.box.size)
+        step = 1e-3 * max(self.bounds.box.size)  # differences are hardly rounded
         for _ in range(steps):
             values = self(points)
             before, after = (np.stack([points + h * side for side in np.eye(3)]) for h in (-step, step))

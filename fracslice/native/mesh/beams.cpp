@@ -74,7 +74,8 @@ double Beams::to_beam(const double* p, size_t i) const {
         const double x = p[k] - beam.from[k] - along * beam.axis[k];
         square += x * x;
     }
-    const double place = std::clamp(along - beam.apart * std::sqrt(square), 0.0, beam.length);
+    double place = beam.apart == 0 ? along : along - beam.apart * std::sqrt(square);
+    place = std::isnan(place) ? 0 : std::clamp(place, 0.0, beam.length);  // of points whose squares are no numbers
     return std::sqrt(square + (along - place) * (along - place)) - (beam.radius - beam.slope * place);
 }
 
