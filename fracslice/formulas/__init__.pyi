@@ -103,9 +103,10 @@ def apollonian(level: int = 4, swell: float = 1.02) -> Node:
     """
 
 def beams(file: str, thickness: float = 0.1, smooth: float = 0.0, size: float | None = None, place: Literal['as is', 'centre', 'bed'] = 'as is', units: Literal['um', 'µm', 'mm', 'cm', 'in', 'm'] = 'mm', sha256: str | None = None) -> Node:
-    """Beams between points, round and with round ends, as a file has them. L = 1: an exact distance outside,
-    and inside of what is in one beam alone. With seams, f is that for which max(0, f + smooth - d)^2, summed
-    over the distances d of all beams, is smooth^2; they fill less than `smooth`.
+    """Beams between points, round and with round ends, as a file has them (round cones: Quilez 2008,
+    "Distance functions"). L = 1: an exact distance outside, and inside of what is in one beam alone. With
+    seams, f is that for which max(0, f + smooth - d)^2, summed over the distances d of all beams, is
+    smooth^2; they fill less than `smooth`.
 
     Parameters
     ----------

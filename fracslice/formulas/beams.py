@@ -44,9 +44,10 @@ _SMOOTH = Number(
     sha256=Digest(None, "hash of the file, by which a file that has changed is noticed"),
 )
 def beams(x, y, z, beams):  # type: ignore[no-untyped-def]
-    """Beams between points, round and with round ends, as a file has them. L = 1: an exact distance outside,
-    and inside of what is in one beam alone. With seams, f is that for which max(0, f + smooth - d)^2, summed
-    over the distances d of all beams, is smooth^2; they fill less than `smooth`.
+    """Beams between points, round and with round ends, as a file has them (round cones: Quilez 2008,
+    "Distance functions"). L = 1: an exact distance outside, and inside of what is in one beam alone. With
+    seams, f is that for which max(0, f + smooth - d)^2, summed over the distances d of all beams, is
+    smooth^2; they fill less than `smooth`.
     """
     return solid_distance(x, y, z, beams)
 
