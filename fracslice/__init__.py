@@ -100,7 +100,9 @@ _WHERE = {
 }
 
 _PACKAGE = "volume"
-"""Formula with the name of a package of ours: here it is `from_vdb`."""
+"""Formula with the name of a package of ours: here it is `from_vdb`. `sweep` is the call, not the
+formula of this name, which is `formulas.sweep`.
+"""
 
 
 def __getattr__(name: str) -> Any:

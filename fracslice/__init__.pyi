@@ -12,6 +12,7 @@ from .formulas import Node as Node
 from .formulas import abox as abox
 from .formulas import amazing_surf as amazing_surf
 from .formulas import apollonian as apollonian
+from .formulas import beams as beams
 from .formulas import bend as bend
 from .formulas import benesi as benesi
 from .formulas import bounds as bounds
@@ -24,6 +25,7 @@ from .formulas import cone as cone
 from .formulas import cosine_bulb as cosine_bulb
 from .formulas import cylinder as cylinder
 from .formulas import difference as difference
+from .formulas import displace as displace
 from .formulas import extrude as extrude
 from .formulas import fischer_koch_s as fischer_koch_s
 from .formulas import flake as flake
@@ -56,6 +58,7 @@ from .formulas import neovius as neovius
 from .formulas import noise as noise
 from .formulas import octahedron as octahedron
 from .formulas import offset as offset
+from .formulas import onion as onion
 from .formulas import orbit as orbit
 from .formulas import plane as plane
 from .formulas import prism as prism
@@ -65,6 +68,7 @@ from .formulas import quaternion_power as quaternion_power
 from .formulas import relief as relief
 from .formulas import repeat as repeat
 from .formulas import revolve as revolve
+from .formulas import scaffold as scaffold
 from .formulas import schwarz_d as schwarz_d
 from .formulas import schwarz_p as schwarz_p
 from .formulas import shell as shell
@@ -74,6 +78,7 @@ from .formulas import struts as struts
 from .formulas import superquadric as superquadric
 from .formulas import tetrabrot as tetrabrot
 from .formulas import text as text
+from .formulas import thicken as thicken
 from .formulas import thread as thread
 from .formulas import torus as torus
 from .formulas import transform as transform

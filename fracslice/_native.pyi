@@ -777,6 +777,24 @@ class Solid:
     @property
     def address(self) -> int: ...
 
+class Solids:
+    """Solids that may overlap: the least of their distances."""
+
+    def __init__(self, solids: list[Solid]) -> None: ...
+    def distances(self, points: NDArray[float64]) -> NDArray[float64]: ...
+    @property
+    def address(self) -> int: ...
+
+class Beams:
+    """Signed distances to beams [n, 2, 4], the centre and radius of each end, with seams of a width between
+    chains, whose numbers are those of the beams.
+    """
+
+    def __init__(self, balls: NDArray[float64], chains: NDArray[int32], seam: float) -> None: ...
+    def distances(self, points: NDArray[float64]) -> NDArray[float64]: ...
+    @property
+    def address(self) -> int: ...
+
 class Outline:
     """Signed distances to closed rings, inside on their left: corners [n, 2], and where each ring ends."""
 

@@ -18,6 +18,7 @@ from fracslice.formulas import (
     abox,
     amazing_surf,
     apollonian,
+    beams,
     bend,
     benesi,
     bounds,
@@ -30,6 +31,7 @@ from fracslice.formulas import (
     cosine_bulb,
     cylinder,
     difference,
+    displace,
     extrude,
     fischer_koch_s,
     flake,
@@ -62,6 +64,7 @@ from fracslice.formulas import (
     noise,
     octahedron,
     offset,
+    onion,
     orbit,
     plane,
     prism,
@@ -71,6 +74,7 @@ from fracslice.formulas import (
     relief,
     repeat,
     revolve,
+    scaffold,
     schwarz_d,
     schwarz_p,
     shell,
@@ -78,8 +82,10 @@ from fracslice.formulas import (
     split_p,
     struts,
     superquadric,
+    sweep,
     tetrabrot,
     text,
+    thicken,
     thread,
     torus,
     transform,
@@ -117,6 +123,8 @@ GRID = str(Path(__file__).parent / "models" / "bracket.vdb")
 """The same, not turned, as distances at samples 0.1 apart, on its faces and between."""
 WASHER = str(Path(__file__).parent / "models" / "washer.svg")
 """A square of 2 mm with a hole of a diamond of 0.5 square mm, in the middle."""
+TRUSS = str(Path(__file__).parent / "models" / "truss.csv")
+"""Six beams of a tetrahedron, and a ball."""
 HILLS = str(Path(__file__).parent / "models" / "hills.png")
 """A picture of 16 x 9 pixels of 8 bits."""
 
@@ -173,6 +181,12 @@ EXAMPLES: dict[str, Node] = {
     "extrude": extrude(WASHER, size=1.4, height=0.6),
     "text": text("o8", FONT, depth=0.4),
     "revolve": revolve(WASHER, size=0.6, offset=0.4),
+    "sweep": sweep(WASHER, size=0.4, points="-0.7 -0.6 0, 0.7 -0.5 0.1, 0.2 0.7 0", closed="yes"),
+    "beams": beams(TRUSS, thickness=0.15, smooth=0.2),
+    "scaffold": scaffold(box(size=(1.2, 0.9, 1.0)), count=12, thickness=0.2),
+    "scaffold on a surface": scaffold(
+        sphere(0.8), of="delaunay", where="surface", count=12, thickness=0.2, smooth=0.1
+    ),
     "heightmap": heightmap(HILLS, size=1.5, height=0.4, base=0.1),
     "lithophane": lithophane(HILLS, thinnest=0.1, thickest=0.3),
     "lithophane wall": lithophane(HILLS, form="cylinder", thinnest=0.1, thickest=0.3, degrees=200),
@@ -212,7 +226,11 @@ EXAMPLES: dict[str, Node] = {
     "difference": difference(box(), sphere(radius=0.6), BAR),
     "smooth difference": difference(box(), sphere(radius=0.6), smooth=0.1),
     "offset": offset(box(), distance=0.15),
+    "displace": displace(box(), by="0.1*sin(4*x)*sin(4*y)"),
+    "thicken": thicken(cut(gyroid(period=0.9, thickness=0.05)), sphere(0.3), by=0.2, within=0.4),
+    "onion": onion(box(size=(1.6, 1.4, 1.2)), period=0.25, thickness=0.1),
     "shell": shell(sphere(), thickness=0.1),
+    "denser infill": infill(sphere(), gyroid(period=0.9, thickness=0.05), shell=0.1, denser=0.2, within=0.5),
     "infill": infill(sphere(), gyroid(period=0.9, thickness=0.12), shell=0.1),
     "perlin noise": noise(sphere(), kind="perlin"),
     "simplex noise": noise(BAR, octaves=2),
@@ -253,10 +271,11 @@ EXAMPLES: dict[str, Node] = {
 }
 
 OF_FILES = {
-    "model", "extrude", "revolve", "text", "volume", "heightmap", "lithophane", "lithophane wall",
+    "beams", "scaffold", "scaffold on a surface",
+    "model", "extrude", "revolve", "sweep", "text", "volume", "heightmap", "lithophane", "lithophane wall",
     "lithophane ball", "relief",
 }  # fmt: skip
-"""Examples that native code computes, on the CPU alone; each is of a file."""
+"""Examples that native code computes, on the CPU alone; each shape is of a file."""
 
 _TURNED = "return scale * turn(fold(w, 1), (0, 0, 1), 20) + c"
 _EGG = "return sqrt(x**2 + y**2 + (flat * z)**2) - 1"
@@ -267,6 +286,7 @@ DEFINED = {
 """Formulas as a scene defines them; they are not registered."""
 
 REPRESENTATIVES = {
+    "beams", "scaffold",
     "a distance", "a step", "abox", "apollonian", "bend", "bounds", "bristorbrot julia", "burning ship",
     "cone", "cosine bulb", "deep", "difference", "extrude", "foam of walls", "gear", "gyroid wall",
     "heightmap", "honeycomb",
@@ -274,7 +294,7 @@ REPRESENTATIVES = {
     "lambda bulb", "lithophane wall", "mandelbox -1.5", "mandelbulb", "mandelbulb 7.5", "many", "material",
     "menger", "mirror", "model", "octahedron flake", "perlin noise", "prism", "pseudo kleinian",
     "quaternion julia 4", "repeat overlapping", "revolve", "rounded box", "schwarz_d wall", "shell",
-    "smooth intersection", "smooth union", "snowflake", "sphere", "superquadric", "text", "thread",
+    "smooth intersection", "smooth union", "snowflake", "sphere", "superquadric", "sweep", "text", "thread",
     "transform", "tree", "twist x", "volume",
 }  # fmt: skip
 """Examples of which none is built like another; tests that are stamped on all have the others in a night."""

@@ -268,6 +268,34 @@ class Vector(Bounded):
 
 
 @dataclass(frozen=True)
+class Points(Parameter):
+    """Several points, with commas between them."""
+
+    annotation: ClassVar[Any] = str | Sequence[Sequence[float]]
+    MOST: ClassVar[int] = 100_000
+
+    @property
+    def expects(self) -> str:
+        return "points such as 0 0 0, 5 0 0, 5 5 2"
+
+    def read(self, text: str) -> Any:
+        return self.check(text)
+
+    def check(self, value: Any) -> Any:
+        parts = value.split(",") if isinstance(value, str) else items(value)
+        if not 2 <= len(parts) <= self.MOST:
+            raise ValueError(f"2 to {self.MOST} {self.expects}, found {len(parts)}")
+        point = Vector(None, "")
+        try:
+            return tuple(point.read(p) if isinstance(p, str) else point.check(p) for p in parts)
+        except ValueError:
+            raise ValueError(self.expects) from None
+
+    def text(self, value: Any) -> str:
+        return ", ".join(" ".join(map(shortest, point)) for point in value)
+
+
+@dataclass(frozen=True)
 class Choice(Parameter):
     """One word of a list.
 

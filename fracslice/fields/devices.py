@@ -11,12 +11,12 @@ import numpy as np
 
 from ..common.cache import key as hashed
 from ..common.cache import warn
-from ..common.parameters import Choice, File, validate_value
+from ..common.parameters import Choice, validate_value
 from ..errors import DeviceError
 from ..expr import vocabulary
 from ..expr.graph import ON_ARRAYS, Evaluator
 from ..expr.intervals import ON_CELLS, TINY, Interval, enclosed
-from ..expr.language import words
+from ..expr.language import InMemory, words
 from ..expr.loops import Loop, enclosures
 from . import cpu
 from .field import Cells, Device, Field, Kernel, Loops, Precision
@@ -46,11 +46,12 @@ def choose_device(device: str) -> Device:
 
 
 def for_field(root: Node, device: Device) -> Device:
-    """Select the CPU for a field with a model or outline, which lies in its memory, with one warning."""
+    """Select the CPU for a field with a model, outline or other in its memory, with one warning."""
     if device == "cpu":
         return device
     for node in root.solids():
-        if any(isinstance(kind, File) and kind.inside for kind in node.formula.parameters.values()):
+        known = not node.formula.exterior_only  # a fractal has none, and its depth may be open
+        if known and any(isinstance(value, InMemory) for value in node.arguments.values()):
             warn(f"a scene with a <{node.formula.name}> is computed on the CPU, in whose memory that is")
             return "cpu"
     return device

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import operator
+import re
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache, reduce
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -25,6 +27,8 @@ FARTHEST, NEAREST, STEEPEST = 30, -5, 100.0
 """Space is proved in cells between powers of 2, of these exponents, on both sides of 0; steepest slope."""
 CELLS = 24
 """Cells along each side of a box."""
+ROUNDS, FEW = 24, 1 << 11
+"""How often the steepest cells are halved, and how many at once."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +61,7 @@ class Varying:
     def most(self, box: Box) -> float:
         """Bound of its values in a box."""
         ends = zip(np.clip(box.lo, -(2.0**FARTHEST), None), np.clip(box.hi, None, 2.0**FARTHEST), strict=True)
-        found = _evaluated(self.text, *(np.linspace(low, high, CELLS + 1) for low, high in ends))
+        found = _on_cells(self.text, *_between(*(np.linspace(*end, CELLS + 1) for end in ends)))
         return float(found.value.hi.max())
 
 
@@ -131,7 +135,7 @@ _UFUNCS = {
     "add": "({} + {})", "subtract": "({} - {})", "multiply": "({} * {})", "divide": "({} / {})",
     "negative": "(-{})", "square": "({0} * {0})", "absolute": "abs({})", "minimum": "min({}, {})",
     "maximum": "max({}, {})", "sqrt": "sqrt({})", "exp": "exp({})", "log": "log({})", "sin": "sin({})",
-    "cos": "cos({})",
+    "cos": "cos({})", "hypot": "sqrt({} ** 2 + {} ** 2)",
 }  # fmt: skip
 
 
@@ -161,29 +165,61 @@ def _followed(function: Callable[..., Any]) -> str:
     return found.text
 
 
+HUGE = 1e100
+"""Largest bound of a slope, or value of a factor of one."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Slopes:
     """Values on cells with their derivatives by x, y and z.
 
-    `squares`: those whose sum of squares it is, up to a number that is not negative.
+    `steepest`: bound of the length of the gradient that follows from the operation; `squares`: those whose
+    sum of squares the value is, up to a number that is not negative; `multiple`: another one, and how many
+    times that the value is.
     """
 
     value: Interval
     slopes: tuple[Interval, ...]
+    steepest: NDArray[np.float64]
     squares: tuple[_Slopes, ...] = ()
+    multiple: tuple[_Slopes, float] | None = None
+
+    @cached_property
+    def length(self) -> NDArray[np.float64]:
+        """Bound of the length of the gradient."""
+        length = np.linalg.norm([_most(s) for s in self.slopes], axis=0)
+        bound: NDArray[np.float64] = np.fmin(length, self.steepest)
+        return bound
+
+    def along(self, other: _Slopes) -> NDArray[np.float64]:
+        """Bound of the product of the lengths of both gradients with the cosine of the angle between."""
+        products = (a * b for a, b in zip(self.slopes, other.slopes, strict=True))
+        whole = reduce(operator.add, products)
+        bound: NDArray[np.float64] = np.fmin(_most(whole), self.length * other.length)
+        return bound
+
+    def times(self, factor: float) -> _Slopes:
+        """The product with a number."""
+        made = self.chained(self.value * factor, factor)
+        squares = tuple(s.times(math.sqrt(factor)) for s in self.squares) if factor >= 0 else ()
+        of, often = self.multiple or (self, 1.0)
+        return replace(made, squares=squares, multiple=(of, often * factor))
 
     def chained(self, value: Interval, slope: Interval | float) -> _Slopes:
         """A function of it, of this derivative."""
-        return _Slopes(value, tuple(s * slope for s in self.slopes))
+        steepest = self.length * (_most(slope) if isinstance(slope, Interval) else abs(slope))
+        return _Slopes(value, tuple(s * slope for s in self.slopes), steepest)
 
     def __neg__(self) -> _Slopes:
-        return _Slopes(-self.value, tuple(-s for s in self.slopes))
+        return self.times(-1.0)
 
     def __add__(self, other: _Slopes | float) -> _Slopes:
         if not isinstance(other, _Slopes):
-            return _Slopes(self.value + other, self.slopes, self.squares if other >= 0 else ())
+            squares = self.squares if other >= 0 else ()
+            return _Slopes(self.value + other, self.slopes, self.steepest, squares)
         both = self.squares + other.squares if self.squares and other.squares else ()
-        return _Slopes(self.value + other.value, _pairwise(operator.add, self, other), both)
+        steepest = np.sqrt(self.length**2 + other.length**2 + 2 * self.along(other))
+        return _Slopes(self.value + other.value, _pairwise(operator.add, self, other), steepest, both)
 
     __radd__ = __add__
 
@@ -195,13 +231,17 @@ class _Slopes:
 
     def __mul__(self, other: _Slopes | float) -> _Slopes:
         if not isinstance(other, _Slopes):
-            return self.chained(self.value * other, other)
-        if other is self:
-            square = self.chained(self.value * self.value, self.value * 2.0)
-            return _Slopes(square.value, square.slopes, (self,))
+            return self.times(other)
+        (of, often), (same, again) = self.multiple or (self, 1.0), other.multiple or (other, 1.0)
+        if of is same:
+            square = replace(of.chained(of.value * of.value, of.value * 2.0), squares=(of,))
+            return square.times(often * again)
         pairs = zip(self.slopes, other.slopes, strict=True)
         slopes = tuple(a * other.value + b * self.value for a, b in pairs)
-        return _Slopes(self.value * other.value, slopes)
+        one, two = _most(self.value), _most(other.value)
+        squares = (two * self.length) ** 2 + (one * other.length) ** 2
+        steepest = np.sqrt(squares + 2 * one * two * self.along(other))
+        return _Slopes(self.value * other.value, slopes, steepest)
 
     __rmul__ = __mul__
 
@@ -224,8 +264,8 @@ class _Slopes:
         parts = [(part, (part.value / root).maximum(-1.0).minimum(1.0)) for part in self.squares]
         first, *rest = (part.chained(part.value, ratio) for part, ratio in parts)
         for other in rest:
-            first = _Slopes(root, _pairwise(operator.add, first, other))
-        return _Slopes(root, first.slopes)
+            first = _Slopes(root, _pairwise(operator.add, first, other), first.steepest)
+        return _Slopes(root, first.slopes, _stretch(self.squares))
 
     def rsqrt(self) -> _Slopes:
         """Reciprocal of the square root."""
@@ -263,10 +303,31 @@ class _Slopes:
         """The smaller of two; where either may be, the slopes of both."""
         other = other if isinstance(other, _Slopes) else self._constant(other)
         less = self.value <= other.value
-        return _Slopes(self.value.minimum(other.value), _pairwise(less.where, self, other))
+        either = np.where(less.may, np.maximum(self.length, other.length), other.length)
+        steepest = np.where(less.must, self.length, either)
+        return _Slopes(self.value.minimum(other.value), _pairwise(less.where, self, other), steepest)
 
     def _constant(self, number: float) -> _Slopes:
-        return _Slopes(self.value.number(number), tuple(s.number(0.0) for s in self.slopes))
+        zero = tuple(s.number(0.0) for s in self.slopes)
+        return _Slopes(self.value.number(number), zero, np.zeros_like(self.steepest))
+
+
+def _most(value: Interval) -> NDArray[np.float64]:
+    """Largest magnitude on each cell."""
+    most: NDArray[np.float64] = np.minimum(np.maximum(-value.lo, value.hi), HUGE)
+    return most
+
+
+def _stretch(parts: tuple[_Slopes, ...]) -> NDArray[np.float64]:
+    """Bound of the slope of a radius in these coordinates, and so of the norm of their Jacobian J: its square
+    is the norm of J times its transpose, which is at most the largest sum of a row.
+    """
+    rows = [
+        np.sum([one.length**2 if one is other else one.along(other) for other in parts], axis=0)
+        for one in parts
+    ]
+    bound: NDArray[np.float64] = np.sqrt(np.max(rows, axis=0))
+    return bound
 
 
 def _pairwise(function: Callable[..., Interval], a: _Slopes, b: _Slopes) -> tuple[Interval, ...]:
@@ -290,13 +351,19 @@ _CONTINUOUS = ("sqrt", "rsqrt", "ratio", "log", "exp", "sin", "cos", "minimum", 
 _evaluator = Evaluator({name: _operation(name) for name in _CONTINUOUS})
 
 
-def _evaluated(text: str, *edges: NDArray[np.float64]) -> _Slopes:
-    """Values and slopes of an expression on the cells between edges along each axis."""
+def _between(*edges: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Corners [3, n] of the cells between edges along each axis."""
     low, high = (np.meshgrid(*(e[part] for e in edges)) for part in (slice(None, -1), slice(1, None)))
-    sides = [Interval(a.ravel(), b.ravel(), ARRAYS) for a, b in zip(low, high, strict=True)]
-    zero, one = (Interval.at(np.full(low[0].size, number), ARRAYS, number) for number in (0.0, 1.0))
+    return np.array(low).reshape(3, -1), np.array(high).reshape(3, -1)
+
+
+def _on_cells(text: str, low: NDArray[np.float64], high: NDArray[np.float64]) -> _Slopes:
+    """Values and slopes of an expression on cells between corners [3, n]."""
+    sides = [Interval(a, b, ARRAYS) for a, b in zip(low, high, strict=True)]
+    ones = np.ones(low.shape[1])
+    zero, one = (Interval.at(number * ones, ARRAYS, number) for number in (0.0, 1.0))
     units = [tuple(one if k == axis else zero for k in range(3)) for axis in range(3)]
-    point = [_Slopes(side, slopes) for side, slopes in zip(sides, units, strict=True)]
+    point = [_Slopes(side, slopes, ones) for side, slopes in zip(sides, units, strict=True)]
     with np.errstate(all="ignore"):
         found: _Slopes = _evaluator(formula(_function(text)), *point)
     return found
@@ -306,9 +373,27 @@ def _evaluated(text: str, *edges: NDArray[np.float64]) -> _Slopes:
 def _slope(text: str) -> float:
     far = 2.0 ** np.arange(NEAREST, FARTHEST + 1)
     edges = np.concatenate([-far[::-1], [0.0], far])
+    used = [edges if re.search(rf"\b{name}\b", text) else edges[[0, -1]] for name in "xyz"]
+    low, high = _between(*used)
     try:
-        slopes = _evaluated(text, edges, edges, edges).slopes
+        slopes = _on_cells(text, low, high).length
+        for _ in range(ROUNDS):
+            # The steepest cells, if they are few, are halved along each axis.
+            steep = slopes > 0.97 * slopes.max()
+            if not 0 < steep.sum() <= FEW:
+                break
+            parts = _halves(low[:, steep], high[:, steep])
+            slopes = np.append(slopes[~steep], _on_cells(text, *parts).length)
+            low, high = (np.append(a[:, ~steep], b, 1) for a, b in zip((low, high), parts, strict=True))
     except (KeyError, TypeError, AttributeError):  # what jumps, such as floor, has no slopes here
         return float("inf")
-    steepest = [np.minimum(np.maximum(-s.lo, s.hi), 1e100) for s in slopes]
-    return float(np.linalg.norm(steepest, axis=0).max() * (1 + 1e-12))
+    return float(slopes.max() * (1 + 1e-12))
+
+
+def _halves(low: NDArray[np.float64], high: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+    """Corners of the eight parts of cells, each [3, 8 n]."""
+    middle = (low + high) / 2
+    which = [[side >> axis & 1 for axis in range(3)] for side in range(8)]
+    begins = [np.where(np.array(upper)[:, None], middle, low) for upper in which]
+    ends = [np.where(np.array(upper)[:, None], high, middle) for upper in which]
+    return np.concatenate(begins, 1), np.concatenate(ends, 1)

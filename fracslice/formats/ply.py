@@ -77,15 +77,20 @@ class _Column(NamedTuple):
     values: Numbers
 
 
+def read_tables(path: str | Path) -> dict[str, dict[str, _Column]]:
+    """Columns of each element of a file. Raises ValueError and others of its kind."""
+    elements, body = _layout(read_bytes(path))
+    tables, at = {}, 0
+    for element in elements:
+        tables[element.name], at = _table(element, body, at)
+    return tables
+
+
 def _read(path: Path) -> Triangles:
     """Its vertices and faces; polygons become fans of triangles."""
-    data = read_bytes(path)
     try:
-        elements, body = _layout(data)
-        tables, at = {}, 0
-        for element in elements:
-            tables[element.name], at = _table(element, body, at)
-        x, y, z = (_numbers(tables["vertex"][axis]) for axis in "xyz")
+        tables = read_tables(path)
+        x, y, z = (numbers_of(tables["vertex"][axis]) for axis in "xyz")
         face = tables.get("face", {})
         lengths, corners = next((face[name] for name in CORNERS if name in face), _Column(*np.empty((2, 0))))
     except (ValueError, KeyError, IndexError, OverflowError) as error:
@@ -95,7 +100,7 @@ def _read(path: Path) -> Triangles:
     return Triangles(np.stack([x, y, z], axis=1).astype(np.float64), fans(lengths, corners.astype(np.int32)))
 
 
-def _numbers(column: _Column) -> Numbers:
+def numbers_of(column: _Column) -> Numbers:
     """Values of a property that has one in each row. Raises ValueError."""
     if (column.lengths != 1).any():
         raise ValueError("lists in place of numbers")

@@ -102,6 +102,34 @@ def apollonian(level: int = 4, swell: float = 1.02) -> Node:
     Node
     """
 
+def beams(file: str, thickness: float = 0.1, smooth: float = 0.0, size: float | None = None, place: Literal['as is', 'centre', 'bed'] = 'as is', units: Literal['um', 'µm', 'mm', 'cm', 'in', 'm'] = 'mm', sha256: str | None = None) -> Node:
+    """Beams between points, round and with round ends, as a file has them (round cones: Quilez 2008,
+    "Distance functions"). L = 1: an exact distance outside, and inside of what is in one beam alone. With
+    seams, f is that for which max(0, f + smooth - d)^2, summed over the distances d of all beams, is
+    smooth^2; they fill less than `smooth`.
+
+    Parameters
+    ----------
+    file : the name of a file
+        a graph, in the folder of the scene: .csv, .json, lines of .obj, edges of .ply, beams of .3mf
+    thickness : a number > 0, default 0.1
+        diameter of beams whose radius the file does not state
+    smooth : a number >= 0, default 0.0
+        width of rounded seams: where distances of beams differ by less than this they are blended (0: none)
+    size : a number > 0
+        longest side of the box of all ends; without it, a scene unit is a millimetre
+    place : as is, centre or bed, default 'as is'
+        where the file has it, with the box of all ends centred at the origin, or there from z = 0
+    units : um, µm, mm, cm, in or m, default 'mm'
+        unit of the file
+    sha256 : the SHA-256 of the file, 64 hexadecimal digits
+        hash of the file, by which a file that has changed is noticed
+
+    Returns
+    -------
+    Node
+    """
+
 def bend(*elements: Node, degrees: float, axis: Literal['x', 'y', 'z'] = 'z') -> Node:
     """The element bent: a straight axis becomes an arc (Barr 1984, "Global and Local Deformations of Solid
     Primitives").
@@ -328,6 +356,24 @@ def difference(*elements: Node, smooth: float | str | Callable[..., Any] = 0.0) 
     Node
     """
 
+def displace(*elements: Node, by: float | str | Callable[..., Any]) -> Node:
+    """The element whose surface moves by an expression in x, y and z (Cook 1984, "Shade trees"). L = the
+    element's plus the bound of the expression's slope, or 1 if that is more. The result is clipped at the box
+    of the element, grown by the largest displacement there; the field of an escape-time fractal as by
+    `<offset>`.
+
+    Parameters
+    ----------
+    *elements : Node
+        What it is applied to; several are a union.
+    by : a number, or an expression such as 0.1+0.02*z
+        how far outward the surface moves at each point, in scene units; negative: inward
+
+    Returns
+    -------
+    Node
+    """
+
 def extrude(file: str, size: float | None = None, height: float = 1.0, place: Literal['centre', 'bed', 'as is'] = 'centre', sha256: str | None = None) -> Node:
     """What an SVG file fills, extruded along z (Quilez 2008, "Distance functions"). L = 1: an exact distance,
     but for curves, which are segments within 1/20000 of the longest side. Strokes, clipping and masks do not
@@ -364,7 +410,7 @@ def fischer_koch_s(period: float = 1.0, thickness: float | str | Callable[..., A
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
     volume_fraction : a number > 0 and < 1
-        share of space that is solid, within 0.2 % of it; the thickness follows
+        share of space that is solid, within 0.2 % of it; the thickness follows, or the period of a thickness
 
     Returns
     -------
@@ -403,7 +449,7 @@ def frd(period: float = 1.0, thickness: float | str | Callable[..., Any] = 0.1, 
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
     volume_fraction : a number > 0 and < 1
-        share of space that is solid, within 0.2 % of it; the thickness follows
+        share of space that is solid, within 0.2 % of it; the thickness follows, or the period of a thickness
 
     Returns
     -------
@@ -448,7 +494,7 @@ def gyroid(period: float = 1.0, thickness: float | str | Callable[..., Any] = 0.
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
     volume_fraction : a number > 0 and < 1
-        share of space that is solid, within 0.2 % of it; the thickness follows
+        share of space that is solid, within 0.2 % of it; the thickness follows, or the period of a thickness
 
     Returns
     -------
@@ -522,9 +568,10 @@ def honeycomb(kind: Literal['435', '534', '535', '353'] = '534', thickness: floa
     Node
     """
 
-def infill(*elements: Node, shell: float | str | Callable[..., Any]) -> Node:
+def infill(*elements: Node, shell: float | str | Callable[..., Any], denser: float = 0.0, within: float = 1.0) -> Node:
     """The first element, of which a wall stays whole, and behind it what the other elements fill, such as a
-    lattice. L = maximum of the elements'.
+    lattice. L = maximum of the elements'; with `denser`, the fillers' plus denser / 2 / within times that of
+    the first element.
 
     Parameters
     ----------
@@ -532,6 +579,10 @@ def infill(*elements: Node, shell: float | str | Callable[..., Any]) -> Node:
         What it is made of.
     shell : a number > 0, or an expression such as 0.1+0.02*z
         thickness of the wall that stays whole, in scene units
+    denser : a number, default 0.0
+        how much thicker what fills it is at the surface of the first element, by less deeper inside
+    within : a number > 0, default 1.0
+        depth from which on it is as thick as given
 
     Returns
     -------
@@ -566,7 +617,7 @@ def iwp(period: float = 1.0, thickness: float | str | Callable[..., Any] = 0.1, 
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
     volume_fraction : a number > 0 and < 1
-        share of space that is solid, within 0.2 % of it; the thickness follows
+        share of space that is solid, within 0.2 % of it; the thickness follows, or the period of a thickness
 
     Returns
     -------
@@ -757,7 +808,7 @@ def lidinoid(period: float = 1.0, thickness: float | str | Callable[..., Any] = 
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
     volume_fraction : a number > 0 and < 1
-        share of space that is solid, within 0.2 % of it; the thickness follows
+        share of space that is solid, within 0.2 % of it; the thickness follows, or the period of a thickness
 
     Returns
     -------
@@ -977,7 +1028,7 @@ def neovius(period: float = 1.0, thickness: float | str | Callable[..., Any] = 0
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
     volume_fraction : a number > 0 and < 1
-        share of space that is solid, within 0.2 % of it; the thickness follows
+        share of space that is solid, within 0.2 % of it; the thickness follows, or the period of a thickness
 
     Returns
     -------
@@ -1039,6 +1090,24 @@ def offset(*elements: Node, distance: float) -> Node:
         What it is applied to; several are a union.
     distance : a number
         how far outward the surface moves, in scene units; negative: inward
+
+    Returns
+    -------
+    Node
+    """
+
+def onion(*elements: Node, period: float, thickness: float | str | Callable[..., Any]) -> Node:
+    """Walls within the element that follow its surface, one below the other, the first with the surface as
+    its outer face (after Quilez 2008, "Distance functions"). L = the element's.
+
+    Parameters
+    ----------
+    *elements : Node
+        What it is applied to; several are a union.
+    period : a number > 0
+        distance from wall to wall
+    thickness : a number > 0, or an expression such as 0.1+0.02*z
+        of the walls
 
     Returns
     -------
@@ -1210,6 +1279,33 @@ def revolve(file: str, size: float | None = None, offset: float = 0.0, place: Li
     Node
     """
 
+def scaffold(*elements: Node, of: Literal['voronoi', 'delaunay'] = 'voronoi', where: Literal['inside', 'surface'] = 'inside', count: int = 100, thickness: float = 0.1, smooth: float = 0.0, seed: int = 0) -> Node:
+    """Beams along the edges of Voronoi 1908 cells or of Delaunay 1934 tetrahedra of points that are spread
+    evenly in the element, or on its surface (Edelsbrunner and Shah 1997, "Triangulating topological spaces"),
+    which they follow. L = maximum of 1 and the element's; on the surface, 1.
+
+    Parameters
+    ----------
+    *elements : Node
+        What it is applied to; several are a union.
+    of : voronoi or delaunay, default 'voronoi'
+        edges of the cells of what is nearest to each point, or lines from points to their neighbours
+    where : inside or surface, default 'inside'
+        points in the element, whose beams end at its surface, or on it
+    count : a whole number from 5 to 20000, default 100
+        number of points
+    thickness : a number > 0, default 0.1
+        diameter of the beams
+    smooth : a number >= 0, default 0.0
+        width of rounded seams: where distances of beams differ by less than this they are blended (0: none)
+    seed : a whole number from 0 to 2147483647, default 0
+        number that chooses another arrangement
+
+    Returns
+    -------
+    Node
+    """
+
 def schwarz_d(period: float = 1.0, thickness: float | str | Callable[..., Any] = 0.1, grade: Sequence[float] = (0.0, 0.0, 0.0), volume_fraction: float | None = None) -> Node:
     """A wall along the surface D of Schwarz 1890. The gradient of its level function is at most
     sqrt(3): L = 1.
@@ -1223,7 +1319,7 @@ def schwarz_d(period: float = 1.0, thickness: float | str | Callable[..., Any] =
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
     volume_fraction : a number > 0 and < 1
-        share of space that is solid, within 0.2 % of it; the thickness follows
+        share of space that is solid, within 0.2 % of it; the thickness follows, or the period of a thickness
 
     Returns
     -------
@@ -1243,7 +1339,7 @@ def schwarz_p(period: float = 1.0, thickness: float | str | Callable[..., Any] =
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
     volume_fraction : a number > 0 and < 1
-        share of space that is solid, within 0.2 % of it; the thickness follows
+        share of space that is solid, within 0.2 % of it; the thickness follows, or the period of a thickness
 
     Returns
     -------
@@ -1291,7 +1387,7 @@ def split_p(period: float = 1.0, thickness: float | str | Callable[..., Any] = 0
     grade : 3 numbers >= -4 and <= 4, default (0.0, 0.0, 0.0)
         growth of the thickness per length along x, y and z
     volume_fraction : a number > 0 and < 1
-        share of space that is solid, within 0.2 % of it; the thickness follows
+        share of space that is solid, within 0.2 % of it; the thickness follows, or the period of a thickness
 
     Returns
     -------
@@ -1314,7 +1410,7 @@ def struts(kind: Literal['cubic', 'bcc', 'fcc', 'octet', 'kelvin'] = 'octet', pe
     thickness : a number > 0, or an expression such as 0.1+0.02*z, default 0.1
         diameter of the struts
     volume_fraction : a number > 0 and < 1
-        share of space that is solid, within 0.2 % of it; the thickness follows
+        share of space that is solid, within 0.2 % of it; the thickness follows, or the period of a thickness
 
     Returns
     -------
@@ -1333,6 +1429,41 @@ def superquadric(size: Sequence[float] = (1.0, 1.0, 1.0), exponent: float = 4.0)
         the three diameters
     exponent : a number >= 2 and <= 100, default 4.0
         2 is an ellipsoid; larger numbers come near to a box
+
+    Returns
+    -------
+    Node
+    """
+
+def sweep(file: str, size: float | None = None, anchor: Literal['centre', 'origin'] = 'centre', path: str | None = None, length: float | None = None, place: Literal['centre', 'as is'] = 'centre', points: str | Sequence[Sequence[float]] | None = None, closed: Literal['no', 'yes'] = 'no', sha256: str | None = None, path_sha256: str | None = None) -> Node:
+    """What an SVG file fills, swept along a path: seen along the path, its x is to the right, and its y up,
+    towards z where the path starts (Wang, Juettler, Zheng and Liu 2008, "Computation of Rotation Minimizing
+    Frames"). Corners below 165 degrees are mitred. L = 1: an exact distance, but for curves, which are
+    segments within 1/20000 of the longest side of the outline, or of the path. Where a path meets itself, or
+    bends more tightly than the outline is wide, parts are united: inside, the distance is then a bound.
+
+    Parameters
+    ----------
+    file : the name of a file
+        an SVG file, in the folder of the scene
+    size : a number > 0
+        the longest side of the outline; without it, a scene unit is a millimetre
+    anchor : centre or origin, default 'centre'
+        the point of the outline that is on the path: the centre of its box, or the origin of its file
+    path : the name of a file
+        an SVG file whose lines are the path, in the folder of the scene
+    length : a number > 0
+        longest side of that path; without it, a scene unit is a millimetre
+    place : centre or as is, default 'centre'
+        that path centred at the origin, or where its file has it, y up
+    points : points such as 0 0 0, 5 0 0, 5 5 2
+        corners of the path, in place of a file
+    closed : no or yes, default 'no'
+        whether points are joined to a ring
+    sha256 : the SHA-256 of the file, 64 hexadecimal digits
+        hash of the file, by which a file that has changed is noticed
+    path_sha256 : the SHA-256 of the file, 64 hexadecimal digits
+        hash of the file of the path, in the same way
 
     Returns
     -------
@@ -1377,6 +1508,25 @@ def text(text: str, font: str, size: float = 1.0, depth: float = 1.0, place: Lit
         where on its axes a variable font is, such as wght=700, wdth=80
     sha256 : the SHA-256 of the file, 64 hexadecimal digits
         hash of the font, by which a file that has changed is noticed
+
+    Returns
+    -------
+    Node
+    """
+
+def thicken(*elements: Node, by: float, within: float = 1.0) -> Node:
+    """The first element, such as a lattice, thicker inside the others, and by less the farther from them: its
+    density follows a solid, a model, a text or the heights of a picture. L = the first element's plus
+    by / 2 / within times the others', or 1 if that is more. The result is clipped at the grown box.
+
+    Parameters
+    ----------
+    *elements : Node
+        What it is made of.
+    by : a number
+        how much thicker the first element is on both sides together; negative: thinner
+    within : a number > 0, default 1.0
+        distance from the others from which on it is as it was
 
     Returns
     -------

@@ -1,13 +1,14 @@
-"""Domain operators that bound their element: bounding box, offset and repetition."""
+"""Domain operators that bound their element: bounding box, offset, displacement and repetition."""
 
 from __future__ import annotations
 
 import math
 
-from ..common.parameters import REQUIRED, Number, Vector
+from ..common.parameters import LARGEST, REQUIRED, Number, Vector
 from ..expr.vocabulary import absolute, any_of, floor, maximum, minimum
 from ..fields.box import Box
 from ..fields.registry import Fixed, Node, always_keeps_sign, domain_operator
+from ..fields.varying import Variable, Varying, as_argument, slope_of
 
 # An operator that confines its child returns ``maximum(d, minimum(child, 2 m - d))``, where d is the signed
 # distance to a volume around the child and m > 0 a margin. The surface is unchanged where d <= 0, and the
@@ -94,6 +95,51 @@ def offset_slope(node: Node) -> float:
 @offset.identity
 def offset_identity(node: Node) -> bool:
     return bool(node["distance"] == 0)
+
+
+@domain_operator(
+    by=Variable(REQUIRED, "how far outward the surface moves at each point, in scene units; negative: inward")
+)
+def displace(child, x, y, z, by, centre, half):  # type: ignore[no-untyped-def]
+    """The element whose surface moves by an expression in x, y and z (Cook 1984, "Shade trees"). L = the
+    element's plus the bound of the expression's slope, or 1 if that is more. The result is clipped at the box
+    of the element, grown by the largest displacement there; the field of an escape-time fractal as by
+    `<offset>`.
+    """
+    return maximum(child(x, y, z) - by, beyond(x, y, z, centre, half))
+
+
+@displace.arguments
+def displace_arguments(node: Node) -> dict[str, object]:
+    by = node["by"]
+    if node.is_conservative and node.bounds.exterior_only:
+        by = by.at_least(0.0) if isinstance(by, Varying) else max(by, 0.0)
+    return {"by": as_argument(by), **frame(node.bounds.box)}
+
+
+@displace.bounds
+def displace_bounds(node: Node) -> Box:
+    return node.children[0].bounds.box.grown(_farthest(node))
+
+
+@displace.slope
+def displace_slope(node: Node) -> float:
+    slope = node.children[0].bounds.slope_less(_farthest(node)) + slope_of(node["by"])
+    return max(1.0, slope)
+
+
+def _farthest(node: Node) -> float:
+    """Bound of the displacement where the displaced element is."""
+    by, box = node["by"], node.children[0].bounds.box
+    if not isinstance(by, Varying):
+        return float(by)
+    # Beyond the box it is more by the slope times the way to a corner.
+    wider = math.sqrt(3) * by.slope
+    within = max(by.most(box), 0.0) / (1 - wider) if wider < 1 else math.inf
+    farthest = min(within, by.most(Box.everywhere()))
+    if not farthest < LARGEST:
+        raise node.fail(f"by={by!r}: expected one with a limit, such as min(..., 1)")
+    return farthest
 
 
 def frame(box: Box) -> dict[str, object]:

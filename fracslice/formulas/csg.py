@@ -1,4 +1,4 @@
-"""CSG operators: union, intersection, difference, shell and infill."""
+"""CSG operators: union, intersection, difference, and what hollows and fills."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from collections.abc import Callable
 from functools import reduce
 from typing import Any
 
-from ..common.parameters import REQUIRED, SMALLEST
-from ..expr.vocabulary import absolute, maximum, minimum
+from ..common.parameters import REQUIRED, SMALLEST, Number
+from ..expr.vocabulary import absolute, floor, maximum, minimum
 from ..fields.box import Box
 from ..fields.registry import Node, csg_operator
 from ..fields.varying import Variable, Varying, as_argument, slope_of
@@ -121,7 +121,8 @@ def csg_arguments(node: Node) -> dict[str, object]:
 
 def csg_check(node: Node) -> None:
     if isinstance(node["smooth"], Varying) and any(child.bounds.exterior_only for child in node.children):
-        raise node.fail(f"smooth={node['smooth']!r}: expected a number, as an element is a fractal")
+        reason = "an element is a fractal, whose slope away from its surface is measured and not proved"
+        raise node.fail(f"smooth={node['smooth']!r}: expected a number, as {reason}")
 
 
 def csg_slope(node: Node) -> float:
@@ -186,43 +187,171 @@ def shell_select(node: Node):  # type: ignore[no-untyped-def]
 
 
 @csg_operator(
+    (1, 1),
+    period=Number(REQUIRED, "distance from wall to wall", above=0),
+    thickness=Variable(REQUIRED, "of the walls", above=0),
+)
+def onion(a, period, over, thickness):  # type: ignore[no-untyped-def]
+    """Walls within the element that follow its surface, one below the other, the first with the surface as
+    its outer face (after Quilez 2008, "Distance functions"). L = the element's.
+    """
+    deep = maximum(-a, 0.0)
+    below = deep - period * floor(deep * over)
+    return maximum(a, minimum(absolute(below - 0.5 * thickness) - 0.5 * thickness, period - below))
+
+
+def conservative_onion(a):  # type: ignore[no-untyped-def]
+    """Conservative bound of the distance to an onion, where the element's field is an exterior bound only."""
+    return maximum(a, 0.0)
+
+
+@onion.select
+def onion_select(node: Node):  # type: ignore[no-untyped-def]
+    return conservative_onion if node.is_conservative and node.bounds.exterior_only else onion.function
+
+
+@onion.arguments
+def onion_arguments(node: Node) -> dict[str, object]:
+    if node.function is conservative_onion:
+        return {}
+    period = node["period"]
+    return {"period": period, "over": 1 / period, "thickness": as_argument(node["thickness"])}
+
+
+@onion.check
+def onion_check(node: Node) -> None:
+    if not isinstance(node["thickness"], Varying) and node["thickness"] >= node["period"]:
+        raise node.fail(f"thickness={node['thickness']:g}: expected less than period={node['period']:g}")
+
+
+# Far away, fillers without end may be no numbers, which are then the first operand, and not chosen.
+
+
+@csg_operator(
     (2, 2),
     shell=Variable(REQUIRED, "thickness of the wall that stays whole, in scene units", above=0),
+    denser=Number(
+        0.0, "how much thicker what fills it is at the surface of the first element, by less deeper inside"
+    ),
+    within=Number(1.0, "depth from which on it is as thick as given", above=0),
 )
 def infill(a, b, shell):  # type: ignore[no-untyped-def]
     """The first element, of which a wall stays whole, and behind it what the other elements fill, such as a
-    lattice. L = maximum of the elements'.
+    lattice. L = maximum of the elements'; with `denser`, the fillers' plus denser / 2 / within times that of
+    the first element.
     """
-    return maximum(a, minimum(-(a + shell), b))
+    return maximum(minimum(b, -(a + shell)), a)
+
+
+def graded_infill(a, b, shell, more, slope):  # type: ignore[no-untyped-def]
+    thicker = more * minimum(maximum(1.0 + slope * a, 0.0), 1.0)
+    return maximum(minimum(b - thicker, -(a + shell)), a)
 
 
 def conservative_infill(a, b, shell):  # type: ignore[no-untyped-def]
     """Conservative bound of the distance to an infill, where the first field is an exterior bound only."""
-    return maximum(a, minimum(minimum(-(a + shell), b), 0.0))
+    return maximum(minimum(minimum(b, -(a + shell)), 0.0), a)
 
 
 @infill.select
 def infill_select(node: Node):  # type: ignore[no-untyped-def]
-    exterior_only = node.is_conservative and node.children[0].bounds.exterior_only
-    return conservative_infill if exterior_only else infill.function
+    if node.is_conservative and node.children[0].bounds.exterior_only:
+        return conservative_infill
+    return graded_infill if node["denser"] else infill.function
 
 
-def hollow_arguments(node: Node) -> dict[str, object]:
-    return {name: as_argument(value) for name, value in node.values.items()}
+@infill.check
+def infill_check(node: Node) -> None:
+    if node["denser"] and any(child.bounds.exterior_only for child in node.children):
+        raise node.fail("denser: expected elements with distances on both sides, and no fractals")
 
 
-def hollow_slope(node: Node) -> float:
-    slopes = map(slope_of, node.values.values())
-    return max(child.bounds.lipschitz for child in node.children) + sum(slopes)
+@infill.arguments
+def infill_arguments(node: Node) -> dict[str, object]:
+    given = {"shell": as_argument(node["shell"])}
+    if node.function is graded_infill:
+        given |= {"more": node["denser"] / 2, "slope": 1 / node["within"]}
+    return given
 
 
-for _operator in (shell, infill):
-    _operator.arguments(hollow_arguments)
-    _operator.slope(hollow_slope)
+@infill.slope
+def infill_slope(node: Node) -> float:
+    """The wall's field and the fillers' are those whose slopes grow, each alone."""
+    solid, filler = (child.bounds.lipschitz for child in node.children)
+    graded = filler + abs(node["denser"]) / 2 / node["within"] * solid
+    return float(max(solid + slope_of(node["shell"]), graded))
+
+
+@csg_operator(
+    (2, 2),
+    by=Number(REQUIRED, "how much thicker the first element is on both sides together; negative: thinner"),
+    within=Number(1.0, "distance from the others from which on it is as it was", above=0),
+)
+def thicken(a, b, more, slope, beyond):  # type: ignore[no-untyped-def]
+    """The first element, such as a lattice, thicker inside the others, and by less the farther from them: its
+    density follows a solid, a model, a text or the heights of a picture. L = the first element's plus
+    by / 2 / within times the others', or 1 if that is more. The result is clipped at the grown box.
+    """
+    return maximum(a - more * minimum(maximum(1.0 - slope * b, 0.0), 1.0), beyond)
+
+
+def endless_thicken(a, b, more, slope):  # type: ignore[no-untyped-def]
+    return a - more * minimum(maximum(1.0 - slope * b, 0.0), 1.0)
+
+
+@thicken.select
+def thicken_select(node: Node):  # type: ignore[no-untyped-def]
+    return thicken.function if _beyond(node.bounds.box) else endless_thicken
+
+
+@thicken.arguments
+def thicken_arguments(node: Node) -> dict[str, object]:
+    given = {"more": node["by"] / 2, "slope": 1 / node["within"]}
+    if beyond := _beyond(node.bounds.box):
+        given["beyond"] = Varying(beyond).argument
+    return given
+
+
+def _beyond(box: Box) -> str:
+    """Expression of the largest coordinate relative to a box; of none where it is unbounded."""
+    sides = zip("xyz", box.lo, box.hi, strict=True)
+    ends = [
+        f"max({low!r} - {name}, {name} - {high!r})" for name, low, high in sides if math.isfinite(high - low)
+    ]
+    return reduce(lambda one, other: f"max({one}, {other})", ends) if ends else ""
+
+
+@thicken.bounds
+def thicken_bounds(node: Node) -> Box:
+    return node.children[0].bounds.box.grown(max(node["by"] / 2, 0.0))
+
+
+@thicken.slope
+def thicken_slope(node: Node) -> float:
+    first, other = (child.bounds.lipschitz for child in node.children)
+    return float(max(1.0, first + abs(node["by"]) / 2 / node["within"] * other))
+
+
+@thicken.check
+def thicken_check(node: Node) -> None:
+    if any(child.bounds.exterior_only for child in node.children):
+        raise node.fail("expected elements with distances on both sides, and no fractals")
+
+
+@shell.arguments
+def shell_arguments(node: Node) -> dict[str, object]:
+    return {"thickness": as_argument(node["thickness"])}
+
+
+@onion.slope
+@shell.slope
+def shell_slope(node: Node) -> float:
+    return node.children[0].bounds.lipschitz + slope_of(node["thickness"])
 
 
 @difference.bounds
 @shell.bounds
+@onion.bounds
 @infill.bounds
 def first_bounds(node: Node) -> Box:
     return node.children[0].bounds.box

@@ -20,7 +20,10 @@ from ..fields.registry import Fixed, Node, shape
 from ..fields.varying import Variable, Varying, as_argument, slope_of
 
 FRACTION = Number(
-    None, "share of space that is solid, within 0.2 % of it; the thickness follows", above=0, below=1
+    None,
+    "share of space that is solid, within 0.2 % of it; the thickness follows, or the period of a thickness",
+    above=0,
+    below=1,
 )
 WALL: dict[str, Any] = {
     "period": Number(1.0, "length after which the surface repeats", above=0),
@@ -145,11 +148,23 @@ SIDE = 160
 
 def wall_half(node: Node) -> float | Varying:
     """Half the thickness of a wall at the origin, in units of its field."""
-    if (fraction := node["volume_fraction"]) is not None:
-        k, flat = 2 * math.pi, (0.0, 0.0, 0.0)
-        return float(node["period"] * quantile(node.formula.function, fraction, k, 0.0, flat))
+    if node["volume_fraction"] is not None:
+        return wall_period(node) * unit_half(node)
     thickness, steepest = node["thickness"], STEEPEST.get(node.formula.name, 1.0)
     return thickness.times(steepest / 2) if isinstance(thickness, Varying) else steepest * thickness / 2
+
+
+def unit_half(node: Node) -> float:
+    """Half the thickness of a wall of period 1 that is a share of space, in units of its field."""
+    k, flat = 2 * math.pi, (0.0, 0.0, 0.0)
+    return float(quantile(node.formula.function, node["volume_fraction"], k, 0.0, flat))
+
+
+def wall_period(node: Node) -> float:
+    """Period as given, or as it follows from a thickness and a share of space."""
+    if not period_follows(node):
+        return float(node["period"])
+    return float(STEEPEST.get(node.formula.name, 1.0) * node["thickness"] / 2 / unit_half(node))
 
 
 @lru_cache(maxsize=256)
@@ -161,16 +176,25 @@ def quantile(function: Callable[..., Any], fraction: float, *arguments: Any) -> 
     return float(np.quantile([function(*slab, *arguments) for slab in slabs], fraction))
 
 
-def lattice_check(node: Node) -> None:
+def period_follows(node: Node) -> bool:
+    """True if a share of space and a thickness are given."""
     thickness = node.formula.parameters["thickness"].default
-    if node["volume_fraction"] is not None and node["thickness"] != thickness:
-        raise node.fail("thickness and volume_fraction: expected one of them")
+    return node["volume_fraction"] is not None and node["thickness"] != thickness
+
+
+def lattice_check(node: Node) -> None:
+    if not period_follows(node):
+        return
+    if node["period"] != node.formula.parameters["period"].default:
+        raise node.fail("period, thickness and volume_fraction: expected two of them, as the third follows")
+    if isinstance(node["thickness"], Varying):
+        raise node.fail("thickness and volume_fraction: expected one number with the other")
 
 
 def wall_arguments(node: Node) -> dict[str, object]:
     steepest = STEEPEST.get(node.formula.name, 1.0)
     return {
-        "k": 2 * math.pi / node["period"],
+        "k": 2 * math.pi / wall_period(node),
         "half": as_argument(wall_half(node)),
         "grade": tuple(steepest * g / 2 for g in node["grade"]),
     }
@@ -252,13 +276,16 @@ def struts(x, y, z, over, period, radius, segments):  # type: ignore[no-untyped-
 
 @struts.arguments
 def struts_arguments(node: Node) -> dict[str, object]:
-    segments, thickness, fraction = STRUTS[node["kind"]], node["thickness"], node["volume_fraction"]
+    segments, thickness, period = STRUTS[node["kind"]], node["thickness"], float(node["period"])
     radius = thickness.times(0.5) if isinstance(thickness, Varying) else thickness / 2
-    if fraction is not None:
-        radius = node["period"] * quantile(struts.function, fraction, 1.0, 1.0, 0.0, segments)
+    if (fraction := node["volume_fraction"]) is not None:
+        of_one = quantile(struts.function, fraction, 1.0, 1.0, 0.0, segments)
+        if period_follows(node):
+            period = thickness / 2 / of_one
+        radius = period * of_one
     return {
-        "over": 1.0 / node["period"],
-        "period": node["period"],
+        "over": 1.0 / period,
+        "period": period,
         "radius": as_argument(radius),
         "segments": Fixed(segments),
     }

@@ -15,21 +15,28 @@ from ..fields.registry import Formula, Node, shape
 from ..formats import ENDINGS, mesh_format
 
 
-def identify_file(formula: Formula, name: str, known: Collection[str], what: str) -> None:
-    """Let the values of a formula have the whole path and the hash of its file.
+def identify_file(
+    formula: Formula, name: str, known: Collection[str], what: str, sha256: str = "sha256"
+) -> None:
+    """Let the values of a formula have the whole path and the hash of its file, if one is given.
 
-    `name`: parameter of the file; `known`: extensions that it may have; `what`: what it is, for errors.
+    `name` and `sha256`: parameters of these; `known`: extensions that it may have; `what`: what it is, for
+    errors.
     """
+    before = formula.hooks.get("completed", lambda values: values)
 
     @formula.completed
     def file_completed(values: dict[str, Any]) -> dict[str, Any]:
         from ..mesh.models import identify
 
+        values = before(values)
+        if values[name] is None:
+            return values
         try:
-            file, digest = identify(values[name], values["sha256"], known, what)
+            file, digest = identify(values[name], values[sha256], known, what)
         except MeshError as error:
             raise SceneError(f'<{formula.name}> {name}="{values[name]}": {error}') from error
-        return {**values, name: file, "sha256": digest}
+        return {**values, name: file, sha256: digest}
 
 
 @contextmanager

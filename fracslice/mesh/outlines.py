@@ -14,7 +14,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 from xml.parsers import expat
 
 import numpy as np
@@ -157,14 +157,19 @@ def read_svg(path: str) -> list[Fill]:
     MeshError
         If it is no SVG file, or fills nothing.
     """
+    fills = list(Drawing(tree_of(path)).drawings())
+    if not fills:
+        raise MeshError("has no closed path that is filled: strokes have no inside; make paths of them first")
+    return fills
+
+
+def tree_of(path: str) -> SvgElement:
+    """Root of the elements of an SVG file."""
     with open_regular(path) as file:
         data = file.read(LARGEST_SVG + 1)
     if len(data) > LARGEST_SVG:
         raise MeshError(f"expected an SVG file of at most {LARGEST_SVG >> 20} MB")
-    fills = list(_Drawing(_parsed(data)).fills())
-    if not fills:
-        raise MeshError("has no closed path that is filled: strokes have no inside; make paths of them first")
-    return fills
+    return _parsed(data)
 
 
 def _parsed(data: bytes) -> SvgElement:
@@ -198,8 +203,10 @@ def _parsed(data: bytes) -> SvgElement:
     return top.inside[0]
 
 
-class _Drawing:
-    """Draws a tree of elements."""
+class Drawing:
+    """Draws a tree of elements: what they fill."""
+
+    names: ClassVar[frozenset[str]] = frozenset(("path", "rect", "circle", "ellipse", "polygon", "polyline"))
 
     def __init__(self, root: SvgElement) -> None:
         self.root, self.drawn, self.curves = root, 0, 0
@@ -231,8 +238,8 @@ class _Drawing:
         kept = {name: value for name, value in own.items() if value != "inherit"}
         return {name: inherited[name] for name in INHERITED if name in inherited} | kept
 
-    def fills(self) -> Iterator[Fill]:
-        """Fills of all that is drawn, mm."""
+    def drawings(self) -> Iterator[Any]:
+        """Of all that is drawn, mm."""
         up = Affine.of(MM, 0, 0, -MM, 0, 0)
         yield from self.draw(self.root, up, {}, 0)
 
@@ -255,16 +262,14 @@ class _Drawing:
                 yield from self.use(element, to, style, depth)
             case "text":
                 raise element.fail("expected paths: make a path of the text first")
-            case name if name in _SHAPES:
-                if (
-                    style.get("fill") not in ("none", "transparent")
-                    and style.get("visibility", "visible") == "visible"
-                ):
-                    yield from self.filled(element, to, style)
+            case name if name in self.names and style.get("visibility", "visible") == "visible":
+                yield from self.shape(element, to, style)
 
-    def filled(self, element: SvgElement, to: Affine, style: dict[str, str]) -> Iterator[Fill]:
+    def shape(self, element: SvgElement, to: Affine, style: dict[str, str]) -> Iterator[Any]:
         """What a shape fills."""
-        rings = [(to(start), list(map(to.curve, curves))) for start, curves in _SHAPES[element.name](element)]
+        if style.get("fill") in ("none", "transparent"):
+            return
+        rings = [(to(start), list(map(to.curve, curves))) for start, curves in SHAPES[element.name](element)]
         self.curves += sum(len(curves) for _, curves in rings)
         element.limit(self.curves)
         if rings:
@@ -358,6 +363,7 @@ _TRANSFORMS: dict[str, Callable[..., Affine]] = {
 
 
 Rings = Iterator[tuple[complex, list[Curve]]]
+"""Starts and curves of what an element draws."""
 
 
 def _polygon(element: SvgElement) -> Rings:
@@ -397,14 +403,14 @@ def _rectangle(element: SvgElement) -> Rings:
 
 def _path(element: SvgElement) -> Rings:
     """Rings of path data; each is closed, as a fill is."""
-    return iter(_PathReader(element).rings)
+    return iter(PathReader(element).rings)
 
 
-class _PathReader:
+class PathReader:
     """Reads path data."""
 
     def __init__(self, element: SvgElement) -> None:
-        self.element, self.rings = element, list[tuple[complex, list[Curve]]]()
+        self.element, self.rings, self.closed = element, list[tuple[complex, list[Curve]]](), set[int]()
         self.at = self.start = 0j
         # Last control point, after the letter of its curve: C, Q, or none.
         self.control: tuple[str, complex] = ("", 0j)
@@ -477,6 +483,7 @@ class _PathReader:
         self.at, self.control = curve[-1] if end is None else end, ("", 0j)
 
     def close(self) -> None:
+        self.closed.add(len(self.rings) - 1)
         self.at, self.curves, self.control = self.start, None, ("", 0j)
 
     def arc(self, values: list[float], end: complex) -> None:
@@ -503,7 +510,7 @@ class _PathReader:
 
 
 _COUNTS = {"M": 2, "Z": 0, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7}
-_SHAPES = {
+SHAPES = {
     "path": _path, "rect": _rectangle, "circle": _ellipse, "ellipse": _ellipse, "polygon": _polygon,
     "polyline": _polygon,
 }  # fmt: skip
@@ -647,9 +654,9 @@ class Outline(InMemory):
 @lru_cache(maxsize=8)
 def extruded(file: str, sha256: str, size: float | None, centred: bool) -> Outline:
     """Outline of a file, scaled, its box centred at the origin or where the file has it."""
-    area = _sized(file, sha256, size)
+    area = sized(file, sha256, size)
     low, high = np.reshape(area.bounds, (2, 2))
-    return Outline.of(_rings(area, (low + high) / 2 if centred else np.zeros(2)))
+    return Outline.of(rings_of(area, (low + high) / 2 if centred else np.zeros(2)))
 
 
 @lru_cache(maxsize=8)
@@ -659,7 +666,7 @@ def written(file: str, sha256: str, text: str, variations: str, size: float, cen
     require_unchanged(file, sha256)
     area = area_of(fills, 1.0)
     low, high = np.reshape(area.bounds, (2, 2))
-    return Outline.of([ring * size for ring in _rings(area, (low + high) / 2 if centred else np.zeros(2))])
+    return Outline.of([ring * size for ring in rings_of(area, (low + high) / 2 if centred else np.zeros(2))])
 
 
 @lru_cache(maxsize=8)
@@ -668,19 +675,19 @@ def revolved(file: str, sha256: str, size: float | None, offset: float, centred:
 
     At the axis it goes on as its mirror image: no edge there is one of the solid.
     """
-    area = _sized(file, sha256, size)
+    area = sized(file, sha256, size)
     import shapely
 
     low, high = np.reshape(area.bounds, (2, 2))
     origin = np.array([low[0] - offset, (low[1] + high[1]) / 2 if centred else low[1]])
     if offset > 0:
-        return Outline.of(_rings(area, origin))
+        return Outline.of(rings_of(area, origin))
     right = shapely.transform(area, lambda points: points - origin)
     left = shapely.transform(right, lambda points: points * (-1, 1))
-    return Outline.of(_rings(shapely.union(right, left, grid_size=GRID * (high - low).max()), np.zeros(2)))
+    return Outline.of(rings_of(shapely.union(right, left, grid_size=GRID * (high - low).max()), np.zeros(2)))
 
 
-def _sized(file: str, sha256: str, size: float | None) -> Geometry:
+def sized(file: str, sha256: str, size: float | None) -> Geometry:
     """What a file fills, scaled about the file's origin."""
     area = _area(file, sha256)
     if size is None:
@@ -710,7 +717,9 @@ def area_of(fills: Iterable[Fill], detail: float | None = None) -> Geometry:
     import shapely
 
     given = list(fills)
-    points = np.array([p for fill in given for start, curves in fill.rings for p in _samples(start, curves)])
+    points = np.array(
+        [p for fill in given for start, curves in fill.rings for p in samples_of(start, curves)]
+    )
     if not np.isfinite(points).all() or not np.isfinite(
         extent := np.ptp(points.view(float).reshape(-1, 2), axis=0).max()
     ):
@@ -719,7 +728,7 @@ def area_of(fills: Iterable[Fill], detail: float | None = None) -> Geometry:
         raise MeshError("has no path with an area")
     grid = extent * GRID
     rings = [
-        ([_ring(*ring, (detail or extent) * TOLERANCE) for ring in fill.rings], fill.nonzero)
+        ([corners_of(*ring, (detail or extent) * TOLERANCE) for ring in fill.rings], fill.nonzero)
         for fill in given
     ]
     if (count := sum(len(ring) for fill, _ in rings for ring in fill)) > MOST_CURVES:
@@ -732,7 +741,7 @@ def area_of(fills: Iterable[Fill], detail: float | None = None) -> Geometry:
     return area
 
 
-def _samples(start: complex, curves: list[Curve]) -> Iterable[complex]:
+def samples_of(start: complex, curves: list[Curve]) -> Iterable[complex]:
     """Points of a ring that have nearly its box."""
     yield start
     for curve in curves:
@@ -770,7 +779,7 @@ def _pieces(start: complex, curve: Curve, tolerance: float) -> int:
     return max(1, math.ceil(math.sqrt(bend / (8 * tolerance))))
 
 
-def _ring(start: complex, curves: list[Curve], tolerance: float) -> NDArray[np.complex128]:
+def corners_of(start: complex, curves: list[Curve], tolerance: float) -> NDArray[np.complex128]:
     """Corners of a ring."""
     points, at = [start], start
     for curve in curves:
@@ -831,7 +840,7 @@ def _winding(
     return winding
 
 
-def _rings(area: Geometry, origin: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+def rings_of(area: Geometry, origin: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     """Rings of polygons, from an origin, with the inside on their left."""
     import shapely
 

@@ -30,6 +30,7 @@ from ..common.parameters import (
     Label,
     Length,
     Number,
+    Points,
     Vector,
 )
 from ..errors import SceneError
@@ -161,7 +162,7 @@ def package_stub(modules: Mapping[str, str]) -> str:
     """Text of the stub file of `fracslice`: its public names, and every formula."""
     packages = {path.parent.name for path in Path(__file__).parents[1].glob("*/__init__.py")}
     formulas = [name for name in _shipped_formulas() if name not in packages]
-    exported = {**modules, **dict.fromkeys(formulas, "formulas")}
+    exported = {**dict.fromkeys(formulas, "formulas"), **modules}
     lines = sorted(f"from .{module} import {name} as {name}" for name, module in exported.items())
     return "\n".join([_MADE, *lines, ""])
 
@@ -327,6 +328,7 @@ _PATTERNS: dict[type, Any] = {
     Digest: _digest,
     File: _text,
     Label: _text,
+    Points: _text,
     Identifier: _identifier,
     Seconds: _text,
     AttributePath: _text,

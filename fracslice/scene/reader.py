@@ -225,8 +225,8 @@ class _Builder:
                 raise self.open[-1].fail(f"takes no elements inside it, found <{name}>")
         if name not in allowed:
             known = {SCENE.name, PARAMETER.name, *SECTIONS, *self.all_formulas()}
-            wrong = "cannot stand here" if name in known else "is not a known element"
-            raise SceneError(f"{self.place}: <{name}> {wrong}; {hint(name, allowed, '<{}>', LISTED)}")
+            wrong, meant = ("cannot stand here", "") if name in known else ("is not a known element", name)
+            raise SceneError(f"{self.place}: <{name}> {wrong}; {hint(meant, allowed, '<{}>', LISTED)}")
         if name in self.done:
             raise SceneError(f"{self.place}: <{name}> may only stand once in a scene")
         return allowed[name]

@@ -224,6 +224,19 @@ def raised(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 
 TRUTHS: dict[str, list[Truth]] = {
+    "beams": [
+        Equal(
+            EXAMPLES["beams"].changed(smooth=0, size=3, thickness=0.45 / 1.4),
+            f.transform(EXAMPLES["beams"].changed(smooth=0), scale=3 / 1.4),
+            sign=True,
+        )
+    ],
+    "scaffold": [
+        Equal(
+            EXAMPLES["scaffold"],
+            f.intersection(EXAMPLES["scaffold"], EXAMPLES["scaffold"].children[0]),
+        )
+    ],
     "heightmap": [plate(EXAMPLES["heightmap"], 0.1, 0.5)],
     "lithophane": [plate(EXAMPLES["lithophane"], 0.3, 0.1)],
     "infill": [
@@ -232,8 +245,25 @@ TRUTHS: dict[str, list[Truth]] = {
             f.union(f.shell(BALL, thickness=0.1), f.intersection(BALL, f.gyroid())),
         )
     ],
+    "displace": [Equal(f.displace(BALL, by=0.1), f.offset(BALL, distance=0.1))],
+    "onion": [
+        Equal(
+            f.onion(f.sphere(0.7), period=0.3, thickness=0.1),
+            f.union(
+                f.shell(f.sphere(0.7), thickness=0.1), f.shell(f.sphere(0.4), thickness=0.1), f.sphere(0.1)
+            ),
+            sign=True,
+        )
+    ],
+    "thicken": [Equal(f.thicken(BALL, BALL, by=0.2, within=0.5), f.sphere(0.7 + 1 / 12), sign=True)],
     "relief": [Equal(EXAMPLES["relief"], raised, sign=True)],
     "revolve": [Volume(EXAMPLES["revolve"], 2 * pi * 0.7 * 0.6**2 * (1 - 0.5 / 4))],
+    "sweep": [
+        Equal(
+            f.sweep(WASHER["file"], size=1.4, points="0 0 -0.3, 0 0 0.3"),
+            f.extrude(WASHER["file"], size=1.4, height=0.6),
+        )
+    ],
     "text": [Equal(EXAMPLES["text"].changed(size=2, depth=0.8), f.transform(EXAMPLES["text"], scale=2))],
     "extrude": [Volume(WASHER, 1.4**2 * (1 - 0.5 / 4) * 0.6), Equal(WASHER, HOLED, sign=True)],
     "volume": [Equal(EXAMPLES["volume"], L_SHAPE, sign=True)],

@@ -17,6 +17,7 @@ from fracslice.common.parameters import (
     File,
     Label,
     Number,
+    Points,
     Vector,
 )
 from fracslice.errors import SceneError
@@ -25,7 +26,7 @@ from fracslice.formulas import Node
 from fracslice.scene import scene
 from fracslice.scene.layout import formulas
 from fracslice.scene.model import computing
-from tests.examples import BRACKET, GRID, HILLS
+from tests.examples import BRACKET, GRID, HILLS, TRUSS
 
 SHAPES = [f for f in formulas() if f.children[1] == 0]
 OTHERS = [f for f in formulas() if f.children[1] != 0]
@@ -63,9 +64,10 @@ _POSSIBLE: dict[type, Any] = {
     Count: _count,
     Vector: _vector,
     Choice: lambda kind: st.sampled_from(kind.choices),
-    File: lambda kind: st.sampled_from((BRACKET, GRID, HILLS)) if kind.inside else st.none(),
+    File: lambda kind: st.sampled_from((BRACKET, GRID, HILLS, TRUSS)) if kind.inside else st.none(),
     Digest: lambda kind: st.none(),
     Label: lambda kind: st.sampled_from(("LUMEN", "surface", "<&lt;", "e\u0301")),
+    Points: lambda kind: st.just(((0.0, 0.0, 0.0), (1.0, 0.5, 0.0))),
     Axis: lambda kind: st.sampled_from("xyz"),
 }
 

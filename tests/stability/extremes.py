@@ -18,6 +18,7 @@ from fracslice.common.parameters import (
     Label,
     Number,
     Parameter,
+    Points,
     Vector,
 )
 from fracslice.errors import SceneError
@@ -26,7 +27,7 @@ from fracslice.formulas import Node
 
 def ends(kind: Parameter) -> list[object]:
     """The values at both ends of a parameter's range, and next to zero where it has both signs."""
-    if isinstance(kind, (Axis, Choice, Digest, File, Label)):
+    if isinstance(kind, (Axis, Choice, Digest, File, Label, Points)):
         return []
     if isinstance(kind, Count):
         return [kind.least, min(kind.most, 1000)]

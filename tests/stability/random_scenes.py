@@ -175,7 +175,10 @@ KNOWN: dict[str, dict[str, Draw]] = {
     "intersection": SEAM,
     "difference": SEAM,
     "shell": {"thickness": _one(0.03, 0.2)},
-    "infill": {"shell": _one(0.03, 0.2)},
+    "infill": {"shell": _one(0.03, 0.2), "denser": _one(-0.02, 0.05), "within": _one(0.1, 0.5)},
+    "onion": {"period": _one(0.2, 0.4), "thickness": _one(0.05, 0.15)},
+    "thicken": {"by": _one(-0.05, 0.1), "within": _one(0.2, 0.6)},
+    "displace": {"by": _one(-0.05, 0.1)},
     "offset": {"distance": _one(-0.05, 0.1)},
     "bounds": {"min": _vector(-0.6, -0.2), "max": _vector(0.2, 0.6)},
     "repeat": {

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
+from fracslice.fields.varying import Varying
 from fracslice.formulas import Node, transform
 
 WALLS = (
@@ -30,7 +32,11 @@ LENGTHS: dict[str, tuple[str, ...]] = {
     "intersection": ("smooth",),
     "difference": ("smooth",),
     "shell": ("thickness",),
-    "infill": ("shell",),
+    "infill": ("shell", "denser", "within"),
+    "onion": ("period", "thickness"),
+    "thicken": ("by", "within"),
+    "displace": ("by",),
+    "scaffold": ("thickness", "smooth"),
     "offset": ("distance",),
     "noise": ("amplitude", "period"),
     "bounds": ("min", "max"),
@@ -68,6 +74,8 @@ def _others(root: Node, factor: float) -> dict[str, object]:
 
 
 def _times(value: object, factor: float) -> object:
+    if isinstance(value, Varying):
+        return Varying(re.sub(r"\b([xyz])\b", rf"(\1/{factor!r})", value.text)).times(factor)
     return tuple(v * factor for v in value) if isinstance(value, tuple) else value * factor  # type: ignore[operator]
 
 

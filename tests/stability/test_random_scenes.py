@@ -14,7 +14,7 @@ from .volumes import volumes
 
 pytestmark = pytest.mark.once
 
-TREES, EACH = (2, 183, 16, 19, 25, 29, 50, 57, 69), 4
+TREES, EACH = (2, 10, 18, 25, 32, 52), 4
 """Trees with every kind of element that need little to be compiled, and four times other numbers."""
 
 RESOLUTION = 32

@@ -1,5 +1,6 @@
-// Fewer triangles, how far they are, a mesh as a field, outlines and reliefs: classes of fracslice._native that keep the arrays they look into.
+// Fewer triangles, how far they are, a mesh as a field, outlines, reliefs and beams: classes of fracslice._native that keep the arrays they look into.
 #include "../unlocked.h"
+#include "beams.h"
 #include "input.h"
 #include "outline.h"
 #include "reduction.h"
@@ -162,10 +163,45 @@ class BoundSolid {
     uintptr_t address() const { return reinterpret_cast<uintptr_t>(solid_->entry()); }
 
     nb::object distances(const Rows<double>& points) const { return distances_of(*solid_, points); }
+    const Solid* solid() const { return &*solid_; }
 
   private:
     BoundMesh mesh_;
     std::optional<Solid> solid_;
+};
+
+class BoundSolids {
+  public:
+    explicit BoundSolids(const nb::list& solids) : kept_(solids), solids_(of(solids)) {}
+
+    uintptr_t address() const { return reinterpret_cast<uintptr_t>(solids_.entry()); }
+    nb::object distances(const Rows<double>& points) const { return distances_of(solids_, points); }
+
+  private:
+    static std::vector<const Solid*> of(const nb::list& solids) {
+        std::vector<const Solid*> found;
+        for (nb::handle solid : solids) found.push_back(nb::cast<const BoundSolid&>(solid).solid());
+        require(!found.empty(), "expected at least one solid");
+        return found;
+    }
+
+    nb::tuple kept_;
+    Solids solids_;
+};
+
+class BoundBeams {
+  public:
+    using Balls = nb::ndarray<const double, nb::shape<-1, 2, 4>, nb::c_contig, nb::device::cpu>;
+
+    BoundBeams(const Balls& balls, const Vector<int32_t>& chains, double seam)
+        : beams_((require(balls.size() > 0 && balls.shape(0) == chains.size(), "expected at least one beam, each of a chain"), span_of(balls)),
+                 span_of(chains), seam) {}
+
+    uintptr_t address() const { return reinterpret_cast<uintptr_t>(beams_.entry()); }
+    nb::object distances(const Rows<double>& points) const { return distances_of(beams_, points); }
+
+  private:
+    Beams beams_;
 };
 
 class BoundOutline {
@@ -230,6 +266,14 @@ void bind_reduction(nb::module_& module) {
              "vertices"_a, "triangles"_a, "order"_a, "low"_a, "high"_a)
         .def("distances", &BoundSolid::distances, "points"_a)
         .def_prop_ro("address", &BoundSolid::address);
+    nb::class_<BoundSolids>(module, "Solids")
+        .def(nb::init<const nb::list&>(), "solids"_a)
+        .def("distances", &BoundSolids::distances, "points"_a)
+        .def_prop_ro("address", &BoundSolids::address);
+    nb::class_<BoundBeams>(module, "Beams")
+        .def(nb::init<const BoundBeams::Balls&, const Vector<int32_t>&, double>(), "balls"_a, "chains"_a, "seam"_a)
+        .def("distances", &BoundBeams::distances, "points"_a)
+        .def_prop_ro("address", &BoundBeams::address);
     nb::class_<BoundOutline>(module, "Outline")
         .def(nb::init<const Rows<double, 2>&, const Vector<int64_t>&>(), "corners"_a, "ends"_a)
         .def("distances", &BoundOutline::distances, "points"_a)

@@ -205,4 +205,28 @@ bool Solid::outside(const double* p, size_t triangle) const {
     return !inside;
 }
 
+double Solid::least(const double* p) const {
+    double square = 0, deep = -std::numeric_limits<double>::infinity();
+    for (size_t k = 0; k < 3; ++k) {
+        const double away = std::max(low_[k] - p[k], p[k] - high_[k]);
+        square += away > 0 ? away * away : 0, deep = std::max(deep, away);
+    }
+    return square > 0 ? std::sqrt(square) * (1 - 0x1p-40) : deep;
+}
+
+double Solids::operator()(const double* p, size_t& found) const {
+    if (!std::isfinite(p[0] + p[1] + p[2])) return std::numeric_limits<double>::quiet_NaN();
+    const size_t count = solids_.size(), first = found % count;
+    size_t at = found / count;
+    double nearest = (*solids_[first])(p, at);
+    found = at * count + first;
+    for (size_t i = 0; i < count; ++i) {
+        if (i == first || !(solids_[i]->least(p) < nearest)) continue;
+        size_t triangle = 0;
+        const double distance = (*solids_[i])(p, triangle);
+        if (distance < nearest) nearest = distance, found = triangle * count + i;
+    }
+    return nearest;
+}
+
 }  // namespace fracslice::mesh

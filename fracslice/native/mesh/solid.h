@@ -3,6 +3,7 @@
 #include <array>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "distances.h"
@@ -68,6 +69,8 @@ class Solid {
     const Distances* entry() const { return &entry_; }
     // The distance of a point; NaN where it is not finite. The search begins with a triangle, which becomes the one found.
     double operator()(const double* p, size_t& found) const;
+    // At most the distance of a point: that of its box.
+    double least(const double* p) const;
 
   private:
     bool outside(const double* p, size_t triangle) const;
@@ -80,6 +83,25 @@ class Solid {
     std::vector<int32_t> across_;
     std::vector<Point> normals_;  // of vertices
     std::optional<Winding> winding_;
+    Distances entry_;
+};
+
+// Solids that may overlap: the least of their distances.
+class Solids {
+  public:
+    static constexpr size_t kAxes = 3;
+
+    // At least one; they outlive this.
+    explicit Solids(std::vector<const Solid*> solids) : solids_(std::move(solids)), entry_(entry_of(this)) {}
+    Solids(const Solids&) = delete;
+    Solids& operator=(const Solids&) = delete;
+
+    const Distances* entry() const { return &entry_; }
+    // As of one solid. The search begins with a triangle of a solid, which become those found: with few solids between them.
+    double operator()(const double* p, size_t& found) const;
+
+  private:
+    std::vector<const Solid*> solids_;
     Distances entry_;
 };
 
