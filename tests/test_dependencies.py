@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 EXTRAS = PROJECT["optional-dependencies"]
 
 MODULES = {
@@ -62,7 +62,11 @@ def used() -> set[str]:
     """What is imported at run time and is neither ours nor Python's."""
     files = [*ROOT.glob("fracslice/**/*.py"), *ROOT.glob("cli/*.py")]
     assert len(files) > 100
-    result = {name.partition(".")[0] for file in files for name in imports(ast.parse(file.read_text()))}
+    result = {
+        name.partition(".")[0]
+        for file in files
+        for name in imports(ast.parse(file.read_text(encoding="utf-8")))
+    }
     return {WITHIN.get(name, name) for name in result - set(sys.stdlib_module_names) - {"fracslice", "cli"}}
 
 
@@ -95,7 +99,9 @@ def without(modules: str, *commands: str, cwd: Path) -> subprocess.CompletedProc
 
 
 def test_the_main_job_needs_no_extra(ball_xml: Path) -> None:
-    ball_xml.write_text(ball_xml.read_text().replace("sphere", "box"))  # a ball stands on a point
+    ball_xml.write_text(
+        ball_xml.read_text(encoding="utf-8").replace("sphere", "box")
+    )  # a ball stands on a point
     done = without(
         BLOCKED,
         "mesh ball.xml -o ball.3mf --resolution 16",
@@ -154,5 +160,5 @@ def test_no_text_names_a_module_of_another_package() -> None:
     """It would be an import past the contract of the layers."""
     for path in (ROOT / "fracslice").rglob("*.py"):
         own = path.relative_to(ROOT / "fracslice").parts[0]
-        named = {*re.findall(r'["\']fracslice\.(\w+)\.', path.read_text())}
+        named = {*re.findall(r'["\']fracslice\.(\w+)\.', path.read_text(encoding="utf-8"))}
         assert own == "__init__.py" or named <= {own}, path

@@ -42,6 +42,10 @@ def test_there_are_at_least_ten_and_they_show_what_there_is():
         "noise",
         "infill",
         "relief",
+        "displace",
+        "thicken",
+        "onion",
+        "scaffold",
     }
 
 

@@ -63,8 +63,8 @@ def operations(
     `scale`: length of a scene unit.
     """
     for node in root.solids():
-        if node.formula.name == "model":
-            raise node.fail("is made of triangles: expected formulas alone, or a mesh of them")
+        if node.is_in_memory:
+            raise node.fail("is data in memory, no formula: expected formulas alone, or a mesh of them")
     linked, made = root.linked, _Graph()
     vocabulary = FUNCTIONS.keys() - {"add", "subtract", "multiply", "divide", "select"}
     domain: dict[str, Any] = {name: made.function(name) for name in vocabulary}

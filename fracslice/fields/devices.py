@@ -16,7 +16,7 @@ from ..errors import DeviceError
 from ..expr import vocabulary
 from ..expr.graph import ON_ARRAYS, Evaluator
 from ..expr.intervals import ON_CELLS, TINY, Interval, enclosed
-from ..expr.language import InMemory, words
+from ..expr.language import words
 from ..expr.loops import Loop, enclosures
 from . import cpu
 from .field import Cells, Device, Field, Kernel, Loops, Precision
@@ -50,8 +50,7 @@ def for_field(root: Node, device: Device) -> Device:
     if device == "cpu":
         return device
     for node in root.solids():
-        known = not node.formula.exterior_only  # a fractal has none, and its depth may be open
-        if known and any(isinstance(value, InMemory) for value in node.arguments.values()):
+        if node.is_in_memory:
             warn(f"a scene with a <{node.formula.name}> is computed on the CPU, in whose memory that is")
             return "cpu"
     return device

@@ -23,6 +23,7 @@ from ..common.parameters import (
     python_name,
 )
 from ..errors import SceneError
+from ..expr.language import InMemory
 from .box import Axis, Box, direction, three
 from .field import Bounds, Cells, Device, Field, Kernel, Loops, Precision
 
@@ -699,6 +700,14 @@ class Node(Operators, Field):
         from .devices import linked_loops
 
         return linked_loops(self, loops, precision, device)
+
+    @property
+    def is_in_memory(self) -> bool:
+        """True for a field of data in memory: a model, an outline, beams."""
+        # a fractal has none, and its depth may be open
+        return not self.formula.exterior_only and any(
+            isinstance(value, InMemory) for value in self.arguments.values()
+        )
 
     @property
     def arguments(self) -> dict[str, Any]:

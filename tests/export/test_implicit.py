@@ -16,7 +16,8 @@ from fracslice.errors import KernelError, MeshError, SceneError
 from fracslice.export import implicit as graphs
 from fracslice.export.implicit import write_implicit
 from fracslice.fields.devices import reference
-from fracslice.formulas import Node, mandelbulb, menger, sphere, transform, twist, union
+from fracslice.fields.registry import get
+from fracslice.formulas import Node, mandelbulb, menger, model, sphere, transform, twist, union
 from fracslice.jobs.mesh import make_implicit
 from fracslice.mesh.models import read_mesh
 from fracslice.records import MeshJob
@@ -145,13 +146,21 @@ def test_a_third_of_the_shapes_and_every_operator_are_their_fields(tmp_path: Pat
         assert off.max() < 1e-9, root.formula.name
 
 
+@pytest.mark.parametrize("name", ["model", "scaffold"])
+def test_what_lies_in_memory_is_no_formula(name: str) -> None:
+    stone = Path(__file__).parents[2] / "examples" / "stone.stl"
+    root = model(file=str(stone)) if name == "model" else get(name)(sphere(radius=0.4), count=20)
+    with pytest.raises(SceneError, match=f"<{name}> is data in memory, no formula"):
+        graphs.operations(root)
+
+
 def possible(formula: object, *children: Node) -> Node | None:
     """A formula with its defaults, if it has them all and a box."""
     try:
         made: Node = formula(*children)  # type: ignore[operator]
     except SceneError:
         return None
-    return made if made.bounds.box.finite else None
+    return made if made.bounds.box.finite and not made.is_in_memory else None
 
 
 def test_what_is_no_formula_is_one_line(

@@ -43,11 +43,26 @@ template <int N> struct Tuple {{
     float v[N];
     __host__ __device__ float operator[](int i) const {{ return v[i]; }}
 }};
-template <class A, class B> struct Pair {{
+template <class... Parts> struct List {{}};
+template <class A, class... Others> struct List<A, Others...> {{
     A first;
-    B second;
+    List<Others...> rest;
 }};
 template <int I, int N> __device__ __forceinline__ float item(const Tuple<N> &t) {{ return t.v[I]; }}
+template <int I, class A, class... Others>
+__device__ __forceinline__ auto item(const List<A, Others...> &t) {{
+    if constexpr (I == 0) return t.first; else return item<I - 1>(t.rest);
+}}
+__device__ __forceinline__ List<> listed() {{ return {{}}; }}
+template <class A, class... Others>
+__device__ __forceinline__ List<A, Others...> listed(A a, Others... others) {{
+    return {{a, listed(others...)}};
+}}
+template <class... Parts> __device__ __forceinline__ auto tuple_of(Parts... parts) {{
+    if constexpr ((std::is_arithmetic_v<Parts> && ...))
+        return Tuple<int(sizeof...(Parts))>{{{{float(parts)...}}}};
+    else return listed(parts...);
+}}
 using Parameters = Tuple<{count}>;
 """
 
@@ -130,10 +145,10 @@ class _Functions:
                 return f"item<{value.data[0]}>({given[0]})"
             case "tuple" if not given:
                 return "Tuple<1>{{0.0f}}"
-            case "tuple" if all(operand.op == "tuple" for operand in value.operands):
-                return f"Pair<decltype({given[0]}), decltype({given[1]})>{{{', '.join(given)}}}"
             case "tuple":
-                return f"Tuple<{len(given)}>{{{{{', '.join(f'float({part})' for part in given)}}}}}"
+                return f"tuple_of({', '.join(given)})"
+            case "element" if type(value.operands[1].known) is int:
+                return f"item<{given[1]}>({given[0]})"
         if value.op in SIGNS:
             return f"({given[0]} {SIGNS[value.op]} {given[1]})"
         return WORDS[value.op].format(*given)
