@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..common.cache import Kept, cache_folder, key
+from ..errors import KernelError
 from ..expr import cuda_driver
 from ..expr.cuda_driver import DeviceArray, address, device_array, require, to_device
 from ..expr.frontend import loop_function
@@ -98,8 +99,11 @@ def machine_code(program: Program, precision: Precision, loops: tuple[Loop, ...]
 def parameters(linked: Linked, precision: Precision) -> DeviceArray:
     """Copy the parameters P of a linked scene to the GPU.
 
-    Passing them as launch constants is no faster, and makes launching slower.
+    Passing them as launch constants is no faster, and makes launching slower. Raises `KernelError` for data
+    in the memory of the CPU.
     """
+    if linked.held:
+        raise KernelError("a scene with data in memory: expected the device cpu, found cuda")
     return to_device(linked.parameters.astype(precision))
 
 

@@ -11,6 +11,6 @@ from .booleans import faults
 pytestmark = pytest.mark.once
 
 
-@pytest.mark.parametrize("seed", stamped(range(1000), (0, 2)))
+@pytest.mark.parametrize("seed", stamped(range(1000), (0,)))
 def test_a_random_operation_is_a_solid_of_its_volume(seed: int) -> None:
     assert faults(seed) == ()
