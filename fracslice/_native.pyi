@@ -66,21 +66,21 @@ Entry = tuple[CompiledFunction, NDArray[Any]] | Callable[[NDArray[float64], NDAr
 [1, n] to be written.
 """
 
-Listed32 = tuple[CompiledFunction, NDArray[float32], Sequence[tuple[int, ...]]]
+Listed = tuple[CompiledFunction, NDArray[Any], Sequence[tuple[int, ...]]]
 """Loop `expr.loops.points`, its P, and of each list the index of the number of elements, this number, and the
 count of numbers of an element.
 """
 
-class Regions32:
+class Regions:
     """Loops over a field whose P ends with lists of the elements of a union: cells know those near to them.
 
     Parameters
     ----------
-    whole : Listed32
+    whole : Listed
         Field.
     bricks : CompiledFunction
         Loop `expr.loops.bricks` over it.
-    alone : Listed32
+    alone : Listed
         Field of the union alone.
     lipschitz : float
         Lipschitz constant of `alone`, with any of the elements.
@@ -94,52 +94,9 @@ class Regions32:
 
     def __init__(
         self,
-        whole: Listed32,
+        whole: Listed,
         bricks: CompiledFunction,
-        alone: Listed32,
-        lipschitz: float,
-        centre: tuple[float, ...],
-        half: float,
-        width: int,
-    ) -> None: ...
-    @property
-    def address(self) -> int:
-        """What takes the place of P in the loops: the words of this address."""
-
-    def get_function_address(self, name: str) -> int:
-        """Return the address of the loop "points" or "bricks" over the regions."""
-
-Listed64 = tuple[CompiledFunction, NDArray[float64], Sequence[tuple[int, ...]]]
-"""Loop `expr.loops.points`, its P, and of each list the index of the number of elements, this number, and the
-count of numbers of an element.
-"""
-
-class Regions64:
-    """Loops over a field whose P ends with lists of the elements of a union: cells know those near to them.
-
-    Parameters
-    ----------
-    whole : Listed64
-        Field.
-    bricks : CompiledFunction
-        Loop `expr.loops.bricks` over it.
-    alone : Listed64
-        Field of the union alone.
-    lipschitz : float
-        Lipschitz constant of `alone`, with any of the elements.
-    centre : tuple of float
-        Centre of a cube; points outside see all elements.
-    half : float
-        Half side of the cube.
-    width : int
-        Lanes of the loops.
-    """
-
-    def __init__(
-        self,
-        whole: Listed64,
-        bricks: CompiledFunction,
-        alone: Listed64,
+        alone: Listed,
         lipschitz: float,
         centre: tuple[float, ...],
         half: float,

@@ -449,13 +449,16 @@ class Reader(Writer):
     def unrolled_tuple(self, node: ast.Call, element: ast.expr, generator: ast.comprehension) -> Value:
         """A tuple of known length."""
         match generator:
+            case ast.comprehension(ast.Name(counter), ast.Call(ast.Name("range"), [limit]), []):
+                count = self.known(limit)
+                values = tuple(range(count)) if type(count) is int else _UNKNOWN
             case ast.comprehension(ast.Name(counter), iterated, []):
                 values = self.known(iterated)
-                if isinstance(iterated, ast.Call) and type(count := self.known(iterated.args[0])) is int:
-                    values = range(count)
-                if isinstance(values, (tuple, range)):
-                    return self.add("tuple", *(self.with_known({counter: v}, element) for v in values))
-        self.fail(node, "expected a range or a tuple that is known when the loop is compiled")
+            case _:
+                values = _UNKNOWN
+        if not isinstance(values, tuple):
+            self.fail(node, "expected a range or a tuple that is known when the loop is compiled")
+        return self.add("tuple", *(self.with_known({counter: value}, element) for value in values))
 
     def with_known(self, values: Mapping[str, Any], node: ast.expr) -> Value:
         outer, self.fixed = self.fixed, {**self.fixed, **values}
@@ -683,9 +686,10 @@ class FormulaReader(Reader):
 
     def call_function(self, called: Callable[..., Any], arguments: list[ast.expr]) -> Value:
         """A call of a function from outside; records that are known are fixed in it."""
-        pairs = list(zip(parameters(called), map(self.known, arguments), strict=False))
+        known = [self.known(argument) for argument in arguments]
+        pairs = zip(parameters(called), known, strict=False)
         fixed = tuple((name, value) for name, value in pairs if is_record(value))
-        given = [self.value(a) for a in arguments if not is_record(self.known(a))]
+        given = [self.value(a) for a, value in zip(arguments, known, strict=True) if not is_record(value)]
         return self.call_counted(own_formula(called, fixed) if fixed else formula(called), given)
 
     def expression(self, node: ast.expr) -> None:

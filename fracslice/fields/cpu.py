@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._native import Regions32, Regions64
+from .._native import Regions
 from ..common.cache import Kept, cache_folder, key
 from ..expr.frontend import loop_function
 from ..expr.graph import Program
@@ -73,18 +73,17 @@ class CpuKernel(Kernel):
         self._parameters = constant(linked.parameters, self.dtype, linked.held)
         self._offsets = constant(np.indices((8, 8, 8)).reshape(3, 512), self.dtype)
         if region is not None:
-            self._look_around(linked, region)
+            alone = self if region.union is linked else CpuKernel(region.union, precision)
+            self._look_around(linked, region, alone)
 
-    def _look_around(self, linked: Linked, region: Region) -> None:
-        """Let the loops pass over elements of a union that are far from a point; see `Regions64`."""
-        alone = CpuKernel(region.union, "float32" if self.dtype.itemsize == 4 else "float64")
+    def _look_around(self, linked: Linked, region: Region, alone: CpuKernel) -> None:
+        """Let the loops pass over elements of a union that are far from a point; see `Regions`."""
         given = [
             (kernel._points, kernel._parameters, [astuple(one) for one in lists])
             for kernel, lists in ((self, linked.lists), (alone, region.union.lists))
         ]
         where = region.lipschitz, region.centre, region.half, self.width
-        kind: Any = Regions32 if self.dtype.itemsize == 4 else Regions64
-        regions = kind(given[0], self._bricks, given[1], *where)
+        regions = Regions(given[0], self._bricks, given[1], *where)
         loops = (CompiledFunction(regions, loop, self.dtype) for loop in (points, bricks))
         self._points, self._bricks = loops
         self._parameters = constant(np.array([regions.address], np.uint64).view(self.dtype), self.dtype)

@@ -411,7 +411,7 @@ def _prove_growth(steps: Round, bound: Growth, given: Sequence[Given], size: flo
     """Growth with radii of escape that are proved; the same if they cannot be."""
     tried, constants = bound, None if size and bound.by_power else size
     for _ in range(TRIES if bound.fits else 0):
-        stops = [own[0] for own in numbers(steps, tried)]
+        stops = [own[0] for own in numbers(tried)]
         radii = [
             escape_radius(
                 least_size(steps, first, given, stops, constants),
@@ -434,7 +434,7 @@ def _half(steps: Round, bound: Growth, given: Sequence[Given], iterations: int) 
     one half more than the samples reach.
     """
     function = field(steps, Form(bound.by_power, bound.scaled))
-    own = arguments(steps, bound, given, iterations).values()
+    own = arguments(bound, given, iterations).values()
 
     def evaluate(points: np.ndarray) -> np.ndarray:
         with np.errstate(all="ignore"):
@@ -445,21 +445,21 @@ def _half(steps: Round, bound: Growth, given: Sequence[Given], iterations: int) 
     return x, y, z
 
 
-def arguments(steps: Round, bound: Growth, given: Sequence[Given], iterations: int) -> dict[str, object]:
+def arguments(bound: Growth, given: Sequence[Given], iterations: int) -> dict[str, object]:
     """Return the arguments of an orbit's field, in their order; see `orbit_code.field`."""
     limits: tuple[float, ...] = (bound.escape,)
     if bound.by_power:
         scale = bound.scales[-1] if bound.scaled else 1.0
         limits = *levels(bound.power, iterations, bound.surface * scale), min(bound.reach, bound.surface)
     own = {"iterations": iterations, "limits": limits, "given": tuple(given)}
-    return {**own, "numbers": numbers(steps, bound)}
+    return {**own, "numbers": numbers(bound)}
 
 
-def numbers(steps: Round, bound: Growth) -> tuple[tuple[float, ...], ...]:
+def numbers(bound: Growth) -> tuple[tuple[float, ...], ...]:
     """Return the numbers of each step that its field takes; see `orbit_code.field`."""
     if not bound.by_power:
         return tuple(((STOP * max(e, bound.escape)) ** 2, 1.0, 1.0, 0.0, e) for e in bound.escapes)
-    scales = bound.scales if bound.scaled else (1.0,) * len(steps)
+    scales = bound.scales if bound.scaled else (1.0,) * len(bound.powers)
     rows = zip((*bound.escapes[:-1], bound.surface), bound.following, scales, bound.powers, strict=True)
     return tuple(
         (
@@ -473,12 +473,10 @@ def numbers(steps: Round, bound: Growth) -> tuple[tuple[float, ...], ...]:
     )
 
 
-def sign_arguments(
-    steps: Round, grown: Growth, given: Sequence[Given], iterations: int
-) -> dict[str, object] | None:
+def sign_arguments(grown: Growth, given: Sequence[Given], iterations: int) -> dict[str, object] | None:
     """Return the arguments of `orbit_code.orbit_sign`; None where the sign is not that of the field."""
-    stops = tuple(own[0] for own in numbers(steps, grown))
-    scales = grown.scales if grown.scaled else (1.0,) * len(steps)
+    stops = tuple(own[0] for own in numbers(grown))
+    scales = grown.scales if grown.scaled else (1.0,) * len(grown.powers)
     outside = _outside(grown, iterations)
     sizes = (scale**2 * stop for scale, stop in zip(scales, stops, strict=True))
     if any(size < least for size, least in zip(sizes, outside, strict=True)):
@@ -503,10 +501,10 @@ def _outside(grown: Growth, iterations: int) -> list[float]:
 @lru_cache(maxsize=64)
 def proved_box(steps: Round, given: tuple[Given, ...], grown: Growth, iterations: int) -> Box:
     """Return a box that is proved to hold the inside of an orbit's field."""
-    radius = math.sqrt(numbers(steps, grown)[-1][0])
+    radius = math.sqrt(numbers(grown)[-1][0])
     if grown.proved and grown.by_power:  # for constants as long as the start point, too
         radius = min(radius, grown.surface)
-    own = sign_arguments(steps, grown, given, iterations)
+    own = sign_arguments(grown, given, iterations)
     if own is None:
         return Box.centred(radius)
     function, known = sign(steps, grown.scaled), tuple(own.values())

@@ -13,6 +13,7 @@ operator is read with its child in the place of ``child``. Identities are omitte
 from __future__ import annotations
 
 import ast
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache, reduce
@@ -611,13 +612,14 @@ class Linker:
         """Return what is collected: P is the numbers, then each array once, then the lists of elements."""
         numbers, tail = self._numbers_and_arrays(), list[float]()
         held, lists = [*self.main.held], list[ListInP]()
-        waiting: list[tuple[Any, int, ElementList]] = [(numbers, 0, listed) for listed in self.main.lists]
+        last = sorted(self.main.lists, key=lambda listed: listed.is_open)
+        waiting = deque[tuple[Any, int, ElementList]]((numbers, 0, listed) for listed in last)
         while waiting:  # those of the open union are the last
-            values, base, listed = waiting.pop(min(range(len(waiting)), key=lambda k: waiting[k][-1].is_open))
+            values, base, listed = waiting.popleft()
             place, own = len(numbers) + len(tail), listed.numbers
             values[base + listed.header + 1] = place
             held += [(place + index, memory) for index, memory in own.held]
-            waiting += [(tail, len(tail), inner) for inner in own.lists]
+            waiting.extendleft((tail, len(tail), inner) for inner in reversed(own.lists))
             tail += own.values
             lists.append(ListInP(listed.header, listed.count, len(own.values) // listed.count))
             if not listed.is_open:

@@ -145,14 +145,13 @@ def orbit_bounds(node: Node) -> Box:
 
 
 def orbit_arguments(node: Node) -> dict[str, object]:
-    code, given = steps(node)
-    return arguments(code, growth_of(node), given, node["iterations"])
+    return arguments(growth_of(node), steps(node)[1], node["iterations"])
 
 
 def orbit_sign(node: Node) -> tuple[Function, dict[str, object]] | None:
     code, given = steps(node)
     grown = growth_of(node)
-    own = sign_arguments(code, grown, given, node["iterations"])
+    own = sign_arguments(grown, given, node["iterations"])
     return (sign(code, grown.scaled), own) if own else None
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ..common.parameters import MILLIMETRES, REQUIRED, Choice, Count, Digest, File, Number
+from ..common.parameters import MILLIMETRES, REQUIRED, Choice, Count, File, Number
 from ..errors import MeshError
 from ..expr.vocabulary import maximum, solid_distance
 from ..fields.box import Box
 from ..fields.registry import Node, domain_operator, shape
-from .models import identify_file, reading
+from .models import DIGEST, identify_file, reading
 
 if TYPE_CHECKING:
     from ..mesh.scaffolds import Beams
@@ -41,7 +41,7 @@ _SMOOTH = Number(
         ("as is", "centre", "bed"),
     ),
     units=Choice("mm", "unit of the file", tuple(MILLIMETRES)),
-    sha256=Digest(None, "hash of the file, by which a file that has changed is noticed"),
+    sha256=DIGEST,
 )
 def beams(x, y, z, beams):  # type: ignore[no-untyped-def]
     """Beams between points, round and with round ends, as a file has them (round cones: Quilez 2008,

@@ -14,6 +14,16 @@ from ..fields.box import Box, three
 from ..fields.registry import Formula, Node, shape
 from ..formats import ENDINGS, mesh_format
 
+DIGEST = Digest(None, "hash of the file, by which a file that has changed is noticed")
+"""Hash of a file that a formula reads; see `identify_file`."""
+
+PLACE = Choice(
+    "as is",
+    "where the file has it, with its box centred at the origin, or there with its lowest point at z = 0",
+    ("as is", "centre", "bed"),
+)
+"""Place of what a file has."""
+
 
 def identify_file(
     formula: Formula, name: str, known: Collection[str], what: str, sha256: str = "sha256"
@@ -51,13 +61,9 @@ def reading(node: Node, name: str) -> Iterator[None]:
 @shape(
     file=File(REQUIRED, f"a model, {alternatives(*ENDINGS)}, in the folder of the scene", inside=True),
     size=Number(None, "the longest side; without it, a scene unit is a millimetre of the model", above=0),
-    place=Choice(
-        "as is",
-        "where the file has it, with its box centred at the origin, or there with its lowest point at z = 0",
-        ("as is", "centre", "bed"),
-    ),
+    place=PLACE,
     units=Choice("mm", "unit of a file that states none, as .3mf and .glb do", tuple(MILLIMETRES)),
-    sha256=Digest(None, "hash of the file, by which a file that has changed is noticed"),
+    sha256=DIGEST,
 )
 def model(x, y, z, origin, scale, inverse, solid):  # type: ignore[no-untyped-def]
     """A triangle model, closed and without self-intersections. L = 1: the exact distance to its triangles, on

@@ -9,7 +9,7 @@ from ..errors import MeshError
 from ..expr.vocabulary import absolute, maximum, minimum, outline_distance, solid_distance, sqrt
 from ..fields.box import Box
 from ..fields.registry import Node, shape
-from .models import identify_file, reading
+from .models import DIGEST, identify_file, reading
 
 if TYPE_CHECKING:
     from ..mesh.outlines import Outline
@@ -21,7 +21,6 @@ _FILE: dict[str, Any] = {
         None, "the longest side of the outline; without it, a scene unit is a millimetre", above=0
     ),
 }
-_DIGEST = Digest(None, "hash of the file, by which a file that has changed is noticed")
 
 
 def _prism(x, y, z, outline, middle, half):  # type: ignore[no-untyped-def]
@@ -50,7 +49,7 @@ def _prism_box(outline: Outline, height: float, place: str) -> Box:
         "centred at the origin, or there from z = 0, or from z = 0 where the file has it, y up",
         ("centre", "bed", "as is"),
     ),
-    sha256=_DIGEST,
+    sha256=DIGEST,
 )
 def extrude(x, y, z, outline, middle, half):  # type: ignore[no-untyped-def]
     """What an SVG file fills, extruded along z (Quilez 2008, "Distance functions"). L = 1: an exact distance,
@@ -81,7 +80,7 @@ def _extruded(node: Node) -> Outline:
     **_FILE,
     offset=Number(0.0, "from the axis to the left edge of the outline", least=0),
     place=Choice("centre", "centred at the origin, or from z = 0", ("centre", "bed")),
-    sha256=_DIGEST,
+    sha256=DIGEST,
 )
 def revolve(x, y, z, outline):  # type: ignore[no-untyped-def]
     """What an SVG file fills, turned around the z axis, with its left edge there and its y along z (after
@@ -124,7 +123,7 @@ def _revolved(node: Node) -> Outline:
     ),
     points=Points(None, "corners of the path, in place of a file"),
     closed=Choice("no", "whether points are joined to a ring", ("no", "yes")),
-    sha256=_DIGEST,
+    sha256=DIGEST,
     path_sha256=Digest(None, "hash of the file of the path, in the same way"),
 )
 def sweep(x, y, z, solids):  # type: ignore[no-untyped-def]

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from ..common.parameters import REQUIRED, Choice, Digest, File, Number
+from ..common.parameters import REQUIRED, Choice, File, Number
 from ..expr.vocabulary import absolute, atan2, maximum, minimum, outline_distance, sin, sqrt
 from ..fields.box import Box
 from ..fields.registry import Fixed, Node, domain_operator, shape
 from .confining import beyond, frame
-from .models import identify_file, reading
+from .models import DIGEST, identify_file, reading
 
 if TYPE_CHECKING:
     from ..mesh.reliefs import Relief, Round
@@ -20,7 +20,6 @@ ENDINGS = {".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff"}
 
 _FILE = File(REQUIRED, "a picture, .png, .jpg, .webp or .tif, in the folder of the scene", inside=True)
 _PLACE = Choice("centre", "centred at the origin, or there from z = 0", ("centre", "bed"))
-_DIGEST = Digest(None, "hash of the file, by which a file that has changed is noticed")
 
 
 def _plate(x, y, z, relief, slope, half, rise):  # type: ignore[no-untyped-def]
@@ -58,7 +57,7 @@ def _rise(node: Node) -> float:
     height=Number(0.1, "of white above black", above=0),
     base=Number(0.05, "thickness below black", above=0),
     place=_PLACE,
-    sha256=_DIGEST,
+    sha256=DIGEST,
 )
 def heightmap(x, y, z, relief, slope, half, rise):  # type: ignore[no-untyped-def]
     """A picture as a landscape: above the middle of each pixel the height of its level of grey, of 8 or 16
@@ -83,7 +82,7 @@ def heightmap(x, y, z, relief, slope, half, rise):  # type: ignore[no-untyped-de
         360.0, "how far a wall goes around the axis, to a whole column of pixels", above=0, most=360
     ),
     place=_PLACE,
-    sha256=_DIGEST,
+    sha256=DIGEST,
 )
 def lithophane(x, y, z, relief, slope, half, rise):  # type: ignore[no-untyped-def]
     """A picture that shows where light shines through (de Bourgoing 1827): the darker, the thicker, linear in
@@ -198,7 +197,7 @@ def _round(node: Node) -> Round:
     file=_FILE,
     size=Number(1.0, "longest side, between the middles of pixels; its middle is on the z axis", above=0),
     height=Number(0.05, "by which the surface rises under white, from none under black", above=0),
-    sha256=_DIGEST,
+    sha256=DIGEST,
 )
 def relief(child, x, y, z, relief, slope, centre, half):  # type: ignore[no-untyped-def]
     """The element raised by a picture that falls on it along z, by its levels of grey; around the picture, by

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ..common.parameters import MILLIMETRES, REQUIRED, Choice, Digest, File, Label, Number
+from ..common.parameters import MILLIMETRES, REQUIRED, Choice, File, Label, Number
 from ..expr.vocabulary import solid_distance
 from ..fields.box import Box
 from ..fields.registry import Node, shape
-from .models import identify_file, placed_box, placement, reading
+from .models import DIGEST, PLACE, identify_file, placed_box, placement, reading
 
 if TYPE_CHECKING:
     from ..volume.level_sets import LevelSet
@@ -24,13 +24,9 @@ if TYPE_CHECKING:
     ),
     iso=Number(None, "value at the surface; by default 0 of a surface and 0.5 of a density"),
     size=Number(None, "the longest side; without it, a scene unit is a millimetre of the grid", above=0),
-    place=Choice(
-        "as is",
-        "where the file has it, with its box centred at the origin, or there with its lowest point at z = 0",
-        ("as is", "centre", "bed"),
-    ),
+    place=PLACE,
     units=Choice("mm", "unit of the file", tuple(MILLIMETRES)),
-    sha256=Digest(None, "hash of the file, by which a file that has changed is noticed"),
+    sha256=DIGEST,
 )
 def volume(x, y, z, origin, scale, inverse, slope, level_set):  # type: ignore[no-untyped-def]
     """A grid of an OpenVDB file (Museth 2013, "VDB: High-Resolution Sparse Volumes with Dynamic Topology").

@@ -134,7 +134,7 @@ def test_denser_samples_find_no_orbit_that_comes_back(seed: int) -> None:
 def test_the_least_size_is_a_lower_bound(root: Node) -> None:
     """Of |w| at the end of a round, for points of cells and constants of a size."""
     code, given = steps(root)
-    stops = [own[0] for own in numbers(code, growth_of(root))]
+    stops = [own[0] for own in numbers(growth_of(root))]
     half, size, tight = 0.02, 1.5, 0
     centres = RNG.uniform(-2, 2, (3, 300))
     centres[:, :40] = half * np.round(centres[:, :40])

@@ -45,8 +45,10 @@ nb::tuple bind_links(const Rows<int32_t>& triangles, const Vector<bool>& counted
     return nb::make_tuple(result.edges, result.open, result.non_manifold, result.misoriented, result.extra_fans);
 }
 
+using DiskAndFan = std::tuple<std::vector<int64_t>, std::vector<std::array<int32_t, 3>>>;
+
 // Of each vertex of `apexes` its disk and fan, or None.
-std::vector<std::optional<std::tuple<std::vector<int64_t>, std::vector<std::array<int32_t, 3>>>>> bind_fans(
+std::vector<std::optional<DiskAndFan>> bind_fans(
     const Rows<int32_t>& triangles, const Rows<int64_t>& beyond, const Rows<double>& vertices, const Rows<double>& normals,
     const Rows<double>& alike, const Vector<bool>& fixed, const Vector<int32_t>& apexes, double thin, double sharp, size_t most,
     int threads) {
@@ -66,7 +68,7 @@ std::vector<std::optional<std::tuple<std::vector<int64_t>, std::vector<std::arra
                           rows(normals, Vector3{}), rows(alike, Vector3{}), marks_of(fixed, vertices.shape(0)), {thin, sharp, most});
         tbb::parallel_for(size_t(0), found.size(), [&](size_t k) { found[k] = disks.grown(apexes.data()[k]); });
     });
-    std::vector<std::optional<std::tuple<std::vector<int64_t>, std::vector<std::array<int32_t, 3>>>>> result(found.size());
+    std::vector<std::optional<DiskAndFan>> result(found.size());
     for (size_t k = 0; k < found.size(); ++k) {
         if (found[k]) result[k].emplace(std::move(found[k]->triangles), std::move(found[k]->fan));
     }

@@ -11,6 +11,8 @@
 #include <nanobind/stl/vector.h>
 #include <tbb/parallel_for.h>
 
+#include <memory>
+
 namespace fracslice::volume {
 namespace {
 
@@ -129,32 +131,39 @@ int64_t count_open_edges(const IjkArray& ijk, const ValuesArray& values, const I
     return open_edges(bricks, signs_of(bricks));
 }
 
-// Loops over a field, in regions; holds what they call.
-template <class Real>
+// Loops over a field, in regions, in the precision of its P; holds what they call.
 class RegionLoops {
   public:
-    using P = nb::ndarray<const Real, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+    using P = nb::ndarray<nb::ro, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
     using Lists = std::vector<std::array<size_t, 3>>;
+    using Listed = std::tuple<nb::object, P, Lists>;  // the loop "points", its P, and lists of the elements
 
-    // `whole` and `alone`: the loop "points", its P, and lists of the elements.
-    RegionLoops(const std::tuple<nb::object, P, Lists>& whole, nb::object bricks, const std::tuple<nb::object, P, Lists>& alone,
-                double lipschitz, const Point& centre, double half, size_t width)
-        : held_{std::get<0>(whole), std::get<0>(alone), bricks},
-          regions_(listing(whole), code<typename Regions<Real>::Bricks>(bricks), listing(alone), lipschitz, centre, half, width) {}
-    uintptr_t address() const { return reinterpret_cast<uintptr_t>(&regions_); }
-    uintptr_t loop(const std::string& name) const {
-        return name == "points" ? reinterpret_cast<uintptr_t>(&points_in_regions<Real>)
-                                : reinterpret_cast<uintptr_t>(&bricks_in_regions<Real>);
+    RegionLoops(const Listed& whole, nb::object bricks, const Listed& alone, double lipschitz, const Point& centre, double half,
+                size_t width)
+        : held_{std::get<0>(whole), std::get<0>(alone), bricks} {
+        const auto make = [&]<class Real>(std::unique_ptr<const Regions<Real>>& made) {
+            made = std::make_unique<Regions<Real>>(listing<Real>(whole), code<typename Regions<Real>::Bricks>(bricks),
+                                                   listing<Real>(alone), lipschitz, centre, half, width);
+            address_ = reinterpret_cast<uintptr_t>(made.get());
+            points_ = reinterpret_cast<uintptr_t>(&points_in_regions<Real>);
+            bricks_ = reinterpret_cast<uintptr_t>(&bricks_in_regions<Real>);
+        };
+        std::get<1>(whole).dtype() == nb::dtype<float>() ? make(singles_) : make(doubles_);
     }
+    uintptr_t address() const { return address_; }
+    uintptr_t loop(const std::string& name) const { return name == "points" ? points_ : bricks_; }
 
   private:
     template <class Loop>
     static Loop code(const nb::object& compiled) {
         return reinterpret_cast<Loop>(nb::cast<uintptr_t>(compiled.attr("address")));
     }
-    static Listing<Real> listing(const std::tuple<nb::object, P, Lists>& given) {
+    template <class Real>
+    static Listing<Real> listing(const Listed& given) {
         const auto& [points, p, lists] = given;
-        Listing<Real> all{code<typename Listing<Real>::Points>(points), {p.data(), p.data() + p.size()}, {}};
+        require(p.dtype() == nb::dtype<Real>(), "expected P of one precision");
+        const Real* first = static_cast<const Real*>(p.data());
+        Listing<Real> all{code<typename Listing<Real>::Points>(points), {first, first + p.size()}, {}};
         size_t numbers = 0;
         for (const auto& [header, count, size] : lists) {
             all.lists.push_back({header, count, size});
@@ -165,27 +174,20 @@ class RegionLoops {
         return all;
     }
     std::array<nb::object, 3> held_;
-    Regions<Real> regions_;
+    std::unique_ptr<const Regions<float>> singles_;
+    std::unique_ptr<const Regions<double>> doubles_;
+    uintptr_t address_ = 0, points_ = 0, bricks_ = 0;
 };
-
-template <class Real>
-void bind_regions(nb::module_& module, const char* name) {
-    using namespace nanobind::literals;
-    using Loops = RegionLoops<Real>;
-    using Given = std::tuple<nb::object, typename Loops::P, typename Loops::Lists>;
-    nb::class_<Loops>(module, name)
-        .def(nb::init<const Given&, nb::object, const Given&, double, const Point&, double, size_t>(), "whole"_a, "bricks"_a,
-             "alone"_a, "lipschitz"_a, "centre"_a, "half"_a, "width"_a)
-        .def_prop_ro("address", &Loops::address)
-        .def("get_function_address", &Loops::loop, "name"_a);
-}
 
 }  // namespace
 
 void bind_extent(nb::module_& module) {
     using namespace nanobind::literals;
-    bind_regions<float>(module, "Regions32");
-    bind_regions<double>(module, "Regions64");
+    nb::class_<RegionLoops>(module, "Regions")
+        .def(nb::init<const RegionLoops::Listed&, nb::object, const RegionLoops::Listed&, double, const Point&, double, size_t>(),
+             "whole"_a, "bricks"_a, "alone"_a, "lipschitz"_a, "centre"_a, "half"_a, "width"_a)
+        .def_prop_ro("address", &RegionLoops::address)
+        .def("get_function_address", &RegionLoops::loop, "name"_a);
     nb::class_<Sides>(module, "Sides")
         .def(nb::init<nb::object, nb::object, double, bool, const Point&, const Point&, int>(), "sign"_a, "conservative"_a,
              "lipschitz"_a, "far"_a, "lo"_a, "hi"_a, "threads"_a = 0)

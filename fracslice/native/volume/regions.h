@@ -96,7 +96,7 @@ class Regions {
                 hi[axis] = double(origin[axis]) + (corners[3 * b + axis] + 7.5) * double(h);
             }
             live.clear();
-            const bool inside = within(root_, lo, hi);
+            const bool inside = root_.holds(lo) && root_.holds(hi);
             if (inside) {
                 gather(root_, lo, hi, live);
                 std::sort(live.begin(), live.end());
@@ -150,8 +150,6 @@ class Regions {
         }
         bool is_leaf() const { return level == kDeepest || live.size() <= kFew || stuck == kStuck; }
     };
-
-    static bool within(const Cell& cell, const Point& lo, const Point& hi) { return cell.holds(lo) && cell.holds(hi); }
 
     // The leaf of a point; the root, which lists all elements, for points outside.
     const Cell* leaf(const Point& p) const {
