@@ -30,6 +30,7 @@ from .field import Bounds, Cells, Device, Field, Kernel, Loops, Precision
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from ..common.arrays import Triangles
     from .linker import Linked
     from .registry import Formula
 
@@ -735,6 +736,17 @@ class Node(Operators, Field):
         """
         node: Node = self._hooked("visible", self, voxel)
         return node
+
+    def triangles(self) -> Triangles | None:
+        """Triangles that are the whole surface, a printable solid; None where it is known as a field alone.
+
+        Returns
+        -------
+        Triangles or None
+            Scene units.
+        """
+        own: Triangles | None = self._hooked("triangles", None)
+        return own
 
     def signs(self) -> Node:
         """Tree whose field has the sign of this one's and is enclosed more tightly by intervals.

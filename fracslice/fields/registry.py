@@ -21,6 +21,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, TypeVar
 
+from ..common.arrays import Triangles
 from ..common.parameters import REQUIRED, Parameter, python_name, validate_value
 from ..errors import FracsliceError, FracsliceWarning, SceneError
 from ..expr.language import Fixed as Fixed
@@ -119,6 +120,10 @@ class Hooks:
     def visible(self, hook: Callable[[Node, float], Node]) -> Callable[[Node, float], Node]:
         """Set the hook that returns the node without detail finer than a voxel size in its own units."""
         return self._hook("visible", hook)
+
+    def triangles(self, hook: Callable[[Node], Triangles | None]) -> Callable[[Node], Triangles | None]:
+        """Set the hook that returns the triangles that are the whole surface, in scene units, or None."""
+        return self._hook("triangles", hook)
 
     def completed(self, hook: Callable[[dict[str, Any]], dict[str, Any]]) -> Hook:
         """Set the hook that returns the values with those that they imply."""

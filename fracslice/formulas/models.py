@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from ..common.arrays import Triangles
 from ..common.parameters import MILLIMETRES, REQUIRED, Choice, Digest, File, Number, alternatives
 from ..errors import MeshError, SceneError, VolumeError
 from ..expr.vocabulary import solid_distance
@@ -92,6 +93,15 @@ def model_arguments(node: Node) -> dict[str, Any]:
 @model.bounds
 def model_bounds(node: Node) -> Box:
     return placed_box(node, _solid(node).box)
+
+
+@model.triangles
+def model_triangles(node: Node) -> Triangles | None:
+    solid = _solid(node)
+    if solid.mesh is None:
+        return None
+    place = placement(node, solid.box)
+    return Triangles(solid.mesh.vertices * place["scale"] + place["origin"], solid.mesh.triangles)
 
 
 def placement(node: Node, box: Box) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..common.arrays import affine, inverse, product, stretches
+from ..common.arrays import Triangles, affine, inverse, product, stretches
 from ..common.parameters import REQUIRED, SMALLEST, Axis, Vector
 from ..expr.vocabulary import absolute
 from ..fields.box import Box
@@ -88,6 +88,16 @@ def transform_bounds(node: Node) -> Box:
     ends = np.where(linear == 0, 0.0, ends)
     low, high = ends.min(0).sum(1) + offset, ends.max(0).sum(1) + offset
     return Box(tuple(low.tolist()), tuple(high.tolist()))
+
+
+@transform.triangles
+def transform_triangles(node: Node) -> Triangles | None:
+    own = node.children[0].triangles()
+    if own is None:
+        return None
+    linear, offset = affine(node.values)
+    turned = own.triangles if np.linalg.det(linear) > 0 else own.triangles[:, ::-1]
+    return Triangles(product(own.vertices, linear.T) + offset, turned)
 
 
 @domain_operator(

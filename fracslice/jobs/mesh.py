@@ -37,6 +37,7 @@ from .mesh_steps import (
 from .report import Clock, Placement, Report, Result, SurfaceError, SurfaceToMesh
 
 if TYPE_CHECKING:
+    from ..common.arrays import Triangles
     from ..mesh import Mesh
     from ..mesh.simplify import Simplified
     from ..volume import Plan, SignBricks
@@ -102,6 +103,9 @@ def import_ahead() -> None:
     for module in ("export", *(f"mesh.{name}" for name in LATER)):
         import_module(f"fracslice.{module}")
 
+
+OWN = "the triangles are those of the model; with a voxel or a resolution it is meshed anew"
+"""Note on a scene that is nothing but a model."""
 
 TRIES = 2
 """How many times a job that lost its object samples finer."""
@@ -220,6 +224,8 @@ class _Job:
         sized, signs, again = self.sampled()
         planned, work = sized.planned, self.clock.work
         of, halo, executor = Sampled(planned, signs, work.threads), HALO * planned.voxel, Local(work)
+        if (own := self.own_triangles(planned)) is not None:
+            return sized, mesh_steps.surface_of_triangles(of, own, self.clock), executor
         if (pool := work.cluster) is not None:
             if not any(self.needing_all()):
                 from .shared import StoredPieces, share_samples
@@ -240,6 +246,13 @@ class _Job:
             most = mesh_steps.BRICKS
         pieces = Pieces(aside() if aside and most < len(signs) else None, halo)
         return sized, mesh_steps.surface_of(of, layers(signs, most), pieces, executor, self.clock), executor
+
+    def own_triangles(self, planned: Plan) -> Triangles | None:
+        """Triangles of a scene that is nothing but a model, unless a resolution is asked for, scene units."""
+        asked = self.what.voxel, self.what.resolution, self.what.chord, self.what.colour
+        if planned.root.tree is None or any(value is not None for value in asked):
+            return None
+        return planned.root.tree.triangles()
 
     def result(self, sized: Sized, surface: Surface, executor: Executor) -> tuple[Result, int]:
         """Finished mesh and report, and the refinement of the samples that does not lose the object."""
@@ -294,6 +307,7 @@ class _Job:
             simplified=made.simplified,
             notes=(
                 *planned.notes,
+                *([OWN] if surface.own else ()),
                 *thickness_note(made.checks.thin, how, planned.voxel * scale),
                 *shorter,
                 *([fell] if thin and not near else ()),

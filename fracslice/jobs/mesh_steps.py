@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..common.memory import available_bytes
 from ..common.messages import significant
 from ..errors import GridError, TooLargeError, VolumeError
-from ..mesh.checks import Tally, nearest, surface_to_mesh
+from ..mesh.checks import Tally, nearest, surface_samples, surface_to_mesh
 from ..mesh.cleaning import SelectedPiece, finished_piece, grid_planes, place_and_round
 from ..mesh.contouring import BLUNT, Piece, SurfaceContours, contour_whole
 from ..mesh.model import Mesh, build, choose
@@ -48,6 +48,7 @@ from ..work import Work, ahead, in_background
 from .report import Clock, Placement
 
 if TYPE_CHECKING:
+    from ..common.arrays import Triangles
     from ..mesh import Mesh
     from ..mesh.checks import MeshReport
     from ..mesh.cleaning import Finished, Frame
@@ -132,11 +133,12 @@ class Surface:
     pieces: Pieces  # labelled pieces of the mesh
     shells: WholeShells  # shells of the mesh
     tips: NDArray[np.float64]  # vertices that were added at tips, and at sharp edges that samples cut off
+    own: bool = False  # whether these are the triangles of a model, which no voxel is too large for
 
     @property
     def thin(self) -> str:
         """Note on walls thinner than a voxel; empty if there are none."""
-        return self.shells.thin_walls(self.planned.voxel)
+        return "" if self.own else self.shells.thin_walls(self.planned.voxel)
 
 
 def sample_surface(planned: Plan, clock: Clock, evaluate: Evaluate | None = None) -> SignBricks:
@@ -214,6 +216,18 @@ def surface_of(
         else:
             shells = survey(changed, planned.voxel, work.threads)
         return Surface(planned, of.signs, changed, shells, tips)
+
+
+def surface_of_triangles(of: Sampled, own: Triangles, clock: Clock) -> Surface:
+    """Take the triangles of a model, scene units, for its surface."""
+    from ..mesh.contouring import Piece
+    from ..mesh.shells import survey
+
+    pieces, none = Pieces(), np.empty((0, 3))
+    with clock("meshing"):
+        pieces.add(Piece(Mesh(own.vertices, own.triangles), np.inf), fresh=0)
+        shells = survey(pieces, of.planned.voxel, clock.work.threads)
+        return Surface(of.planned, of.signs, pieces, shells, none, own=True)
 
 
 def refine_surface(surface: Surface, chord: float, clock: Clock) -> tuple[Surface, Refined]:
@@ -523,6 +537,8 @@ class Distances(MeshStep[NDArray[np.float64]]):
 def surface_distances(surface: Surface, executor: Executor, work: Work) -> NDArray[np.float64]:
     """Distances from points on the surface of the field to its mesh, scene units, float64 [n]."""
     pieces, margin = surface.pieces, surface.planned.voxel
+    if surface.own:  # triangles of any size
+        return nearest(pieces.mesh(0), surface_samples(surface.planned, work), np.inf, work)
     ends = np.array(pieces.ends)
     begins, turns = np.concatenate([[-np.inf], ends[:-1]]), count()
 

@@ -75,10 +75,11 @@ class Solid(InMemory):
     """Closed mesh whose signed distances machine code asks for; see `native/mesh/solid.h`."""
 
     box: Box  # bounds
+    mesh: Mesh | None = None  # its triangles, if they are a printable mesh
 
     @classmethod
-    def of(cls, mesh: Mesh) -> Solid:
-        """Solid of a checked mesh."""
+    def of(cls, mesh: Mesh, printable: bool = False) -> Solid:
+        """Solid of a checked mesh; `printable`: whether it is more than a solid, a printable mesh."""
         vertices, triangles = mesh.vertices, mesh.triangles
         # Triangles that are near each other lie together in memory.
         order, *boxes = build(mesh, halved=True)
@@ -86,7 +87,9 @@ class Solid(InMemory):
         native = _native.Solid(mesh.vertices, mesh.triangles, np.arange(len(order)), *boxes)
         low, high = mesh.bounds.tolist()
         digest = int(key("solid", vertices, triangles)[:16], 16)
-        return cls(digest, native, Box(tuple(low), tuple(high)))
+        return cls(
+            digest, native, Box(tuple(low), tuple(high)), Mesh(vertices, triangles) if printable else None
+        )
 
 
 def identify(file: str, digest: str | None, known: Iterable[str], what: str) -> tuple[str, str]:
@@ -202,11 +205,12 @@ def solid(file: str, sha256: str) -> Solid:
     require_unchanged(file, sha256)
     if len(mesh.triangles) > MOST:
         raise MeshError(f"{len(mesh.triangles):,} triangles: expected at most {MOST:,}")
-    if problems := faults(check_mesh(mesh)):
+    report = check_mesh(mesh)
+    if problems := faults(report):
         mended = f"`fracslice repair {os.path.basename(file)} -o OUT` mends what it can"
         raise MeshError(f"{', '.join(problems)}: expected a solid; {mended}")
     a, b, c = mesh.triangles.T
-    return Solid.of(mesh.selected((a != b) & (b != c) & (c != a)))
+    return Solid.of(mesh.selected((a != b) & (b != c) & (c != a)), not report.problems)
 
 
 @dataclass(frozen=True, eq=False)

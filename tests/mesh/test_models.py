@@ -369,3 +369,22 @@ def test_a_turned_cube_is_the_same_cube(seed: int) -> None:
     on = np.linspace(ends[:, 0], ends[:, 1], 300).reshape(-1, 3)
     assert len(ends) == 12 and Nearest(mesh).points(on).max() < 2e-6
     assert made.report.problems == () and made.volume == pytest.approx(1000, rel=1e-6)
+
+
+@pytest.mark.parametrize("make", [bracket, crater, nested])
+@pytest.mark.parametrize("scale", [(1, 1, 1), (1.5, -0.5, 2)])
+def test_a_model_alone_keeps_its_triangles(make: Callable[[], Mesh], scale: tuple[float, ...]) -> None:
+    solid = make()
+    made = make_mesh(transform(from_trimesh(solid), rotate=(1, 2, 3, 40), scale=scale), threads=1)
+    assert len(made.triangles) == len(solid.triangles)
+    assert made.volume == pytest.approx(abs(np.prod(scale)) * solid.volume, rel=1e-6)
+    assert made.report.problems == ()
+    assert made.report.surface_error_mm.max < 1e-5 and made.report.surface_to_mesh_mm.max < 1e-3
+
+
+def test_a_model_with_a_resolution_is_meshed_anew() -> None:
+    assert len(make_mesh(from_trimesh(shapes.cube()), resolution=32, threads=1).triangles) > 1000
+
+
+def test_a_model_whose_bodies_share_a_vertex_is_meshed_anew() -> None:
+    assert len(make_mesh(from_trimesh(two_tips()), threads=1).triangles) > 100
