@@ -622,9 +622,11 @@ class _Sharpening:
     def _wrong(self, state: _Sharpened) -> NDArray[np.int64]:
         """New triangles that are turned over or too thin, or intersect others after quantisation."""
         mesh = state.mesh
-        as_written = quantise(mesh, used_vertices(mesh), threads=self._work.threads).mesh
-        new = state.parents < 0
-        crossing = self_intersecting_triangles(as_written, threads=self._work.threads, among=new)
+        new, threads = state.parents < 0, self._work.threads
+        as_written = quantise(mesh, used_vertices(mesh), threads=threads).mesh
+        # whether a flat fold is found depends on the rounding, and the file has another one
+        crossing = self_intersecting_triangles(as_written, threads=threads, among=new)
+        crossing |= self_intersecting_triangles(mesh, threads=threads, among=new)
         bad = state.bad(self._voxel, 0.0, 2 * APART)
         return np.union1d(bad[~self._across(state, bad)], np.flatnonzero(crossing))
 
