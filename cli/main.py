@@ -53,6 +53,7 @@ NAMES = (
     "scenes",
     "show",
     "slice",
+    "studio",
 )
 """Commands: functions in modules of their names, with an underscore behind the name of a builtin."""
 

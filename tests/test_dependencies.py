@@ -20,6 +20,8 @@ MODULES = {
     "pillow": "PIL",
     "scikit-image": "skimage",
     "imageio-ffmpeg": "imageio_ffmpeg",
+    "trame-rca": "trame",
+    "trame-vuetify": "trame",
 }
 """Of packages, where it has another name."""
 
@@ -28,7 +30,7 @@ WITHIN = {"vtkmodules": "pyvista", "Imath": "OpenEXR"}
 
 BLOCKED = (
     "pyvista vtkmodules matplotlib skimage manifold3d pymeshlab lxml networkx "
-    "hypothesis shapely uharfbuzz imageio_ffmpeg pyoidn distributed dask fsspec"
+    "hypothesis shapely uharfbuzz imageio_ffmpeg pyoidn distributed dask fsspec trame aiohttp"
 )
 
 

@@ -146,6 +146,7 @@ def test_commands_are_understood(line: str, folder: Path, monkeypatch, capfd) ->
     ):
         monkeypatch.setattr(f"fracslice.{work}", begin)
     monkeypatch.setattr("fracslice.viewer.show", begin)
+    monkeypatch.setattr("fracslice.studio.session.Studio", begin)
     monkeypatch.setattr("shutil.which", lambda name: name)
     monkeypatch.setattr("fracslice.viewer.need_screen", lambda: None)
     with pytest.raises(BegunError):

@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -20,24 +21,10 @@ from ..scene.reader import read
 from ..scene.view import Camera, View
 from ..work import Work
 from .progressive import Pass, Renderer
-from .setup import clearance, default_lights
+from .setup import clearance
 
 NEARER = 2.0
 """Ratio of surface distances, in either direction, at which depth and precision are chosen again."""
-VISIBLE = 0.7
-"""Fraction of the sky that is visible from an average point of a fractal."""
-
-
-def draft_view(root: Node, view: View) -> View:
-    """Return a view whose pictures are free of noise after one sample: hard shadows and a sharp lens."""
-    lights = tuple(
-        replace(light, shadows="no", strength=light.strength * VISIBLE)
-        if light.surrounds
-        else replace(light, size=0.0)
-        for light in view.lights or default_lights(root)
-    )
-    camera = view.camera and replace(view.camera, aperture=0.0)
-    return replace(view, camera=camera, lights=lights, shading=replace(view.shading, bounces=0, paths="no"))
 
 
 class Follower:
@@ -82,12 +69,26 @@ POLL = 0.2
 """Interval between checks of the file, seconds."""
 
 
-class WatchedFile:
-    """File that another program may save again."""
+class SceneSource(Protocol):
+    """Where a live picture has its scene from."""
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
+    def read(self) -> Scene:
+        """The scene as it is now; raises `SceneError` if it is invalid."""
+
+    def changed(self) -> bool:
+        """Whether it is another than at the last call."""
+
+
+class SceneFile:
+    """Scene of a file that another program may save again."""
+
+    def __init__(self, path: Path, settings: Sequence[str] = (), files_outside: bool = False) -> None:
+        self._path, self._settings, self._files_outside = path, settings, files_outside
         self._checked, self._saved = time.monotonic(), self._stamp()
+
+    def read(self) -> Scene:
+        """See `SceneSource.read`."""
+        return read(self._path, files_outside=self._files_outside).with_values(self._settings)
 
     def changed(self) -> bool:
         """Return whether the file was saved since the last call; the disk is asked at most every `POLL`."""
@@ -144,8 +145,6 @@ WITHIN = 0.05
 """Aim for the time of a draft, seconds."""
 COARSEST = 8
 """Largest spacing of a draft's pixels."""
-READABLE = 4
-"""Samples per pixel from which the final picture replaces the draft: fewer are noisier."""
 FARTHEST = 100.0
 """Distance from the first target that a flight keeps within, in distances of the first eye."""
 LONGEST = 0.1
@@ -164,25 +163,23 @@ class Shown:
 
 
 class Live:
-    """Live picture of a scene file, which is read again whenever it is saved.
+    """Live picture of a scene, which is read again whenever its source says that it has changed.
 
-    While the camera moves, the picture is a draft with hard lights; at rest, it sharpens. If a later version
-    of the file is invalid, the picture stays and the message is in `shown.problem`. Call `close` at the end.
+    While the camera moves, the picture is a draft, with fewer pixels and one sample of each; at rest, it
+    sharpens. If a later version is invalid, the picture stays and the message is in `shown.problem`. Call
+    `close` at the end.
 
     `size` in pixels.
     """
 
     def __init__(
         self,
-        path: str | Path,
-        settings: Sequence[str] = (),
+        source: SceneSource,
         size: tuple[int, int] = (960, 540),
         work: Work | None = None,
         device: str = "auto",
-        files_outside: bool = False,
     ) -> None:
-        self._files_outside = files_outside
-        self._path, self._settings, self._size, self._device = Path(path), settings, size, device
+        self._source, self._size, self._device = source, size, device
         self._refining = replace(work or Work(), cancel=threading.Event())
         self._drafting = replace(self._refining, cancel=threading.Event())  # input must not stop a draft
         self._lock = threading.Lock()
@@ -190,8 +187,7 @@ class Live:
         self._stepped = time.monotonic()
         self.making: float | None = None
         self._aim: Camera
-        self._file = WatchedFile(self._path)
-        self._load(self._read(), None)
+        self._load(source.read(), None)
         self.first = self.camera
         self._farthest = FARTHEST * math.dist(self.first.eye, self.first.target)
         self._open = True
@@ -199,13 +195,16 @@ class Live:
         self._thread = threading.Thread(target=self._run, name="fracslice live", daemon=True)
         self._thread.start()
 
-    def _read(self) -> Scene:
-        return read(self._path, files_outside=self._files_outside).with_values(self._settings)
-
     @property
     def camera(self) -> Camera:
         """Camera of the picture."""
         return self.shown.camera
+
+    @property
+    def aim(self) -> Camera:
+        """Camera that the picture follows."""
+        with self._lock:
+            return self._aim
 
     @property
     def running(self) -> bool:
@@ -244,6 +243,10 @@ class Live:
             self._size = size
             self._refining.cancel.set()
 
+    def wake(self) -> None:
+        """Look at the source at once."""
+        self._refining.cancel.set()
+
     def close(self) -> None:
         """Stop rendering. Raises the exception that ended the render thread, if any."""
         self._open = False
@@ -263,8 +266,8 @@ class Live:
             self._failure = error
 
     def _step(self) -> None:
-        """Follow the file and the camera; otherwise refine the picture, or wait if it is complete."""
-        self._follow_file()
+        """Follow the source and the camera; otherwise refine the picture, or wait if it is complete."""
+        self._follow_source()
         aim, size = self._flown(), self._size
         try:
             if aim != self.camera or size != self._drawn:
@@ -292,13 +295,13 @@ class Live:
     def _draft(self, drafts: Follower, camera: Camera | None, size: tuple[int, int]) -> None:
         """Show a draft, and choose the spacing of the next one by the time that it took."""
         coarse = max(size[0] // self._spacing, 1), max(size[1] // self._spacing, 1)
-        renderer = self._made(drafts, camera and replace(camera, aperture=0.0), coarse)
+        renderer = self._made(drafts, camera, coarse)
         start = time.monotonic()
         *_, done = renderer.passes(1)
         seconds = time.monotonic() - start
         seen = camera or renderer.setup.camera
         self.shown = Shown(done.shown, 0.0, seen, drafts.distance, self._problem)
-        self._drafts, self._drawn, self._passes = drafts, size, self._sharpened(self._spacing > 1)
+        self._drafts, self._drawn, self._passes = drafts, size, self._sharpened()
         if seconds > 1.5 * WITHIN:
             self._spacing = min(self._spacing + 1, COARSEST)
         elif seconds < WITHIN / 2:
@@ -309,19 +312,13 @@ class Live:
         try:
             return next(self._passes, None) is not None
         except Cancelled:  # ends a generator
-            self._passes = self._sharpened(False)
+            self._passes = self._sharpened()
             raise
 
-    def _sharpened(self, coarse: bool) -> Iterator[Pass]:
-        """Show a draft of every pixel after a coarse one, then the final picture once it has less noise."""
-        if coarse:
-            sharp = replace(self.camera, aperture=0.0)
-            for done in self._made(self._stills, sharp, self._drawn).passes(1):
-                yield done
-            self.shown = replace(self.shown, pixels=done.shown)
+    def _sharpened(self) -> Iterator[Pass]:
+        """Show the picture of every pixel, pass by pass."""
         for done in self._made(self._finals, self.camera, self._drawn).passes():
-            if done.samples >= min(READABLE, done.view.film.samples):
-                self.shown = replace(self.shown, pixels=done.shown, samples=done.samples)
+            self.shown = replace(self.shown, pixels=done.shown, samples=done.samples)
             yield done
 
     def _made(self, follower: Follower, camera: Camera | None, size: tuple[int, int]) -> Renderer:
@@ -334,25 +331,23 @@ class Live:
 
     def _load(self, scene: Scene, camera: Camera | None) -> None:
         """Show a scene from a camera, or from its own; if that fails, the former scene stays."""
-        hard, device = draft_view(scene.root, scene.view), self._device
-        drafts = Follower(scene.root, hard, self._drafting, device)
+        drafts = Follower(scene.root, scene.view, self._drafting, self._device)
         self._problem = ""
         self._draft(drafts, camera or scene.view.camera, self._size)
-        self._stills = Follower(scene.root, hard, self._refining, device)
-        self._finals = Follower(scene.root, scene.view, self._refining, device)
+        self._finals = Follower(scene.root, scene.view, self._refining, self._device)
         self.scene = scene
         with self._lock:
             self._aim = self.camera
 
-    def _follow_file(self) -> None:
-        """Load a new version of the file.
+    def _follow_source(self) -> None:
+        """Load a new version of the scene.
 
         Its camera is used only if it differs from the previous version's.
         """
-        if not self._file.changed():
+        if not self._source.changed():
             return
         try:
-            scene = self._read()
+            scene = self._source.read()
             moved = scene.view.camera != self.scene.view.camera
             self._load(scene, None if moved else self._aim)
         except FracsliceError as error:

@@ -19,7 +19,7 @@ import numpy as np
 from ..common.files import replacing
 from ..errors import ExportError
 from ..rendering import Pass
-from ..rendering.live import CameraInput, Live
+from ..rendering.live import CameraInput, Live, SceneFile
 from ..scene.model import to_xml
 from ..scene.view import Camera
 from ..work import Work
@@ -345,7 +345,7 @@ def fly(
     """
     need_screen()
     work = work or Work()
-    live = Live(path, settings, size, work, device, files_outside)
+    live = Live(SceneFile(Path(path), settings, files_outside), size, work, device)
     try:
         Viewer(live, size, work.cancel.is_set).open()
     finally:

@@ -1,0 +1,587 @@
+"""The page of a studio: panels of trame and Vuetify beside our own frames."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import secrets
+import webbrowser
+from collections.abc import Awaitable, Callable
+from typing import Any, Literal
+
+from aiohttp import web
+from trame.app import get_server
+from trame.ui.vuetify3 import VAppLayout
+from trame.widgets import html, rca
+from trame.widgets import vuetify3 as v
+
+from ..errors import FracsliceError
+from ..viewer.viewer import MOVES, PACES, Controls
+from . import panels
+from .session import PICTURES, Studio, command, jpeg
+
+TICK = 1 / 60
+"""Interval between two looks at the picture, seconds."""
+
+QUALITIES = 75, 92
+"""Quality of JPEG frames, of drafts and of pictures at rest."""
+
+PENDING = 2
+"""Frames that a page may have to fetch still before others are left out."""
+
+HELP = (
+    ("drag", "turn around the target"),
+    ("shift or right drag", "look around"),
+    ("wheel", "come nearer, go away"),
+    ("W S A D R F, Q E", "fly, roll"),
+    ("1 to 9", "pace"),
+    ("V", "first view"),
+    ("ctrl Z, ctrl Y", "undo, redo"),
+    ("?", "this help"),
+)
+
+CONTROL = {"z": "undo", "y": "redo"}
+"""What keys do with ctrl."""
+
+SPREAD = 0.3
+"""Size of random changes: 1 doubles or halves a number in a typical case."""
+
+AREA = "picture"
+
+
+def named(label: str, title: str = "") -> list[str]:
+    """Attributes that name a control, for those who see it and those who do not."""
+    return [f'aria-label="{label}"', f'title="{title or label}"']
+
+
+def named_by(expression: str) -> list[str]:
+    """The same of an expression of the page."""
+    return [f':aria-label="{expression}"']
+
+
+class Frames:
+    """The area of the picture: sends frames, receives sizes and what the mouse and the keys do."""
+
+    area_name = AREA
+
+    def __init__(self, studio: Studio, act: Callable[[str], None]) -> None:
+        self._studio, self._act = studio, act
+        self._streamer: Any = None
+        self._sent: object = None
+        self._grip: tuple[float, float] | None = None
+        self._looking = False
+        self.controls = Controls()
+
+    def set_streamer(self, streamer: Any) -> None:
+        """Have the streamer of a page; called by trame-rca."""
+        self._streamer, self._sent = streamer, None
+
+    def update_size(self, _: str, size: dict[str, Any]) -> None:
+        """Follow the size of the area, pixels of the page."""
+        self._studio.live.resize((max(int(size.get("w", 0)), 16), max(int(size.get("h", 0)), 16)))
+        self._sent = None
+
+    def reset(self) -> None:
+        """Send the picture once more."""
+        self._sent = None
+
+    def on_interaction(self, _: str, event: dict[str, Any]) -> None:
+        """Do what an event of the mouse or a key says."""
+        kind = event.get("type", "")
+        at = float(event.get("x", 0)), float(event.get("y", 0))
+        if kind in ("LeftButtonPress", "RightButtonPress", "MiddleButtonPress"):
+            self._grip, self._looking = at, kind != "LeftButtonPress" or bool(event.get("shiftKey"))
+        elif kind.endswith("ButtonRelease"):
+            self._grip = None
+        elif kind == "MouseMove" and self._grip:
+            right, up = at[0] - self._grip[0], at[1] - self._grip[1]
+            self._grip = at
+            turn = self._studio.look_around if self._looking else self._studio.orbit
+            turn(right, -up)
+        elif kind == "MouseWheel":
+            self._studio.approach(1.0 if event.get("spinY", 0) < 0 else -1.0)
+        elif kind in ("KeyDown", "KeyPress", "KeyUp"):
+            self.key(str(event.get("key", "")).lower(), kind != "KeyUp", bool(event.get("controlKey")))
+
+    def key(self, key: str, down: bool, control: bool = False) -> None:
+        """Press or release a key."""
+        if control:
+            if down and key in CONTROL:
+                self._act(CONTROL[key])
+        elif not down:
+            self.controls.release(key)
+        elif key in MOVES or key in PACES:
+            self.controls.press(key)
+        elif key in ("v", "?"):
+            self._act(key)
+
+    async def send(self) -> None:
+        """Send the picture if there is a new one, and a page to send it to."""
+        shown = self._studio.shown
+        if shown is self._sent or self._streamer is None:
+            return
+        self._sent = shown
+        still = shown.samples > 0
+        loop = asyncio.get_running_loop()
+        data = await loop.run_in_executor(None, jpeg, shown.pixels, QUALITIES[still])
+        rows, columns, _ = shown.pixels.shape
+        meta = {"type": "image/jpeg", "codec": "", "w": columns, "h": rows, "st": 0, "key": "key"}
+        self._streamer.push_content(AREA, meta, data)
+
+
+class Page:
+    """The page and what it does."""
+
+    def __init__(self, studio: Studio) -> None:
+        self.studio, self.token = studio, secrets.token_urlsafe(24)
+        self.server = get_server(f"fracslice-{self.token[:8]}", client_type="vue3")
+        self.state, self.ctrl = self.server.state, self.server.controller
+        self.frames = Frames(studio, self.act)
+        self.state.trame__title = f"{studio.document.path.stem} - fracslice"
+        self.state.update(
+            {
+                "choices": panels.choices(),
+                "search": "",
+                "adding": False,
+                "wrapping": False,
+                "editing": False,
+                "helping": False,
+                "making": False,
+                "opening": False,
+                "scenes": studio.scenes,
+                "dark": True,
+                "file_name": f"{studio.document.path.stem}.3mf",
+                "resolution": 256,
+                "samples": 64,
+                "status": "",
+                "job": {},
+            }
+        )
+        self.refresh()
+        self.state.change("xml")(self.write)
+        self.ctrl.on_server_bind.add(self.guard)
+        self.ctrl.on_server_ready.add(lambda **_: asyncio.get_running_loop().create_task(self.follow()))
+        self.build()
+
+    def refresh(self) -> None:
+        """Bring what the page shows of the document up to date."""
+        document = self.studio.document
+        tag = document.chosen
+        with self.state as state:
+            state.rows = panels.outline(document)
+            state.panel = panels.controls(tag) if tag else []
+            state.at = list(document.version.at)
+            state.tag = tag.name if tag else ""
+            state.xml = document.text
+            state.problem = document.problem or self.studio.message
+            state.undoes, state.redoes, state.saved = document.undoes, document.redoes, document.is_saved
+
+    def edit(self, change: Callable[..., None], *arguments: Any) -> None:
+        """Change the document and the page."""
+        self.studio.edit(change, *arguments)
+        self.refresh()
+
+    def act(self, key: str) -> None:
+        """Do what a key of the picture or of the page means."""
+        document = self.studio.document
+        if key == "v":
+            self.studio.home()
+        elif key == "?":
+            with self.state as state:
+                state.helping = not state.helping
+        elif key == "undo":
+            self.edit(document.undo)
+        elif key == "redo":
+            self.edit(document.redo)
+        elif key == "save":
+            self.save()
+
+    def save(self) -> None:
+        """Save the scene."""
+        try:
+            self.studio.save()
+        except FracsliceError as error:
+            self.studio.message = str(error)
+        self.refresh()
+
+    def open(self, source: str) -> None:
+        """Open another scene."""
+        self.studio.message = ""
+        try:
+            self.studio.open(source)
+        except FracsliceError as error:
+            self.studio.message = str(error)
+        self.shut("opening")
+        with self.state as state:
+            state.file_name = f"{self.studio.document.path.stem}.3mf"
+            state.trame__title = f"{self.studio.document.path.stem} - fracslice"
+        self.refresh()
+
+    def shut(self, *dialogs: str) -> None:
+        """Close dialogs, though a page may have opened them by itself."""
+        with self.state as state:
+            state.update(dict.fromkeys(dialogs, False))
+            state.dirty(*dialogs)
+
+    def vary(self) -> None:
+        """Change the numbers at random."""
+        try:
+            self.studio.vary(SPREAD)
+        except FracsliceError as error:
+            self.studio.message = str(error)
+        self.refresh()
+
+    def choose(self, place: list[int]) -> None:
+        """Choose an element."""
+        self.studio.document.choose(tuple(place))
+        self.refresh()
+
+    def add(self, name: str, around: bool) -> None:
+        """Add an element to the chosen one, or put it around that."""
+        document, at = self.studio.document, self.studio.document.version.at
+        self.shut("adding", "wrapping")
+        if any(choice["name"] == name and choice["kind"] == "part" for choice in self.state.choices):
+            at = ()
+        if around:
+            self.edit(document.wrap, at, name)
+        else:
+            self.edit(document.add, at, name)
+
+    def change(self, edit: Literal["duplicate", "unwrap", "remove"]) -> None:
+        """Change the chosen element."""
+        document = self.studio.document
+        self.edit(getattr(document, edit), document.version.at)
+
+    def shift(self, by: int) -> None:
+        """Move the chosen element up or down among its siblings."""
+        at = self.studio.document.version.at
+        if at and at[-1] + by >= 0:
+            self.edit(self.studio.document.move, at, (*at[:-1], at[-1] + by + (by > 0)))
+
+    def set_text(self, name: str, value: str | None) -> None:
+        """Give an attribute of the chosen element a text; none takes it away."""
+        document = self.studio.document
+        self.edit(document.set_value, document.version.at, name, value or None)
+
+    def set_number(self, name: str, index: int, value: Any) -> None:
+        """Give a number of an attribute a value."""
+        try:
+            number = float(value)
+        except (TypeError, ValueError):
+            return
+        self.studio.set_number(self.studio.document.version.at, name, int(index), number)
+        self.refresh()
+
+    def set_colour(self, name: str, value: str) -> None:
+        """Give an attribute a colour."""
+        self.set_text(name, panels.colour_text(value))
+
+    def write(self, xml: str, **_: Any) -> None:
+        """Take the text of the editor."""
+        if xml != self.studio.document.text:
+            self.edit(self.studio.document.write, xml, None, "text")
+
+    def make(self) -> None:
+        """Make the file that the page names."""
+        name, options = self.state.file_name, self.options
+        try:
+            self.studio.start(name, options)
+        except FracsliceError as error:
+            self.studio.message = str(error)
+        self.refresh()
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Options of the file that the page names."""
+        picture = str(self.state.file_name).lower().endswith(PICTURES)
+        return (
+            {"samples": int(self.state.samples)} if picture else {"resolution": float(self.state.resolution)}
+        )
+
+    def cancel(self) -> None:
+        """Cancel what is being made."""
+        if self.studio.job:
+            self.studio.job.cancel.set()
+
+    async def follow(self) -> None:
+        """Steer by the keys that are held, send frames, and say how far things are, until the server ends."""
+        while True:
+            self.studio.steer(self.frames.controls.input)
+            await self.frames.send()
+            self._say()
+            await asyncio.sleep(TICK)
+
+    def _say(self) -> None:
+        """Bring the line below the picture, and that of the job, up to date."""
+        shown, job = self.studio.shown, self.studio.job
+        state = "draft" if shown.samples < 1 else f"{shown.samples:.0f} samples a pixel"
+        making = "   compiling ..." if self.studio.live.making else ""
+        status = f"{state}   surface at {shown.distance:.2g}   pace {self.frames.controls.pace:.2g}{making}"
+        told = {}
+        if job:
+            line = job.result or job.problem or job.stage
+            told = {"line": line, "share": round(100 * job.share), "done": job.is_done}
+            told["command"] = command(self.studio.target, job.path.name, self.options)
+        problem = self.studio.document.problem or self.studio.message or shown.problem
+        changes = {"status": status, "job": told, "problem": problem}
+        if any(self.state[name] != value for name, value in changes.items()):
+            with self.state as state_now:
+                state_now.update(changes)
+
+    def guard(self, server: Any) -> None:
+        """Refuse requests that were made to another host, or by the page of another site."""
+
+        @web.middleware
+        async def refuse(
+            request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
+        ) -> web.StreamResponse:
+            port = server.get_port()
+            known = {f"{name}:{port}" for name in ("127.0.0.1", "localhost", "[::1]", server.host)}
+            origin = request.headers.get("Origin")
+            if request.host not in known or (origin and origin.partition("//")[2] not in known):
+                raise web.HTTPForbidden(text="expected the address that fracslice studio has printed")
+            return await handler(request)
+
+        server.app.middlewares.append(refuse)
+
+    def serve(self, host: str, port: int, browser: bool, say: Callable[[str], None]) -> None:
+        """Serve the page until it is interrupted; `say` is given its address."""
+
+        def ready(**_: Any) -> None:
+            name = "127.0.0.1" if host in ("localhost", "0.0.0.0", "::") else host
+            address = f"http://{name}:{self.server.port}/index.html?secret={self.token}"
+            say(address)
+            if browser:
+                webbrowser.open(address)
+
+        self.ctrl.on_server_ready.add(ready)
+        os.environ["TRAME_ARGS"] = f"--authKey={self.token}"  # instead of this program's own arguments
+        os.environ["WSLINK_READY_MSG"] = ""
+        self.server.start(
+            port=port,
+            host=host,
+            open_browser=False,
+            show_connection_info=False,
+            disable_logging=True,
+            timeout=0,
+        )
+
+    def build(self) -> None:
+        """Lay the page out."""
+        with VAppLayout(self.server, theme=("dark ? 'dark' : 'light'",)) as layout:
+            self._bar()
+            with v.VNavigationDrawer(permanent=True, width=360):
+                self._tree()
+                v.VDivider()
+                self._panel()
+            with v.VNavigationDrawer(v_model=("editing",), location="right", width=460):
+                self._editor()
+            with v.VMain(style="height: 100vh"):
+                self._picture()
+            self._dialogs()
+        self.layout = layout
+
+    def _bar(self) -> None:
+        with v.VAppBar(density="compact"):
+            v.VAppBarTitle("{{ trame__title }}{{ saved ? '' : ' *' }}")
+            v.VBtn(icon="mdi-folder-open", click="opening = true; search = ''", raw_attrs=named("Open"))
+            v.VBtn(
+                icon="mdi-dice-5", click=self.vary, raw_attrs=named("Vary", "Change the numbers at random")
+            )
+            for icon, label, act, off in (
+                ("mdi-undo", "Undo", "undo", "undoes == 0"),
+                ("mdi-redo", "Redo", "redo", "redoes == 0"),
+                ("mdi-content-save", "Save", "save", "false"),
+                ("mdi-home", "First view", "v", "false"),
+                ("mdi-help", "Help", "?", "false"),
+            ):
+                v.VBtn(icon=icon, click=(self.act, f"['{act}']"), disabled=(off,), raw_attrs=named(label))
+            v.VBtn(
+                icon="mdi-camera-marker",
+                click=self.keep_view,
+                raw_attrs=named("Write this view into the scene"),
+            )
+            v.VBtn(icon="mdi-xml", click="editing = !editing", raw_attrs=named("Text", "Text of the scene"))
+            v.VBtn(icon="mdi-cube-send", click="making = true", raw_attrs=named("Make a file", "Make a file"))
+            v.VBtn(
+                icon="mdi-theme-light-dark",
+                click="dark = !dark",
+                raw_attrs=named("Light or dark", "Light or dark"),
+            )
+
+    def keep_view(self) -> None:
+        """Write the camera into the scene."""
+        self.studio.keep_view()
+        self.refresh()
+
+    def _tree(self) -> None:
+        with html.Div(classes="d-flex pa-1"):
+            v.VBtn("Add", click="adding = true; search = ''", size="small", variant="text")
+            v.VBtn("Wrap", click="wrapping = true; search = ''", size="small", variant="text")
+            for icon, label, act in (
+                ("mdi-arrow-up", "Move up", lambda: self.shift(-1)),
+                ("mdi-arrow-down", "Move down", lambda: self.shift(1)),
+                ("mdi-content-copy", "Duplicate", lambda: self.change("duplicate")),
+                ("mdi-arrow-collapse", "Unwrap", lambda: self.change("unwrap")),
+                ("mdi-delete", "Delete", lambda: self.change("remove")),
+            ):
+                v.VBtn(icon=icon, click=act, size="small", variant="text", raw_attrs=named(label))
+        with (
+            v.VList(density="compact", style="max-height: 40vh; overflow: auto", raw_attrs=named("Elements")),
+            v.VListItem(
+                v_for="row in rows",
+                key="row.place.join('.')",
+                click=(self.choose, "[row.place]"),
+                active=("row.chosen",),
+                style=("`padding-left: ${8 + 14 * row.depth}px; min-height: 30px`",),
+            ),
+        ):
+            html.Span("{{ row.name }}")
+            html.Span("{{ row.given }}", classes="text-caption text-medium-emphasis ml-2")
+
+    def _panel(self) -> None:
+        with html.Div(classes="pa-3"):
+            html.Div("{{ tag }}", classes="text-h6")
+            with html.Div(v_for="c in panel", key="at.join('.') + c.name", classes="mb-2"):
+                with html.Div(classes="d-flex align-center"):
+                    html.Span(
+                        "{{ c.name }}",
+                        title=("c.doc + ': ' + c.expects",),
+                        classes=("c.given ? 'text-body-2 font-weight-bold' : 'text-body-2'",),
+                    )
+                    v.VSpacer()
+                    v.VBtn(
+                        "reset",
+                        v_if="c.given",
+                        size="x-small",
+                        variant="text",
+                        click=(self.set_text, "[c.name, null]"),
+                        raw_attrs=named_by("'reset ' + c.name"),
+                    )
+                with (
+                    html.Template(v_if="c.kind == 'slider'"),
+                    html.Div(v_for="(value, i) in c.values", key="i", classes="d-flex align-center"),
+                ):
+                    v.VSlider(
+                        model_value=("value",),
+                        update_modelValue=(self.set_number, "[c.name, i, $event]"),
+                        min=("c.least",),
+                        max=("c.most",),
+                        step=("c.step",),
+                        density="compact",
+                        hide_details=True,
+                        raw_attrs=named_by("c.name + ' ' + (i + 1)"),
+                    )
+                    html.Input(
+                        type="number",
+                        value=("value",),
+                        step="any",
+                        change=(self.set_number, "[c.name, i, $event.target.value]"),
+                        style="width: 84px; color: inherit",
+                        raw_attrs=named_by("c.name + ' ' + (i + 1) + ' as a number'"),
+                    )
+                v.VSelect(
+                    v_if="c.kind == 'choice'",
+                    model_value=("c.text",),
+                    items=("c.choices",),
+                    update_modelValue=(self.set_text, "[c.name, $event]"),
+                    density="compact",
+                    hide_details=True,
+                    raw_attrs=named_by("c.name"),
+                )
+                html.Input(
+                    v_if="c.kind == 'colour'",
+                    type="color",
+                    value=("c.hex",),
+                    change=(self.set_colour, "[c.name, $event.target.value]"),
+                    raw_attrs=named_by("c.name"),
+                )
+                v.VTextField(
+                    v_if="c.kind == 'text'",
+                    model_value=("c.text",),
+                    change=(self.set_text, "[c.name, $event.target.value]"),
+                    density="compact",
+                    hide_details=True,
+                    raw_attrs=named_by("c.name"),
+                )
+
+    def _editor(self) -> None:
+        html.Textarea(
+            v_model=("xml",),
+            raw_attrs=[*named("Text of the scene"), 'spellcheck="false"'],
+            style="width: 100%; height: calc(100vh - 80px); font: 12px monospace; color: inherit",
+            classes="pa-2",
+        )
+
+    def _picture(self) -> None:
+        with html.Div(style="position: relative; height: calc(100vh - 48px); background: #181a1d"):
+            area = rca.RemoteControlledArea(
+                name=AREA,
+                display="image",
+                send_mouse_move=True,
+                event_throttle_ms=15,
+                image_style=("{ width: '100%', height: '100%', objectFit: 'contain' }",),
+            )
+            area.set_drop_frames_pending_network_limit(PENDING)
+            area.add_view_handler(self.frames)
+            html.Div(
+                "{{ status }}",
+                style="position: absolute; left: 8px; bottom: 6px; color: #eee; text-shadow: 0 0 3px #000",
+                classes="text-caption",
+                raw_attrs=['role="status"'],
+            )
+            v.VAlert(
+                "{{ problem }}",
+                v_if="problem",
+                type="warning",
+                density="compact",
+                style="position: absolute; left: 8px; right: 8px; top: 8px",
+            )
+            with v.VCard(
+                v_if="job.line",
+                style="position: absolute; right: 8px; bottom: 8px; width: 340px",
+                classes="pa-2",
+            ):
+                html.Div("{{ job.line }}", classes="text-caption")
+                v.VProgressLinear(v_if="!job.done", model_value=("job.share",), raw_attrs=named("Progress"))
+                html.Code("{{ job.command }}", classes="text-caption")
+                v.VBtn("Cancel", v_if="!job.done", size="small", variant="text", click=self.cancel)
+
+    def _dialogs(self) -> None:
+        for flag, title, around in (("adding", "Add an element", False), ("wrapping", "Wrap it in", True)):
+            with v.VDialog(v_model=(flag,), width=560), v.VCard(title=title):
+                v.VTextField(v_model=("search",), label="Search", autofocus=True, classes="mx-4")
+                shown = "choices.filter(c => (c.name + c.doc).includes(search)"
+                shown += " && (c.kind != 'shape' && c.kind != 'part'))" if around else ")"
+                with v.VList(density="compact", style="max-height: 60vh; overflow: auto"):
+                    v.VListItem(
+                        v_for=f"c in {shown}",
+                        key="c.name",
+                        title=("c.name",),
+                        subtitle=("c.doc",),
+                        click=(self.add, f"[c.name, {str(around).lower()}]"),
+                    )
+        with v.VDialog(v_model=("opening",), width=460), v.VCard(title="Open a scene"):
+            v.VTextField(v_model=("search",), label="Search", autofocus=True, classes="mx-4")
+            with v.VList(density="compact", style="max-height: 60vh; overflow: auto"):
+                v.VListItem(
+                    v_for="name in scenes.filter(name => name.includes(search))",
+                    key="name",
+                    title=("name",),
+                    click=(self.open, "[name]"),
+                )
+        with v.VDialog(v_model=("helping",), width=460), v.VCard(title="Help"), v.VTable(), html.Tbody():
+            for keys, meaning in HELP:
+                with html.Tr():
+                    html.Td(keys)
+                    html.Td(meaning)
+        with v.VDialog(v_model=("making",), width=460), v.VCard(title="Make a file", classes="pa-3"):
+            v.VTextField(v_model=("file_name",), label="File: .stl .3mf .ply .obj .glb .png .jpg .webp")
+            v.VTextField(v_model=("resolution",), type="number", label="Voxels along the longest side")
+            v.VTextField(v_model=("samples",), type="number", label="Samples a pixel, of a picture")
+            v.VBtn("Make", click=(self.make_and_close,), color="primary")
+
+    def make_and_close(self) -> None:
+        """Make the file and close the dialog."""
+        self.shut("making")
+        self.make()

@@ -1,0 +1,367 @@
+"""What a studio does, without a page: the document, the live picture of it, and jobs in the background."""
+
+from __future__ import annotations
+
+import secrets
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from functools import partial
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common.files import replacing
+from ..common.parameters import AUTO, Number
+from ..errors import Cancelled, FracsliceError, SceneError
+from ..fields.box import Triple
+from ..fields.registry import Fixed
+from ..formats import SOLIDS
+from ..formulas import Node
+from ..rendering import Renderer
+from ..rendering.live import CameraInput, Live, Shown
+from ..scene import library
+from ..scene.layout import SOLID, varied
+from ..scene.model import Scene
+from ..scene.view import Camera
+from ..work import Work
+from .document import Document, Place, Tag, with_attribute
+
+NEARER = 1.1
+"""Factor of a step of the wheel on the distance from the target."""
+
+DEGREES = 0.35
+"""Angle that a drag turns by, for each pixel."""
+
+PICTURES, MESHES = (".png", ".jpg", ".webp", ".exr"), (".stl", ".3mf", ".ply", ".obj", ".glb")
+"""Files that are made, by their extensions."""
+
+
+NUDGE = 2.0**-30
+"""By what a number is off, relative to it, that would otherwise be a constant of the code."""
+
+
+def loosened(node: Node) -> Node:
+    """The same solid, but for less than a pixel, by code that serves any value of its numbers.
+
+    A whole power is a constant of its code: any other would be compiled.
+    """
+    children = tuple(map(loosened, node.children))
+    for name, kind in node.formula.parameters.items():
+        value = node[name]
+        if type(kind) is not Number or not isinstance(value, float) or not value or value % 1:
+            continue
+        with suppress(SceneError):
+            nudged: dict[str, Any] = {name: value * (1 + NUDGE)}
+            other = node.changed(**nudged)
+            if _constants(other) != _constants(node):
+                node = other
+    return node.changed(children)
+
+
+def _constants(node: Node) -> object:
+    """What of an element's own numbers is in its code."""
+    depths: dict[str, Any] = {name: 1 for name, value in node.values.items() if value == AUTO}
+    known = node.changed(**depths) if depths else node
+    return known.function, [value for value in known.arguments.values() if isinstance(value, Fixed)]
+
+
+class Latest:
+    """The last valid scene of a document, as a `rendering.live.SceneSource`."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene, self._seen = scene, scene
+
+    def put(self, scene: Scene) -> None:
+        """Show another scene from now on."""
+        self._scene = scene
+
+    def read(self) -> Scene:
+        """See `SceneSource.read`."""
+        self._seen = self._scene
+        return self._seen
+
+    def changed(self) -> bool:
+        """See `SceneSource.changed`."""
+        return self._scene is not self._seen
+
+
+@dataclass(eq=False)
+class Job:
+    """A file that is made in the background."""
+
+    path: Path
+    stage: str = "beginning"
+    share: float = 0.0
+    result: str = ""  # what was made, once it is
+    problem: str = ""  # why it was not
+    cancel: threading.Event = field(default_factory=threading.Event)
+
+    @property
+    def is_done(self) -> bool:
+        """True once it ended, however."""
+        return bool(self.result or self.problem)
+
+    def progress(self, stage: str, share: float) -> None:
+        """See `Work.progress`."""
+        self.stage, self.share = stage, share
+
+
+class Studio:
+    """A scene that is looked at, changed and made. Call `close` at the end.
+
+    Parameters
+    ----------
+    source : str
+        Scene file, model file, or name of a shipped scene.
+    folder : Path
+        Folder below which files are written.
+    work : Work, optional
+        Threads.
+    device : {"cpu", "cuda", "auto"}
+        Device that traces the rays.
+    files_outside : bool
+        Whether models may lie outside of the scene's folder.
+
+    Raises
+    ------
+    SceneError
+        If the source is no scene.
+    """
+
+    def __init__(
+        self,
+        source: str,
+        folder: Path,
+        work: Work | None = None,
+        device: str = "auto",
+        files_outside: bool = False,
+    ) -> None:
+        self.folder, self._work, self._files_outside = folder, work or Work(), files_outside
+        self._seed, self._drawn = secrets.randbits(32), 0
+        self.document, self.target = opened(source, folder, files_outside)
+        self._scene = Latest(self.document.scene)
+        self.live = Live(self._scene, work=self._work, device=device)
+        self._compile_ahead(device)
+        self.message = ""
+        self.job: Job | None = None
+        self._worker: threading.Thread | None = None
+
+    def _compile_ahead(self, device: str) -> None:
+        """Compile in the background what the first edit of a number will need."""
+        scene, root = self.document.scene, loosened(self.document.scene.root)
+        if root != scene.root:
+            work = replace(self._work, threads=1, cancel=threading.Event())
+            make = partial(Renderer, root, scene.view, (16, 16), work, device)
+            threading.Thread(target=make, name="fracslice compiling", daemon=True).start()
+
+    def close(self) -> None:
+        """Stop rendering and the job."""
+        if self.job and self._worker:
+            self.job.cancel.set()
+            self._worker.join()
+        self.live.close()
+
+    @property
+    def shown(self) -> Shown:
+        """The picture and what is known of it."""
+        return self.live.shown
+
+    def open(self, source: str) -> None:
+        """Open another scene, seen by its own camera."""
+        self.document, self.target = opened(source, self.folder, self._files_outside)
+        self._scene.put(self.document.scene)
+        self.live.wake()
+
+    @property
+    def scenes(self) -> list[str]:
+        """What can be opened: shipped scenes, and files of the folder."""
+        own = (path.name for path in self.folder.glob("*") if path.suffix.lower() in (".xml", *SOLIDS))
+        return [*library.names(), *sorted(own)]
+
+    def vary(self, spread: float) -> None:
+        """Change the numbers of the elements at random, and write them into the text."""
+        self._drawn += 1
+        other = varied(self.document.scene, (self._seed, self._drawn), spread)
+        self.edit(self._write_values, other.root)
+
+    def _write_values(self, root: Node) -> None:
+        """Write the numbers of a tree that has the elements of the document."""
+        document = self.document
+        pairs = zip(root.walk(), document.scene.root.walk(), strict=True)
+        nodes = [
+            (node, old) for node, old in pairs if old.place
+        ]  # others are unions of what has no element around
+        tags = [tag for tag in document.root.walk() if len(tag.place) > 1 and self._is_of_solid(tag)]
+        text = document.text
+        for tag, (node, before) in reversed(list(zip(tags, nodes, strict=True))):
+            start = text[tag.start : tag.inner]
+            for name, kind in node.formula.parameters.items():
+                if node[name] != before[name]:
+                    start = with_attribute(start, name, kind.text(node[name]))
+            text = text[: tag.start] + start + text[tag.inner :]
+        document.write(text)
+
+    def _is_of_solid(self, tag: Tag) -> bool:
+        return self.document.root.children[tag.place[0]].name == SOLID.name
+
+    def edit(self, change: Callable[..., None], *arguments: Any) -> None:
+        """Change the document, and show what it is now; what cannot be done is said in `message`."""
+        self.message = ""
+        try:
+            change(*arguments)
+        except SceneError as error:
+            self.message = str(error)
+        scene = self.document.scene
+        self._scene.put(replace(scene, root=loosened(scene.root)))
+        self.live.wake()
+
+    def set_number(self, place: Place, attribute: str, index: int, value: float) -> None:
+        """Change one of the numbers of an attribute."""
+        from .panels import controls
+
+        tag = self.document.find(place)
+        control = next((c for c in controls(tag) if c["name"] == attribute), None) if tag else None
+        if control is None or "values" not in control:
+            return
+        numbers = list(control["values"])
+        numbers[index] = value
+        self.edit(self.document.set_value, place, attribute, " ".join(f"{n:.6g}" for n in numbers))
+
+    def orbit(self, right: float, down: float) -> None:
+        """Turn around the target as a drag by some pixels says."""
+        camera = self.live.aim
+        turned = camera.turned(DEGREES * right, -DEGREES * down)
+        back = np.subtract(camera.target, turned.target)
+        self.live.look(replace(turned, eye=_triple(np.add(turned.eye, back)), target=camera.target))
+
+    def look_around(self, right: float, down: float) -> None:
+        """Turn in place as a drag by some pixels says."""
+        self.live.turn(-DEGREES / 2 * right, DEGREES / 2 * down)
+
+    def approach(self, steps: float) -> None:
+        """Come nearer to the target, or go away from it."""
+        camera = self.live.aim
+        arm = np.subtract(camera.eye, camera.target) * NEARER**-steps
+        self.live.look(replace(camera, eye=_triple(np.add(camera.target, arm))))
+
+    def steer(self, steering: CameraInput) -> None:
+        """Fly."""
+        self.live.steer(steering)
+
+    def home(self) -> None:
+        """Return to the first view."""
+        self.live.look(self.live.first)
+
+    def keep_view(self) -> None:
+        """Write the camera into the scene."""
+        self.edit(self._write_camera, self.live.camera)
+
+    def _write_camera(self, camera: Camera) -> None:
+        from ..scene.model import part_to_xml
+
+        eye, target, up = map(_rounded, (camera.eye, camera.target, camera.up))
+        document, line = self.document, part_to_xml(replace(camera, eye=eye, target=target, up=up))
+        tag = next((t for t in document.root.children if t.name == "camera"), None)
+        if tag is not None:
+            text = document.text[: tag.start] + line + document.text[tag.end :]
+        else:
+            end = document.root.close
+            text = f"{document.text[:end]}  {line}\n{document.text[end:]}"
+        document.write(text)
+
+    def save(self, name: str = "") -> None:
+        """Write the text into its file, or into another one of the folder."""
+        path = self._inside(name) if name else self.target
+        with replacing(path) as file:
+            file.write(self.document.text.encode())
+        self.target, self.document.saved = path, self.document.text
+        self.message = f"saved {path.name}"
+
+    def _inside(self, name: str) -> Path:
+        path = (self.folder / name).resolve()
+        if not path.is_relative_to(self.folder.resolve()):
+            raise SceneError(f"{name}: expected a file in {self.folder}")
+        return path
+
+    def start(self, name: str, options: dict[str, Any]) -> None:
+        """Begin to make a file: a picture or a mesh, by its extension; one at a time."""
+        if self.job and not self.job.is_done:
+            self.message = f"{self.job.path.name} is being made; cancel it first"
+            return
+        path = self._inside(name)
+        if path.suffix.lower() not in (*PICTURES, *MESHES):
+            raise SceneError(f"{name}: expected a file of {', '.join((*PICTURES, *MESHES))}")
+        job = self.job = Job(path)
+        arguments = job, self.document.scene, self.live.camera, options
+        self._worker = threading.Thread(target=self._make, args=arguments, name="fracslice job")
+        self._worker.start()
+
+    def _make(self, job: Job, scene: Scene, camera: Camera, options: dict[str, Any]) -> None:
+        """Body of the thread of a job."""
+        from ..api.calls import make_mesh, render
+
+        how: dict[str, Any] = {"progress": job.progress, "cancel": job.cancel, "threads": self._work.threads}
+        try:
+            if job.path.suffix.lower() in PICTURES:
+                seen = replace(scene, view=replace(scene.view, camera=camera))
+                render(seen, **options, **how).save(job.path)
+                job.result = f"{job.path.name} is written"
+                return
+            report = make_mesh(scene, path=job.path, **options, **how).report
+            verdict = f", would not print: {', '.join(report.problems)}" if report.problems else ""
+            job.result = f"{job.path.name}: {report.mesh.triangles:,} triangles{verdict}"
+        except Cancelled:
+            job.problem = "cancelled; nothing was written"
+        except FracsliceError as error:
+            job.problem = str(error)
+
+
+def _rounded(numbers: Triple) -> Triple:
+    """Numbers with nine digits."""
+    x, y, z = (float(f"{number:.9g}") for number in numbers)
+    return x, y, z
+
+
+def _triple(array: NDArray[np.float64]) -> Triple:
+    x, y, z = array.tolist()
+    return x, y, z
+
+
+def command(target: Path, name: str, options: dict[str, Any]) -> str:
+    """Command line that makes the same file."""
+    verb = "render" if Path(name).suffix.lower() in PICTURES else "mesh"
+    given = "".join(f" --{option} {value}" for option, value in options.items())
+    return f"fracslice {verb} {target.name} -o {name}{given}"
+
+
+def opened(source: str, folder: Path, files_outside: bool) -> tuple[Document, Path]:
+    """Document of a scene, or of a model as the scene of that alone, and the file to save it in."""
+    path = Path(source)
+    if path.suffix.lower() in SOLIDS:
+        name, place = SOLIDS[path.suffix.lower()], path.with_suffix(".xml")
+        text = f'<scene version="1">\n  <solid unit="1mm">\n    <{name} file="{escape(path.name)}"/>\n'
+        return Document(f"{text}  </solid>\n</scene>\n", place, files_outside), folder / place.name
+    shipped = not path.exists() and path.name == source and not path.suffix
+    file = library.path(source) if shipped else path
+    try:
+        text = file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise SceneError(f"{source}: {getattr(error, 'strerror', None) or error}") from None
+    target = folder / file.name if shipped else path
+    return Document(text, file, files_outside), target
+
+
+def jpeg(pixels: NDArray[np.uint8], quality: int) -> bytes:
+    """Encode a picture, uint8 [height, width, 3], for a page."""
+    import io
+
+    from PIL import Image
+
+    file = io.BytesIO()
+    Image.fromarray(pixels[..., :3]).save(file, "JPEG", quality=quality)
+    return file.getvalue()

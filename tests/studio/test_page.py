@@ -1,0 +1,188 @@
+"""The page of a studio, driven as a person would, in a real browser."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+playwright = pytest.importorskip("playwright.sync_api")
+
+pytestmark = [
+    pytest.mark.once,
+    pytest.mark.skipif(shutil.which("chromium") is None, reason="no Chromium is installed"),
+]
+
+SCENE = """<scene version="1">
+  <!-- A ball and a block. -->
+  <solid size="40mm">
+    <union smooth="0.1">
+      <sphere radius="0.5"/>
+      <transform translate="0.8 0 0"><box size="0.6 0.6 0.6"/></transform>
+    </union>
+  </solid>
+</scene>
+"""
+
+
+class Served(NamedTuple):
+    """A studio that is served."""
+
+    page: playwright.Page
+    address: str
+    folder: Path
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[playwright.Browser]:
+    with playwright.sync_playwright() as started:
+        opened = started.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
+        yield opened
+        opened.close()
+
+
+@pytest.fixture(scope="module")
+def served(browser: playwright.Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    folder = tmp_path_factory.mktemp("studio")
+    (folder / "two.xml").write_text(SCENE)
+    command = [
+        sys.executable,
+        "-m",
+        "cli",
+        "studio",
+        "two.xml",
+        "--no-browser",
+        "--device",
+        "cpu",
+        "--threads",
+        "1",
+    ]
+    with subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout
+        address = process.stdout.readline().strip()
+        page = browser.new_page(viewport={"width": 1000, "height": 640})
+        page.goto(address)
+        page.get_by_text("sphere").wait_for()
+        yield Served(page, address, folder)
+        process.send_signal(2)
+        assert process.wait(60) in (0, 130)
+
+
+def text(page: playwright.Page) -> str:
+    """Text of the scene, in its editor."""
+    return str(page.get_by_label("Text of the scene").input_value())
+
+
+def row(page: playwright.Page, name: str) -> playwright.Locator:
+    """Elements of a name in the tree."""
+    return page.get_by_role("list", name="Elements").get_by_text(name, exact=True)
+
+
+def until(holds: Callable[[], bool], seconds: float = 30) -> None:
+    """Waits until it holds."""
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, "it never came"
+        time.sleep(0.05)
+
+
+def picture(page: playwright.Page) -> bytes:
+    """What the page shows as the picture, once it has samples."""
+    until(lambda: "samples" in page.get_by_role("status").inner_text())
+    return bytes(page.locator(".v-main img").first.screenshot())
+
+
+def test_a_person_looks_changes_undoes_and_saves(served: Served) -> None:
+    page = served.page
+    first = picture(page)
+    page.mouse.move(700, 350)
+    page.mouse.down()
+    page.mouse.move(760, 380, steps=8)
+    page.mouse.up()
+    until(lambda: picture(page) != first)
+    row(page, "sphere").click()
+    page.get_by_label("radius 1 as a number").fill("0.7")
+    page.get_by_label("radius 1 as a number").press("Enter")
+    page.get_by_label("Text", exact=True).click()
+    until(lambda: 'radius="0.7"' in text(page))
+    page.get_by_label("Undo").click()
+    until(lambda: text(page) == SCENE)
+    page.get_by_label("Redo").click()
+    page.get_by_label("Save").click()
+    until(lambda: 'radius="0.7"' in (served.folder / "two.xml").read_text())
+    assert "<!-- A ball and a block. -->" in (served.folder / "two.xml").read_text()
+
+
+def test_every_value_of_a_slider_arrives(served: Served) -> None:
+    page = served.page
+    row(page, "sphere").click()
+    thumb = page.locator(".v-slider-thumb").first.bounding_box()
+    assert thumb
+    x, y = thumb["x"] + thumb["width"] / 2, thumb["y"] + thumb["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 40, y, steps=30)
+    page.mouse.up()
+    shown = page.get_by_label("radius 1 as a number")
+    until(lambda: f'radius="{float(shown.input_value()):.6g}"' in text(page))
+    assert float(shown.input_value()) > 0.75
+
+
+def test_a_wrong_text_is_said_at_its_line_while_the_picture_stays(served: Served) -> None:
+    page, editor = served.page, served.page.get_by_label("Text of the scene")
+    right = text(page)
+    editor.fill(right.replace("<sphere", "<spheres").replace("</sphere>", "</spheres>"))
+    page.get_by_text(re.compile(r"two\.xml:5: <spheres> is not a known element")).wait_for()
+    assert page.locator(".v-main img").first.is_visible()
+    editor.fill(right)
+    page.locator(".v-alert").wait_for(state="detached")
+
+
+def test_an_element_is_wrapped_and_a_file_made(served: Served) -> None:
+    page = served.page
+    row(page, "sphere").click()
+    page.get_by_role("button", name="Wrap", exact=True).click()
+    page.get_by_label("Search").fill("shell")
+    page.locator(".v-dialog .v-list-item", has_text="shell").first.click()
+    until(lambda: "<shell" in text(page))
+    page.get_by_label("Make a file").click()
+    page.get_by_label("File:").fill("two.stl")
+    page.get_by_label("Voxels").fill("32")
+    page.get_by_role("button", name="Make", exact=True).click()
+    page.get_by_text(re.compile(r"two\.stl: [\d,]+ triangles")).wait_for()
+    assert (served.folder / "two.stl").stat().st_size > 1000
+    assert page.get_by_text("fracslice mesh two.xml -o two.stl --resolution 32").is_visible()
+
+
+def test_two_tabs_show_the_same_scene(served: Served, browser: playwright.Browser) -> None:
+    other = browser.new_page()
+    other.goto(served.address)
+    row(other, "sphere").wait_for()
+    row(served.page, "sphere").click()
+    before = row(other, "sphere").count()
+    served.page.get_by_role("button", name="Duplicate").click()
+    until(lambda: row(other, "sphere").count() == before + 1)
+    other.close()
+
+
+def test_other_sites_and_those_without_the_token_are_refused(
+    served: Served, browser: playwright.Browser
+) -> None:
+    base = served.address.partition("/index")[0]
+    for headers in ({"Host": "example.com"}, {"Origin": "http://example.com"}):
+        with pytest.raises(urllib.error.HTTPError, match="403"):
+            urllib.request.urlopen(urllib.request.Request(f"{base}/index.html", headers=headers))
+    stranger = browser.new_page()
+    stranger.goto(f"{base}/index.html?secret=wrong")
+    time.sleep(2)
+    assert row(stranger, "sphere").count() == 0
+    stranger.close()
