@@ -9,7 +9,7 @@ from .options import CommandOptions, command
 
 @command(CommandOptions, short_help="List the scenes that ship with fracslice.")
 def scenes(_: CommandOptions) -> None:
-    """List the scenes that ship with fracslice; each name can stand for a SCENE.
+    """List the scenes that ship with fracslice, then those of the gallery; each name can stand for a SCENE.
 
     Examples
     --------
@@ -17,7 +17,7 @@ def scenes(_: CommandOptions) -> None:
     """
     from fracslice.scene import library
 
-    names = library.names()
-    width = max(map(len, names))
-    for name in names:
-        click.echo(f"{name:{width}}  {library.about(name)}")
+    names, gallery = library.names(), library.gallery()
+    width = max(map(len, names + gallery))
+    lines = {name: f"{name:{width}}  {library.about(name)}" for name in names + gallery}
+    click.echo("\n".join([*(lines[name] for name in names), "", *(lines[name] for name in gallery)]))

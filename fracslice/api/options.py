@@ -261,12 +261,13 @@ def resolve(source: Source) -> Node | Scene:
     if path.exists() or path.name != os.fspath(source) or path.suffix:
         return read(path)
     name = os.fspath(source)
-    if name in library.names():
+    if name in library.names() or name in library.gallery():
         return read(library.path(name))
     ready = [n for n in formula_names() if _is_ready(get(n))]
     if name in ready:
         return get(name)()
-    raise SceneError(f"{name}: no such scene, formula or file; {hint(name, {*ready, *library.names()})}")
+    known = {*ready, *library.names(), *library.gallery()}
+    raise SceneError(f"{name}: no such scene, formula or file; {hint(name, known)}")
 
 
 def _is_ready(formula: Formula) -> bool:

@@ -29,11 +29,24 @@ def names() -> list[str]:
     return sorted(path.stem for path in folder().glob("*.xml"))
 
 
+def gallery() -> list[str]:
+    """Return the names of the scenes of the gallery.
+
+    Returns
+    -------
+    list of str
+        Sorted names.
+    """
+    return sorted(path.stem for path in folder().glob("gallery/*.xml"))
+
+
 def path(name: str) -> Path:
-    """Return the file of a shipped scene."""
-    if name not in names():
-        raise SceneError(f"{name}: no such scene; {hint(name, names())}")
-    return folder() / f"{name}.xml"
+    """Return the file of a shipped scene, or of one of the gallery."""
+    if name in names():
+        return folder() / f"{name}.xml"
+    if name in gallery():
+        return folder() / "gallery" / f"{name}.xml"
+    raise SceneError(f"{name}: no such scene; {hint(name, {*names(), *gallery()})}")
 
 
 def about(name: str) -> str:

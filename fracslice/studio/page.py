@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import base64
 import os
 import secrets
 import webbrowser
@@ -16,6 +17,7 @@ from trame.widgets import html, rca
 from trame.widgets import vuetify3 as v
 
 from ..errors import FracsliceError
+from ..formulas import Node
 from ..viewer.viewer import MOVES, PACES, Controls
 from . import panels
 from .session import PICTURES, Studio, command, jpeg
@@ -42,9 +44,6 @@ HELP = (
 
 CONTROL = {"z": "undo", "y": "redo"}
 """What keys do with ctrl."""
-
-SPREAD = 0.3
-"""Size of random changes: 1 doubles or halves a number in a typical case."""
 
 AREA = "picture"
 
@@ -148,6 +147,11 @@ class Page:
                 "helping": False,
                 "making": False,
                 "opening": False,
+                "varying": False,
+                "sheet": [],
+                "spread": 0.3,
+                "axis": "",
+                "share": 0.5,
                 "scenes": studio.scenes,
                 "dark": True,
                 "file_name": f"{studio.document.path.stem}.3mf",
@@ -157,6 +161,7 @@ class Page:
                 "job": {},
             }
         )
+        self._sheet: list[Node] = []
         self.refresh()
         self.state.change("xml")(self.write)
         self.ctrl.on_server_bind.add(self.guard)
@@ -223,13 +228,33 @@ class Page:
             state.update(dict.fromkeys(dialogs, False))
             state.dirty(*dialogs)
 
-    def vary(self) -> None:
-        """Change the numbers at random."""
+    async def vary(self) -> None:
+        """Show a sheet of variations of the scene, one after the other."""
+        self._sheet = []
+        with self.state as state:
+            state.varying, state.sheet = True, []
+        made, loop = self.studio.variations(float(self.state.spread)), asyncio.get_running_loop()
+        sheet = self._sheet
         try:
-            self.studio.vary(SPREAD)
+            while (one := await loop.run_in_executor(None, next, made, None)) and sheet is self._sheet:
+                sheet.append(one[0])
+                with self.state as state:
+                    data = base64.b64encode(jpeg(one[1], QUALITIES[1])).decode()
+                    state.sheet = [*state.sheet, f"data:image/jpeg;base64,{data}"]
         except FracsliceError as error:
             self.studio.message = str(error)
+
+    async def take(self, number: int) -> None:
+        """Go on from a variation of the sheet."""
+        self.studio.take(self._sheet[number])
         self.refresh()
+        await self.vary()
+
+    def cut(self, axis: str, share: Any) -> None:
+        """Cut the picture open, or close it."""
+        with self.state as state:
+            state.axis, state.share = axis, float(share)
+        self.studio.cut(axis, float(share))
 
     def choose(self, place: list[int]) -> None:
         """Choose an element."""
@@ -385,9 +410,7 @@ class Page:
         with v.VAppBar(density="compact"):
             v.VAppBarTitle("{{ trame__title }}{{ saved ? '' : ' *' }}")
             v.VBtn(icon="mdi-folder-open", click="opening = true; search = ''", raw_attrs=named("Open"))
-            v.VBtn(
-                icon="mdi-dice-5", click=self.vary, raw_attrs=named("Vary", "Change the numbers at random")
-            )
+            v.VBtn(icon="mdi-dice-5", click=self.vary, raw_attrs=named("Vary", "Variations of the numbers"))
             for icon, label, act, off in (
                 ("mdi-undo", "Undo", "undo", "undoes == 0"),
                 ("mdi-redo", "Redo", "redo", "redoes == 0"),
@@ -524,6 +547,30 @@ class Page:
             )
             area.set_drop_frames_pending_network_limit(PENDING)
             area.add_view_handler(self.frames)
+            with html.Div(
+                classes="d-flex align-center",
+                style="position: absolute; right: 8px; top: 8px; width: 300px; color: #eee",
+            ):
+                for axis in ("x", "y", "z"):
+                    v.VBtn(
+                        axis,
+                        click=(self.cut, f"[axis == '{axis}' ? '' : '{axis}', share]"),
+                        active=(f"axis == '{axis}'",),
+                        size="small",
+                        variant="text",
+                        raw_attrs=named(f"Cut across {axis}"),
+                    )
+                v.VSlider(
+                    v_if="axis",
+                    model_value=("share",),
+                    update_modelValue=(self.cut, "[axis, $event]"),
+                    min=0,
+                    max=1,
+                    step=0.005,
+                    hide_details=True,
+                    density="compact",
+                    raw_attrs=named("Place of the cut"),
+                )
             html.Div(
                 "{{ status }}",
                 style="position: absolute; left: 8px; bottom: 6px; color: #eee; text-shadow: 0 0 3px #000",
@@ -561,6 +608,26 @@ class Page:
                         subtitle=("c.doc",),
                         click=(self.add, f"[c.name, {str(around).lower()}]"),
                     )
+        with v.VDialog(v_model=("varying",), width=700), v.VCard(title="Variations: click to go on from one"):
+            with html.Div(classes="d-flex flex-wrap justify-center", style="min-height: 480px"):
+                html.Img(
+                    v_for="(image, i) in sheet",
+                    key="i",
+                    src=("image",),
+                    click=(self.take, "[i]"),
+                    style="width: 216px; margin: 3px; cursor: pointer",
+                    raw_attrs=[":alt=\"'variation ' + (i + 1)\""],
+                )
+            with html.Div(classes="d-flex align-center mx-4"):
+                v.VSlider(
+                    v_model=("spread",),
+                    min=0.02,
+                    max=1,
+                    step=0.02,
+                    label="Size of changes",
+                    hide_details=True,
+                )
+                v.VBtn("Others", click=self.vary, variant="text")
         with v.VDialog(v_model=("opening",), width=460), v.VCard(title="Open a scene"):
             v.VTextField(v_model=("search",), label="Search", autofocus=True, classes="mx-4")
             with v.VList(density="compact", style="max-height: 60vh; overflow: auto"):

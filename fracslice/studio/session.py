@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import secrets
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from ..common.files import replacing
 from ..common.parameters import AUTO, Number
 from ..errors import Cancelled, FracsliceError, SceneError
-from ..fields.box import Triple
+from ..fields.box import Box, Triple
 from ..fields.registry import Fixed
 from ..formats import SOLIDS
-from ..formulas import Node
+from ..formulas import Node, intersection, plane
 from ..rendering import Renderer
 from ..rendering.live import CameraInput, Live, Shown
 from ..scene import library
@@ -36,6 +36,9 @@ NEARER = 1.1
 
 DEGREES = 0.35
 """Angle that a drag turns by, for each pixel."""
+
+THUMBNAIL, SAMPLES = (200, 150), 4
+"""Pixels of the picture of a variation, and samples of each."""
 
 PICTURES, MESHES = (".png", ".jpg", ".webp", ".exr"), (".stl", ".3mf", ".ply", ".obj", ".glb")
 """Files that are made, by their extensions."""
@@ -90,6 +93,23 @@ class Latest:
         return self._scene is not self._seen
 
 
+@dataclass(frozen=True)
+class Section:
+    """A plane across an axis that cuts the picture open."""
+
+    axis: int
+    share: float  # of the length along it
+    flipped: bool  # whether the part with larger coordinates stays
+
+    def half(self, box: Box) -> Node:
+        """The half of space that stays; an unbounded solid counts as 20 units long."""
+        low, high = max(box.lo[self.axis], -10.0), min(box.hi[self.axis], 10.0)
+        at = low + self.share * (high - low)
+        normal = [0.0, 0.0, 0.0]
+        normal[self.axis] = -1.0 if self.flipped else 1.0
+        return plane(tuple(normal), -at if self.flipped else at)
+
+
 @dataclass(eq=False)
 class Job:
     """A file that is made in the background."""
@@ -142,21 +162,22 @@ class Studio:
         files_outside: bool = False,
     ) -> None:
         self.folder, self._work, self._files_outside = folder, work or Work(), files_outside
-        self._seed, self._drawn = secrets.randbits(32), 0
+        self._seed, self._drawn, self._device = secrets.randbits(32), 0, device
         self.document, self.target = opened(source, folder, files_outside)
         self._scene = Latest(self.document.scene)
         self.live = Live(self._scene, work=self._work, device=device)
-        self._compile_ahead(device)
+        self._compile_ahead()
         self.message = ""
         self.job: Job | None = None
+        self.section: Section | None = None
         self._worker: threading.Thread | None = None
 
-    def _compile_ahead(self, device: str) -> None:
+    def _compile_ahead(self) -> None:
         """Compile in the background what the first edit of a number will need."""
         scene, root = self.document.scene, loosened(self.document.scene.root)
         if root != scene.root:
             work = replace(self._work, threads=1, cancel=threading.Event())
-            make = partial(Renderer, root, scene.view, (16, 16), work, device)
+            make = partial(Renderer, root, scene.view, (16, 16), work, self._device)
             threading.Thread(target=make, name="fracslice compiling", daemon=True).start()
 
     def close(self) -> None:
@@ -174,6 +195,7 @@ class Studio:
     def open(self, source: str) -> None:
         """Open another scene, seen by its own camera."""
         self.document, self.target = opened(source, self.folder, self._files_outside)
+        self.section = None
         self._scene.put(self.document.scene)
         self.live.wake()
 
@@ -181,13 +203,22 @@ class Studio:
     def scenes(self) -> list[str]:
         """What can be opened: shipped scenes, and files of the folder."""
         own = (path.name for path in self.folder.glob("*") if path.suffix.lower() in (".xml", *SOLIDS))
-        return [*library.names(), *sorted(own)]
+        return [*library.names(), *library.gallery(), *sorted(own)]
 
-    def vary(self, spread: float) -> None:
-        """Change the numbers of the elements at random, and write them into the text."""
-        self._drawn += 1
-        other = varied(self.document.scene, (self._seed, self._drawn), spread)
-        self.edit(self._write_values, other.root)
+    def variations(self, spread: float, count: int = 9) -> Iterator[tuple[Node, NDArray[np.uint8]]]:
+        """Trees with other numbers, drawn at random, and their pictures as the page sees the scene."""
+        scene, view = self.document.scene, replace(self.document.scene.view, camera=self.live.camera)
+        for _ in range(count):
+            self._drawn += 1
+            other = varied(scene, (self._seed, self._drawn), spread)
+            *_, done = Renderer(loosened(other.root), view, THUMBNAIL, self._work, self._device).passes(
+                SAMPLES
+            )
+            yield other.root, done.shown
+
+    def take(self, root: Node) -> None:
+        """Write the numbers of a variation into the text."""
+        self.edit(self._write_values, root)
 
     def _write_values(self, root: Node) -> None:
         """Write the numbers of a tree that has the elements of the document."""
@@ -216,9 +247,27 @@ class Studio:
             change(*arguments)
         except SceneError as error:
             self.message = str(error)
+        self._show()
+
+    def _show(self) -> None:
+        """Show the scene as it is now, cut open if it is to be."""
         scene = self.document.scene
-        self._scene.put(replace(scene, root=loosened(scene.root)))
+        root = loosened(scene.root)
+        if self.section:
+            root = intersection(root, self.section.half(root.bounds.box))
+        self._scene.put(replace(scene, root=root))
         self.live.wake()
+
+    def cut(self, axis: str, share: float) -> None:
+        """Cut the picture open across an axis, at a share of the length along it; the file stays whole."""
+        if not axis:
+            self.section = None
+        else:
+            number, camera = "xyz".index(axis), self.live.aim
+            towards = camera.eye[number] < camera.target[number]
+            same = self.section and self.section.axis == number
+            self.section = Section(number, share, self.section.flipped if self.section and same else towards)
+        self._show()
 
     def set_number(self, place: Place, attribute: str, index: int, value: float) -> None:
         """Change one of the numbers of an attribute."""

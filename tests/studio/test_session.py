@@ -130,11 +130,27 @@ def test_a_model_is_a_scene_of_its_own(tmp_path: Path) -> None:
 
 
 def test_random_numbers_keep_the_text(studio: Studio) -> None:
-    for _ in range(5):
-        studio.vary(0.5)
+    for root, picture in studio.variations(0.5, 3):
+        assert picture.shape == (150, 200, 3) and np.ptp(picture) > 50
+        studio.take(root)
     assert studio.document.scene.root != sphere(radius=5.0) and studio.document.problem == ""
     radius = studio.document.find(BALL).attributes["radius"]  # type: ignore[union-attr]
     assert studio.document.text == TEXT.replace('"5"', f'"{radius}"')
+
+
+def test_a_section_cuts_the_picture_and_not_the_file(studio: Studio) -> None:
+    whole = rest(studio)
+    studio.cut("z", 0.5)
+    within(lambda: studio.live.scene.root.formula.name == "intersection")
+    half = studio.live.scene.root
+    assert half.distance([0, 0, 0.1]) == pytest.approx(0.1) and half.distance([0, 0, -1]) == pytest.approx(-1)
+    assert abs(rest(studio).astype(int) - whole).mean() > 2
+    studio.start("ball.stl", {"resolution": 16.0})
+    within(lambda: studio.job is not None and studio.job.is_done)
+    assert studio.job and studio.job.result
+    studio.cut("", 0.5)
+    within(lambda: studio.live.scene.root == sphere(radius=5.0))
+    assert studio.document.is_saved
 
 
 def program(root: Node) -> object:
