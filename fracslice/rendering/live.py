@@ -207,6 +207,11 @@ class Live:
             return self._aim
 
     @property
+    def size(self) -> tuple[int, int]:
+        """Width and height, pixels."""
+        return self._size
+
+    @property
     def running(self) -> bool:
         """True while the render thread is alive."""
         return self._thread.is_alive()

@@ -1,4 +1,4 @@
-"""A studio at 960 x 600 on the CPU: seconds until scenes are seen, and milliseconds from an input to its frame.
+"""A studio at 960 x 600 on the CPU: seconds until a scene is seen, milliseconds from an input to its frame.
 
 First picture: from opening the scene to its first draft, with kernels compiled before. Moved: from a drag to
 the picture from there, as JPEG. Changed: from the value of a slider to the picture with it. Frames a second:
@@ -18,7 +18,11 @@ from ..runner import Row, Run, Spread
 
 SMALLEST = {"names": ("menger-sponge",), "size": (48, 32), "inputs": 2, "seconds": 0.2}
 
-CHANGED = {"mandelbulb": ("power", 8.0, 0.03), "menger-sponge": ("level", 4, 0), "geode": ("smooth", 0.08, 0.002)}
+CHANGED = {
+    "mandelbulb": ("power", 8.0, 0.03),
+    "menger-sponge": ("level", 4, 0),
+    "geode": ("smooth", 0.08, 0.002),
+}
 """Attribute of the first element, its value, and by how much it changes at each step."""
 
 LATEST = 60.0
@@ -39,15 +43,19 @@ def rows(
             studio = Studio(name, Path(folder), device="cpu")
             opened = time.perf_counter() - start
             try:
-                studio.live.resize(size)
-                wait(lambda: studio.shown.samples >= 1)
-                moved = Spread.of([after(studio, lambda: studio.orbit(9, 4)) for _ in range(inputs)])
-                changed = Spread.of([after(studio, change(studio, name, k)) for k in range(inputs)])
-                frames = turned(studio, seconds)
-                row: Row = {"": name, "first picture, s": opened, "moved, ms": moved, "changed, ms": changed}
-                yield {**row, "frames a second": frames, "spacing": size[0] / studio.shown.pixels.shape[1]}
+                yield {"": name, "first picture, s": opened, **used(studio, name, size, inputs, seconds)}
             finally:
                 studio.close()
+
+
+def used(studio: Studio, name: str, size: tuple[int, int], inputs: int, seconds: float) -> Row:
+    """What a person who uses a studio waits for."""
+    studio.live.resize(size)
+    wait(lambda: studio.shown.samples >= 1)
+    moved = Spread.of([after(studio, lambda: studio.orbit(9, 4)) for _ in range(inputs)])
+    changed = Spread.of([after(studio, change(studio, name, k)) for k in range(inputs)])
+    frames, spacing = turned(studio, seconds)
+    return {"moved, ms": moved, "changed, ms": changed, "frames a second": frames, "spacing": spacing}
 
 
 def wait(holds: Callable[[], bool]) -> None:
@@ -80,10 +88,11 @@ def change(studio: Studio, name: str, step: int) -> Callable[[], None]:
     return lambda: studio.set_number(place, attribute, 0, number)
 
 
-def turned(studio: Studio, seconds: float) -> float:
-    """Frames a second while the camera turns."""
+def turned(studio: Studio, seconds: float) -> tuple[float, float]:
+    """Frames a second while the camera turns, and the spacing of their pixels."""
     frames, start = 0, time.perf_counter()
     while time.perf_counter() < start + seconds:
         after(studio, lambda: studio.orbit(3, 0))
         frames += 1
-    return frames / (time.perf_counter() - start)
+    spacing = studio.live.size[0] / studio.shown.pixels.shape[1]
+    return frames / (time.perf_counter() - start), spacing
