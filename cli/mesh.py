@@ -27,6 +27,7 @@ from .execution import (
 )
 from .options import (
     AMOUNT,
+    COLOURS,
     INTERVAL,
     SECONDS,
     ClusterOptions,
@@ -118,7 +119,7 @@ def make_files(given: MeshFileOptions, parts: Callable[[Scene, Work], Parts] = w
 
     check_outputs(given)
     if Path(given.output).suffix.lower() == GRID:
-        names = {"chord", "simplify", "faces", "colour", "cluster", "shard", "store"}
+        names = {"chord", "simplify", "faces", *COLOURS, "cluster", "shard", "store"}
         refuse_options(names, "only for meshes, and a .vdb file holds distances on a grid")
     if given.implicit:
         refuse_what_needs_triangles(given.output)
@@ -176,7 +177,7 @@ def refuse_what_needs_triangles(output: str) -> None:
         "chord",
         "simplify",
         "faces",
-        "colour",
+        *COLOURS,
         "dust",
         "report",
         "picture",

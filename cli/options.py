@@ -18,6 +18,7 @@ import click
 
 from fracslice.common.parameters import (
     Choice,
+    Colours,
     Count,
     Duration,
     Flag,
@@ -137,6 +138,8 @@ def metavar(kind: Parameter) -> str:
     """What stands for a value in the help."""
     if isinstance(kind, Count):
         return "|".join([*kind.words, "N"])
+    if isinstance(kind, Colours):
+        return "N|COLOUR,..." if kind.counted else "NAME|COLOUR,..."
     if isinstance(kind, Choice | Listed):
         return "|".join(map(str, kind.choices if isinstance(kind, Choice) else kind.values))
     if isinstance(kind, Heights):
@@ -356,11 +359,15 @@ class PreparationOptions(SceneOptions):
         return changed
 
 
+COLOURS = frozenset({"colour", "palette", "filaments", "bodies"})
+"""Fields of meshes with colours."""
+
+
 class MeshOptions(PreparationOptions):
     """Options of meshes without colours."""
 
     records: ClassVar[Records] = (MeshJob,)
-    without = frozenset({"colour"})
+    without = COLOURS
 
     def mesh_job(self, scene: Scene) -> MeshJob:
         """Mesh job of a scene."""

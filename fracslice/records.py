@@ -14,6 +14,7 @@ from .common.parameters import (
     AnyLength,
     AnyScale,
     Choice,
+    Colours,
     Count,
     Duration,
     Flag,
@@ -50,6 +51,12 @@ RESOLUTION = 256.0
 
 Colour: TypeAlias = Literal["material", "point", "axes", "planes", "sphere", "steps", "direction"]
 """What the colours of vertices show: the materials of the scene, or a property of the orbit."""
+
+Palette: TypeAlias = Literal["viridis", "plasma", "inferno", "magma", "cividis", "twilight"]
+"""Palettes by name."""
+
+MOST_FILAMENTS = 16
+"""Most filaments that slicers tell apart in painted triangles."""
 
 COARSEST, FINEST = 8, 16384
 """Limits of the voxels along the longest side."""
@@ -252,6 +259,23 @@ class MeshJob(Placed):
         "property of the orbit",
         get_args(Colour),
     )
+    palette: str | Sequence[str] | None = attribute(
+        Colours,
+        None,
+        "palette that a property of the orbit is shown in, by name or as its colours; viridis by default",
+        words=get_args(Palette),
+    )
+    filaments: int | str | Sequence[str] | None = attribute(
+        Colours,
+        None,
+        "filaments that a coloured mesh is printed with: how many, or their colours; in .3mf files, "
+        "triangles are painted for slicers",
+        most=MOST_FILAMENTS,
+        counted=True,
+    )
+    bodies: bool = attribute(
+        Flag, False, "in place of painted triangles, an .3mf file has a body for each filament"
+    )
     proved: bool = attribute(
         Flag, False, "space is skipped by proofs only, not by the measured bounds of fractals"
     )
@@ -265,6 +289,12 @@ class MeshJob(Placed):
         if self.simplify is not None and self.faces is not None:
             raise SceneError("simplify and faces: expected one of them")
         validate(self, SceneError)
+        if self.palette is not None and self.colour in (None, "material"):
+            raise SceneError("palette: expected a property of the orbit as the colour, such as point")
+        if self.filaments is not None and self.colour is None:
+            raise SceneError("filaments: expected a colour, too, such as material or point")
+        if self.bodies and self.filaments is None:
+            raise SceneError("bodies: expected filaments, too, such as 4")
 
     def edits(self, scene: Scene) -> Print:
         """Changes for printing.

@@ -75,6 +75,9 @@ class MeshKeywords(PlacedKeywords, total=False):
     faces: int | None
     dust: float | None
     colour: Colour | None
+    palette: str | Sequence[str] | None
+    filaments: int | str | Sequence[str] | None
+    bodies: bool | None
     proved: bool | None
 
 

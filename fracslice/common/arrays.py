@@ -181,6 +181,17 @@ def affine(values: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
     return linear, offset
 
 
+@dataclass(frozen=True, eq=False)
+class Filaments:
+    """Filaments of which triangles are printed."""
+
+    colours: NDArray[np.uint8]  # of the filaments, sRGB, (k, 3)
+    of: NDArray[np.uint8]  # filament of the largest part of each triangle, (m,)
+    texts: tuple[str, ...]  # how triangles are painted, as slicers store it
+    text: NDArray[np.int32]  # number of the text of each triangle, (m,)
+    bodies: tuple[Triangles, ...] = ()  # the solid of each filament, if they are wanted
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Triangles:
     """Triangles as they are in a file. `Mesh` adds measures and checks of the arrays."""
@@ -189,11 +200,12 @@ class Triangles:
     triangles: NDArray[np.int32]  # vertex indices, (m, 3), counter-clockwise seen from outside
     colours: NDArray[np.uint8] | None = None  # of the vertices, sRGB, (n, 3)
     scalars: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)  # of the vertices, (n,)
+    filaments: Filaments | None = None  # of the triangles
 
     @property
     def _arrays(self) -> tuple[Any, ...]:
         """Values of the fields."""
-        return self.vertices, self.triangles, self.colours, dict(self.scalars)
+        return self.vertices, self.triangles, self.colours, dict(self.scalars), self.filaments
 
     def in_order(self) -> Triangles:
         """Sort the vertices by their first use, so that the triangles alone determine the arrays."""
@@ -202,13 +214,14 @@ class Triangles:
         return self._taken(*in_order(self.triangles, len(self.vertices)))
 
     def _taken(self, index: NDArray[Any], triangles: NDArray[np.int32]) -> Triangles:
-        """Triangles of some of the vertices, with their colours and scalars.
+        """Triangles of some of the vertices, with colours and scalars; with filaments, if none is left out.
 
         `index`: int (k,), of the vertices; `triangles`: int32 (m, 3), of their numbers among these.
         """
         colours = None if self.colours is None else self.colours[index]
         scalars = {name: values[index] for name, values in self.scalars.items()}
-        return Triangles(self.vertices[index], triangles, colours, scalars)
+        filaments = self.filaments if len(triangles) == len(self.triangles) else None
+        return Triangles(self.vertices[index], triangles, colours, scalars, filaments)
 
     def to_trimesh(self) -> trimesh.Trimesh:
         """Copy of the mesh as a `trimesh.Trimesh`, unprocessed.

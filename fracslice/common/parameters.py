@@ -225,6 +225,55 @@ class Count(Parameter):
 
 
 @dataclass(frozen=True)
+class Colours(Parameter):
+    """Colours as in #000,#fff,#e33; in place of them, one of some words, or how many there are.
+
+    Attributes
+    ----------
+    least, most : int
+        Inclusive limits of their number.
+    words : tuple of str
+        Words that are allowed, too.
+    counted : bool
+        True if a number of colours is allowed, too.
+    """
+
+    least: int = 2
+    most: int = 8
+    words: tuple[str, ...] = ()
+    counted: bool = False
+
+    @property
+    def expects(self) -> str:
+        limits = f"{self.least} to {self.most}"
+        count = [f"a number from {limits}"] if self.counted else []
+        return alternatives(*self.words, *count, f"{limits} colours such as #000,#fff,#e33")
+
+    def read(self, text: str) -> Any:
+        if self.counted and re.fullmatch(r"\s*[0-9]{1,9}\s*", text):
+            return self.check(int(text))
+        return self.check(text.strip())
+
+    def check(self, value: Any) -> Any:
+        if isinstance(value, str) and value in self.words:
+            return value
+        if isinstance(value, Integral) and self.counted and self.least <= int(value) <= self.most:
+            return int(value)
+        given = value.split(",") if isinstance(value, str) else list(items(value))
+        matches = [_COLOUR.fullmatch(one.strip()) if isinstance(one, str) else None for one in given]
+        if not self.least <= len(given) <= self.most or None in matches:
+            raise ValueError(self.expects)
+        digits = [match[1].lower() for match in matches if match]
+        return tuple(f"#{d if len(d) == 6 else ''.join(2 * c for c in d)}" for d in digits)
+
+    def text(self, value: Any) -> str:
+        return str(value) if isinstance(value, str | int) else ",".join(value)
+
+
+_COLOUR = re.compile(r"#([0-9a-fA-F]{6}|[0-9a-fA-F]{3})")
+
+
+@dataclass(frozen=True)
 class Vector(Bounded):
     """Several finite numbers, separated by spaces; the limits hold for each.
 

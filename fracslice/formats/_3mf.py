@@ -1,7 +1,8 @@
 """3MF, by the core specification 1.3.
 
-Written: one object in millimetres and, for colours, materials 1.2. Read: the build, with the production
-extension.
+Written: one object in millimetres and, for colours, materials 1.2. Triangles of filaments are painted, too,
+in attributes that PrusaSlicer reads (Format/3mf.cpp), and Bambu Studio and OrcaSlicer (bbs_3mf.cpp), which
+take the filament of an object from its group of one colour. Read: the build, with the production extension.
 """
 
 from __future__ import annotations
@@ -20,8 +21,18 @@ from xml.parsers import expat
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import COPIES, DEEPEST, LARGEST, MOST_PARTS, Triangles, concatenate, count, moved
-from ..common.files import HEAD, Fragment, Text, append, deflate, join, number_rows, open_regular, rows
+from ..common.arrays import (
+    COPIES,
+    DEEPEST,
+    LARGEST,
+    MOST_PARTS,
+    Filaments,
+    Triangles,
+    concatenate,
+    count,
+    moved,
+)
+from ..common.files import HEAD, ROWS, Fragment, Text, append, deflate, join, number_rows, open_regular, rows
 from ..errors import MeshError
 from ..work import Work
 from . import MeshFormat
@@ -42,8 +53,9 @@ TRIANGLE, END_OF_ROW = ('<triangle v1="', '" v2="', '" v3="'), '"/>\n'
 CORE_NAMES = {"Title", "Designer", "Description", "Copyright", "LicenseTerms", "Rating", "Application"}
 CORE_NAMES |= {"CreationDate", "ModificationDate"}
 MATERIALS = "http://schemas.microsoft.com/3dmanufacturing/material/2015/02"
+PAINTS = "http://schemas.slic3r.org/3mf/2017/06"
 GROUP = 2
-"""Number of the group of colours, of the materials extension."""
+"""Number of the group of colours, of the materials extension; the first one, if each filament has its own."""
 
 
 def _write(mesh: Triangles, file: BinaryIO, metadata: Mapping[str, str], work: Work) -> None:
@@ -52,10 +64,37 @@ def _write(mesh: Triangles, file: BinaryIO, metadata: Mapping[str, str], work: W
     See `MeshFormat`. Metadata that 3MF does not define get fracslice's namespace.
     """
     mesh = mesh.in_order()
-    coloured = mesh.colours is not None
-    is_large = _is_large(len(mesh.vertices), len(mesh.triangles), coloured)
+    coloured, texts = mesh.colours is not None, 0
+    parts, more = [mesh], dict[str, bytes]()
+    if mesh.filaments is not None:
+        more = _settings(mesh.filaments)
+        parts += mesh.filaments.bodies
+        lengths = np.array([len(text) for text in mesh.filaments.texts])
+        texts = 2 * int(lengths[mesh.filaments.text].sum())
+    vertices, triangles = (sum(len(getattr(p, name)) for p in parts) for name in ("vertices", "triangles"))
+    is_large = _is_large(vertices, triangles, coloured, texts)
     blocks = work.ordered(lambda text: deflate(text()), _model(mesh, metadata))
-    join(file, (partial(append, block) for block in blocks), is_large)
+    join(file, (partial(append, block) for block in blocks), is_large, more)
+
+
+def _settings(filaments: Filaments) -> dict[str, bytes]:
+    """Filaments of bodies, as Bambu Studio and OrcaSlicer read them."""
+    if not filaments.bodies:
+        return {}
+    parts = "".join(
+        f'<part id="{number}" subtype="normal_part"><metadata key="name" value="filament {k}"/>'
+        f'<metadata key="extruder" value="{k}"/></part>\n'
+        for k, number, _ in _numbered(filaments)
+    )
+    whole = f'<object id="1">\n<metadata key="extruder" value="1"/>\n{parts}</object>\n'
+    return {"Metadata/model_settings.config": f"{HEAD}<config>\n{whole}</config>\n".encode()}
+
+
+def _numbered(filaments: Filaments) -> Iterator[tuple[int, int, Triangles]]:
+    """Bodies that are not empty, with the numbers of their filaments, from 1, and of their objects."""
+    for k, body in enumerate(filaments.bodies, 1):
+        if len(body.triangles):
+            yield k, GROUP + len(filaments.colours) + k, body
 
 
 def write_fragments(
@@ -79,10 +118,13 @@ def write_fragments(
     join(file, fragments, _is_large(vertices[0], triangles[0], False))
 
 
-def _is_large(vertices: int, triangles: int, coloured: bool) -> bool:
-    """True if the text may exceed the 2 GiB of a plain ZIP member; rows take at most 66 and 54 bytes."""
-    vertex, triangle = (92, 108) if coloured else (66, 54)  # with a colour for each vertex
-    return vertex * vertices + triangle * triangles > 2**31 - 2**20
+def _is_large(vertices: int, triangles: int, coloured: bool, painted: int = 0) -> bool:
+    """True if the text may exceed the 2 GiB of a plain ZIP member; rows take at most 66 and 54 bytes.
+
+    `painted`: bytes of the painting.
+    """
+    vertex, triangle = (92, 140) if coloured else (66, 54)  # with a colour for each vertex, or painted
+    return vertex * vertices + triangle * triangles + painted > 2**31 - 2**20
 
 
 def _head(metadata: Mapping[str, str], model: str = MODEL) -> Iterator[bytes]:
@@ -95,6 +137,9 @@ def _head(metadata: Mapping[str, str], model: str = MODEL) -> Iterator[bytes]:
 
 
 def _model(mesh: Triangles, metadata: Mapping[str, str]) -> Iterator[Text]:
+    if mesh.filaments is not None:
+        yield from _printed(mesh, mesh.filaments, metadata)
+        return
     if mesh.colours is None:
         yield from _texts(*_head(metadata), PLAIN)
         yield from mesh_element(mesh)
@@ -106,6 +151,49 @@ def _model(mesh: Triangles, metadata: Mapping[str, str]) -> Iterator[Text]:
         yield from _texts(f'</m:colorgroup>\n<object id="1" type="model" pid="{GROUP}" pindex="0">'.encode())
         yield from mesh_element(mesh, index.reshape(-1).astype(np.int32))
     yield from _texts(END)
+
+
+def _printed(mesh: Triangles, filaments: Filaments, metadata: Mapping[str, str]) -> Iterator[Text]:
+    """A mesh of filaments, each with a group of one colour: as painted triangles, or as a body for each."""
+    spaces = f'<model xmlns:m="{MATERIALS}" xmlns:slic3rpe="{PAINTS}" '
+    yield from _texts(*_head(metadata, MODEL.replace("<model ", spaces)))
+    for group, (red, green, blue) in enumerate(filaments.colours.tolist(), GROUP):
+        colour = f'<m:color color="#{red:02X}{green:02X}{blue:02X}"/>'
+        yield from _texts(f'<m:colorgroup id="{group}">{colour}</m:colorgroup>\n'.encode())
+    if not filaments.bodies:
+        yield from _texts(f'<object id="1" type="model" pid="{GROUP}" pindex="0">'.encode())
+        yield from _painted_element(mesh, filaments)
+        yield from _texts(END)
+        return
+    for k, number, body in _numbered(filaments):
+        of = f'pid="{GROUP + k - 1}" pindex="0"'
+        yield from _texts(f'<object id="{number}" name="filament {k}" type="model" {of}>'.encode())
+        yield from mesh_element(body.in_order())
+        yield from _texts(b"</object>\n")
+    components = (f'<component objectid="{number}"/>' for _, number, _ in _numbered(filaments))
+    yield from _texts(PLAIN, f"<components>{''.join(components)}</components>".encode(), END)
+
+
+def _painted_element(mesh: Triangles, filaments: Filaments) -> Iterator[Text]:
+    """Mesh element whose triangles have the colour group of their filament, and its painting."""
+    yield from _texts(VERTICES)
+    yield from vertex_rows(mesh.vertices)
+    yield from _texts(TRIANGLES)
+    plain = "0"  # a triangle that is not painted
+    texts = [f' slic3rpe:mmu_segmentation="{t}" paint_color="{t}"' * (t != plain) for t in filaments.texts]
+    groups = [f' pid="{GROUP + k}" p1="0"' if k else "" for k in range(len(filaments.colours))]
+
+    def block(part: slice) -> bytes:
+        given = mesh.triangles[part].tolist(), filaments.of[part].tolist(), filaments.text[part].tolist()
+        lines = (
+            f'<triangle v1="{a}" v2="{b}" v3="{c}"{groups[of]}{texts[text]}/>\n'
+            for (a, b, c), of, text in zip(*given, strict=True)
+        )
+        return "".join(lines).encode()
+
+    for begin in range(0, len(mesh.triangles), ROWS):
+        yield partial(block, slice(begin, begin + ROWS))
+    yield from _texts(END_OF_MESH)
 
 
 def _texts(*blocks: bytes) -> Iterator[Text]:

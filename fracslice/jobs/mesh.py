@@ -149,6 +149,8 @@ class _Job:
             if self.what.colour is not None and not mesh_format(ending).has_colours:
                 coloured = ", ".join(name for name in ENDINGS if mesh_format(name).has_colours)
                 raise SceneError(f"colour: expected a file that holds colours: {coloured}")
+            if self.what.bodies and ending != ".3mf":
+                raise SceneError("bodies: expected a file that holds several, .3mf")
         if self.what.colour is not None and self.clock.work.cluster is not None:
             raise SceneError(f"colour {self.what.colour}: expected no cluster and no shard")
 
@@ -441,17 +443,28 @@ class Writing:
 
     def _painted(self, meshes: Iterator[Mesh], finish: Finish) -> Iterator[Mesh]:
         """Colour the vertices. Edits that are no formulas have the colour of the object there."""
-        from ..rendering.materials import paint
+        from ..rendering.materials import Paint, paint
 
-        assert self.what.colour is not None
+        what, work = self.what, self.clock.work
+        colour, palette = what.colour, what.palette
+        assert colour is not None
         field: Any = finish.of.planned.root
         while field.tree is None:
             field = field.root
+
+        def paint_at(points: np.ndarray) -> Paint:
+            return paint(field.tree, finish.place.units(points), colour, work, palette)
+
         for mesh in meshes:
             with self.clock("colouring"):
-                points = finish.place.units(mesh.vertices)
-                done = paint(field.tree, points, self.what.colour, self.clock.work)
-            yield replace(mesh, colours=done.colours, scalars=done.scalars)
+                done = paint_at(mesh.vertices)
+                made = replace(mesh, colours=done.colours, scalars=done.scalars)
+                if what.filaments is not None:
+                    from ..mesh.filaments import with_filaments
+
+                    how = what.filaments, lambda points: paint_at(points).colours, what.bodies
+                    made = with_filaments(made, *how, work)
+            yield made
 
 
 def metadata(scene: Scene) -> dict[str, str]:

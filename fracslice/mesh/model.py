@@ -176,6 +176,8 @@ class Mesh(Triangles):
         Colours of the vertices, sRGB.
     scalars : mapping of str to ndarray of float32, shape (n,)
         Named numbers of the vertices.
+    filaments : Filaments, optional
+        Filaments of the triangles: their colours, and of which each triangle is.
 
     Raises
     ------
