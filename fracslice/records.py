@@ -6,6 +6,7 @@ made from it.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Literal, TypeAlias, get_args
 
@@ -28,6 +29,7 @@ from .common.parameters import (
     Pixels,
     Record,
     Shift,
+    Sides,
     Triple,
     Vector,
     attribute,
@@ -369,6 +371,56 @@ class MeshJob(Placed):
                 f"voxel {self.voxel:g}mm: expected {low:.4g}mm to {high:.4g}mm for an object of {size:g}mm"
             )
         return size / self.voxel
+
+
+@record
+class PartsJob(Record):
+    """Parameters of an object in parts.
+
+    Raises
+    ------
+    SceneError
+        For invalid values.
+    """
+
+    bed: Given[Sequence[AnyLength] | str | None, Triple | None] = attribute(
+        Sides, None, "make parts that fit a printer of this size, such as 220x220x250mm"
+    )
+    parts: Given[Sequence[int] | str | None, tuple[int, int, int] | str | None] = attribute(
+        Pixels,
+        None,
+        "parts along x, y and z, or auto: as few as fit the bed",
+        sign="x",
+        names=("parts along x", "y", "z"),
+        example="2x1x1",
+        letters="auto|NxNxN",
+        least=1,
+        most=64,
+        words=("auto",),
+    )
+    clearance: Given[AnyLength, float] = attribute(
+        Length, 0.15, "gap around the pegs that join parts", zero=True
+    )
+
+    def __post_init__(self) -> None:
+        validate(self, SceneError)
+        if self.parts == "auto" and self.bed is None:
+            raise SceneError("parts auto: expected a bed, too, such as 220x220x250mm")
+
+    def side(self, axis: int) -> float:
+        """Longest part along an axis, mm.
+
+        Parameters
+        ----------
+        axis : int
+            0 to 2.
+
+        Returns
+        -------
+        float
+            Side of the bed, or infinity.
+        """
+        return math.inf if self.bed is None else self.bed[axis]
 
 
 @record

@@ -133,6 +133,7 @@ def test_commands_are_understood(line: str, folder: Path, monkeypatch, capfd) ->
         return
     for work in (
         "jobs.mesh.make_mesh",
+        "jobs.divided.make_parts",
         "mesh.checks.repair",
         "jobs.mesh.make_implicit",
         "slicing.plan_stack",

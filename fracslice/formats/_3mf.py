@@ -10,12 +10,12 @@ from __future__ import annotations
 import zipfile
 import zlib
 from array import array
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from html import escape
 from itertools import chain
 from pathlib import Path
-from typing import IO, Any, BinaryIO
+from typing import IO, Any, BinaryIO, NamedTuple
 from xml.parsers import expat
 
 import numpy as np
@@ -95,6 +95,39 @@ def _numbered(filaments: Filaments) -> Iterator[tuple[int, int, Triangles]]:
     for k, body in enumerate(filaments.bodies, 1):
         if len(body.triangles):
             yield k, GROUP + len(filaments.colours) + k, body
+
+
+class ObjectCopies(NamedTuple):
+    """An object that is built at some places."""
+
+    name: str
+    mesh: Triangles  # mm
+    offsets: list[tuple[float, float, float]]  # mm
+
+
+def write_objects(
+    objects: Sequence[ObjectCopies], file: BinaryIO, metadata: Mapping[str, str], work: Work
+) -> None:
+    """Write several objects, without colours, streamed as one is."""
+
+    def texts() -> Iterator[Text]:
+        yield from _texts(*_head(metadata))
+        for number, placed in enumerate(objects, 1):
+            head = f'<object id="{number}" name="{escape(placed.name)}" type="model">'
+            yield from _texts(head.encode())
+            yield from mesh_element(placed.mesh.in_order())
+            yield from _texts(b"</object>\n")
+        items = "".join(
+            f'<item objectid="{number}" transform="1 0 0 0 1 0 0 0 1 {x:.6g} {y:.6g} {z:.6g}"/>\n'
+            for number, placed in enumerate(objects, 1)
+            for x, y, z in placed.offsets
+        )
+        yield from _texts(f"</resources>\n<build>\n{items}</build>\n</model>\n".encode())
+
+    vertices = sum(len(placed.mesh.vertices) for placed in objects)
+    triangles = sum(len(placed.mesh.triangles) for placed in objects)
+    blocks = work.ordered(lambda text: deflate(text()), texts())
+    join(file, (partial(append, block) for block in blocks), _is_large(vertices, triangles, False))
 
 
 def write_fragments(
@@ -307,7 +340,7 @@ class _Relations:
 _Name = tuple[str, str]
 """File of an object in the package, and its identifier there."""
 
-_Placed = tuple[_Name, NDArray[np.float64]]
+_Part = tuple[_Name, NDArray[np.float64]]
 """Object and its transform."""
 
 
@@ -323,8 +356,8 @@ class _Package:
 
     def __init__(self) -> None:
         self.meshes: dict[_Name, Triangles] = {}
-        self.parts: dict[_Name, list[_Placed]] = {}
-        self.build: list[_Placed] = []
+        self.parts: dict[_Name, list[_Part]] = {}
+        self.build: list[_Part] = []
         self.unit, self.file, self.object = "millimeter", "", ("", "")
         self.vertices, self.triangles = array("d"), array("q")
         self.count = 0
@@ -346,7 +379,7 @@ class _Package:
         with archive.open(file) as part:
             _parse(part, self.start, self.end)
 
-    def named(self, build: list[_Placed]) -> set[str]:
+    def named(self, build: list[_Part]) -> set[str]:
         """Files of the objects that are built or components of others."""
         return {name[0] for placed in (build, *self.parts.values()) for name, _ in placed}
 
@@ -370,7 +403,7 @@ class _Package:
             case "model":
                 self.unit = get.get("unit", self.unit)
 
-    def reference(self, get: dict[str, str]) -> _Placed:
+    def reference(self, get: dict[str, str]) -> _Part:
         """The object that an item or a component names, in this file or in that of its path."""
         self.count_part()
         paths = [value for key, value in get.items() if key.rpartition(":")[2] == "path"]
