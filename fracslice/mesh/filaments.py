@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import combinations, permutations
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,11 +120,23 @@ def parse_colours(texts: Sequence[str]) -> Colours:
     return np.array([[int(text[k : k + 2], 16) for k in (1, 3, 5)] for text in texts], np.uint8)
 
 
-def vertex_areas(mesh: Mesh) -> NDArray[np.float64]:
-    """Area of the triangles at each vertex, float64 [n]."""
-    area = np.repeat(np.linalg.norm(mesh.normals, axis=1), 3)
-    areas: NDArray[Any] = np.bincount(mesh.triangles.ravel(), area, len(mesh.vertices))
-    return areas
+SAMPLES = 1 << 16
+"""Points of the surface whose colours count."""
+PLASTIC = np.array([0.7548776662466927, 0.5698402909980532])
+"""Steps of a sequence that fills the unit square evenly (M. Roberts 2018, after the plastic number)."""
+
+
+def surface_points(mesh: Mesh, count: int) -> NDArray[np.float64]:
+    """Points that are spread evenly over the triangles, the same on any machine, float64 [count, 3]."""
+    upto = np.cumsum(np.linalg.norm(mesh.normals, axis=1))
+    number = np.arange(count)
+    triangle = np.searchsorted(upto, (number + 0.5) / count * upto[-1])
+    u, v = ((number[:, None] + 1) * PLASTIC % 1.0).T
+    over = u + v > 1
+    u, v = np.where(over, 1 - u, u), np.where(over, 1 - v, v)
+    a, b, c = np.moveaxis(mesh.corners[np.minimum(triangle, len(upto) - 1)], 1, 0)
+    points: NDArray[np.float64] = a + u[:, None] * (b - a) + v[:, None] * (c - a)
+    return points
 
 
 def with_filaments(
@@ -137,7 +149,7 @@ def with_filaments(
     """
     assert mesh.colours is not None
     if isinstance(wanted, int):
-        filaments = chosen_colours(mesh.colours, vertex_areas(mesh), wanted)
+        filaments = chosen_colours(colours_at(surface_points(mesh, SAMPLES)), np.ones(SAMPLES), wanted)
     else:
         filaments = parse_colours(wanted)
     numbers = nearest_filament(mesh.colours, filaments)

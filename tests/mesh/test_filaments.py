@@ -23,6 +23,7 @@ from fracslice.mesh.filaments import (
     nearest_filament,
     oklab,
     paint_triangles,
+    surface_points,
 )
 from fracslice.records import MeshJob, Palette
 from fracslice.work import Work
@@ -58,6 +59,21 @@ def test_clusters_are_found_however_they_are_ordered() -> None:
     assert np.abs(found[nearest_filament(middles.astype(np.uint8), found)] - middles).max() < 6
     mixed = rng.permutation(200)
     assert np.array_equal(chosen_colours(colours[mixed], np.ones(200), 5), found)
+
+
+def test_colours_between_vertices_count() -> None:
+    """Simplified to its corners, a bar has a stripe that no vertex has."""
+    bar, stripe = material(box(size=(2, 1, 1)), colour=RED), material(box(size=(0.3, 1, 1)), colour=BLUE)
+    made = make_mesh(
+        union(stripe, bar), size="30mm", resolution=24, colour="material", filaments=3, simplify=0.01
+    )
+    assert made.colours is not None and len(np.unique(made.colours, axis=0)) == 1
+    assert made.mesh.filaments is not None and len(made.mesh.filaments.colours) == 2
+    points = surface_points(shapes.cube(2, (0, 0, 0)), 6000)
+    for axis in range(3):
+        for side in (0, 2):
+            assert (points[:, axis] == side).sum() == pytest.approx(1000, abs=3)
+    assert points.mean(0) == pytest.approx(1, abs=0.01)
 
 
 Painted = list[tuple[np.ndarray, int]]
