@@ -29,7 +29,7 @@ from .execution import (
 )
 from .options import (
     AMOUNT,
-    COLOURS,
+    FOR_SLICERS,
     INTERVAL,
     SECONDS,
     ClusterOptions,
@@ -120,7 +120,7 @@ def mesh(given: WholeOptions) -> int:
     return make_files(given) if given.bed is None and given.parts is None else make_parted(given)
 
 
-NO_PARTS = frozenset({"implicit", "report", "seconds", "every", "cluster", "shard", "store", *COLOURS})
+NO_PARTS = frozenset({"implicit", "report", "seconds", "every", "cluster", "shard", "store", *FOR_SLICERS})
 """Options that parts do not have."""
 
 
@@ -179,7 +179,7 @@ def make_files(given: MeshFileOptions, parts: Callable[[Scene, Work], Parts] = w
 
     check_outputs(given)
     if Path(given.output).suffix.lower() == GRID:
-        names = {"chord", "simplify", "faces", *COLOURS, "cluster", "shard", "store"}
+        names = {"chord", "simplify", "faces", *FOR_SLICERS, "cluster", "shard", "store"}
         refuse_options(names, "only for meshes, and a .vdb file holds distances on a grid")
     if given.implicit:
         refuse_what_needs_triangles(given.output)
@@ -237,7 +237,7 @@ def refuse_what_needs_triangles(output: str) -> None:
         "chord",
         "simplify",
         "faces",
-        *COLOURS,
+        *FOR_SLICERS,
         "dust",
         "report",
         "picture",

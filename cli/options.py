@@ -359,15 +359,15 @@ class PreparationOptions(SceneOptions):
         return changed
 
 
-COLOURS = frozenset({"colour", "palette", "filaments", "bodies"})
-"""Fields of meshes with colours."""
+FOR_SLICERS = frozenset({"colour", "palette", "filaments", "bodies", "heights"})
+"""Fields of meshes with colours, and with hints for slicers."""
 
 
 class MeshOptions(PreparationOptions):
     """Options of meshes without colours."""
 
     records: ClassVar[Records] = (MeshJob,)
-    without = COLOURS
+    without = FOR_SLICERS
 
     def mesh_job(self, scene: Scene) -> MeshJob:
         """Mesh job of a scene."""

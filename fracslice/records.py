@@ -278,6 +278,14 @@ class MeshJob(Placed):
     bodies: bool = attribute(
         Flag, False, "in place of painted triangles, an .3mf file has a body for each filament"
     )
+    heights: Given[AnyLength | Sequence[AnyLength | None] | None, tuple[float, float | None] | None] = (
+        attribute(
+            Heights,
+            None,
+            "heights of layers for slicers in an .3mf file, such as 0.1mm..0.3mm: thick where the surface is "
+            "steep",
+        )
+    )
     proved: bool = attribute(
         Flag, False, "space is skipped by proofs only, not by the measured bounds of fractals"
     )
@@ -297,6 +305,8 @@ class MeshJob(Placed):
             raise SceneError("filaments: expected a colour, too, such as material or point")
         if self.bodies and self.filaments is None:
             raise SceneError("bodies: expected filaments, too, such as 4")
+        if self.heights is not None and self.heights[1] is None:
+            raise SceneError("heights: expected a range, such as 0.1mm..0.3mm")
 
     def edits(self, scene: Scene) -> Print:
         """Changes for printing.

@@ -78,6 +78,7 @@ class MeshKeywords(PlacedKeywords, total=False):
     palette: str | Sequence[str] | None
     filaments: int | str | Sequence[str] | None
     bodies: bool | None
+    heights: AnyLength | Sequence[AnyLength | None] | None
     proved: bool | None
 
 

@@ -65,9 +65,9 @@ def _write(mesh: Triangles, file: BinaryIO, metadata: Mapping[str, str], work: W
     """
     mesh = mesh.in_order()
     coloured, texts = mesh.colours is not None, 0
-    parts, more = [mesh], dict[str, bytes]()
+    parts, more = [mesh], _layer_heights(mesh)
     if mesh.filaments is not None:
-        more = _settings(mesh.filaments)
+        more |= _settings(mesh.filaments)
         parts += mesh.filaments.bodies
         lengths = np.array([len(text) for text in mesh.filaments.texts])
         texts = 2 * int(lengths[mesh.filaments.text].sum())
@@ -75,6 +75,22 @@ def _write(mesh: Triangles, file: BinaryIO, metadata: Mapping[str, str], work: W
     is_large = _is_large(vertices, triangles, coloured, texts)
     blocks = work.ordered(lambda text: deflate(text()), _model(mesh, metadata))
     join(file, (partial(append, block) for block in blocks), is_large, more)
+
+
+PROFILES = "Metadata/Slic3r_PE_layer_heights_profile.txt", "Metadata/layer_heights_profile.txt"
+"""Where PrusaSlicer, and Bambu Studio and OrcaSlicer, have heights of layers."""
+
+
+def _layer_heights(mesh: Triangles) -> dict[str, bytes]:
+    """Heights of layers over z, as slicers read them: at both faces of each layer; the last is the top."""
+    if mesh.tops is None:
+        return {}
+    top, inner = float(np.ptp(mesh.vertices[:, 2])), mesh.tops[:-1]
+    tops = np.array([*inner[inner < top], top])
+    bottoms, heights = np.array([0.0, *tops[:-1]]), np.diff(mesh.tops, prepend=0.0)[: len(tops)]
+    rows = np.stack([bottoms, heights, tops, heights], 1).reshape(-1).tolist()
+    text = f"object_id=1|{';'.join(f'{number:.6f}' for number in rows)}\n".encode()
+    return dict.fromkeys(PROFILES, text)
 
 
 def _settings(filaments: Filaments) -> dict[str, bytes]:

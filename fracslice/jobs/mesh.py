@@ -103,6 +103,9 @@ def import_ahead() -> None:
         import_module(f"fracslice.{module}")
 
 
+PIXEL = 0.2
+"""Pixels by which the slope of the surface is measured for heights of layers, mm."""
+
 TRIES = 2
 """How many times a job that lost its object samples finer."""
 
@@ -149,10 +152,14 @@ class _Job:
             if self.what.colour is not None and not mesh_format(ending).has_colours:
                 coloured = ", ".join(name for name in ENDINGS if mesh_format(name).has_colours)
                 raise SceneError(f"colour: expected a file that holds colours: {coloured}")
+            if self.what.heights is not None and ending != ".3mf":
+                raise SceneError("heights: expected a file that holds heights of layers, .3mf")
             if self.what.bodies and ending != ".3mf":
                 raise SceneError("bodies: expected a file that holds several, .3mf")
         if self.what.colour is not None and self.clock.work.cluster is not None:
             raise SceneError(f"colour {self.what.colour}: expected no cluster and no shard")
+        if self.what.heights is not None and self.clock.work.cluster is not None:
+            raise SceneError("heights: expected no cluster and no shard")
 
     @contextmanager
     def aside(self) -> Iterator[Callable[[], Path] | None]:
@@ -422,6 +429,8 @@ class Writing:
             meshes = tips_last(meshes, finish.tips)
         if self.what.colour is not None:
             meshes = self._painted(meshes, finish)
+        if self.what.heights is not None:
+            meshes = (replace(mesh, tops=self._tops()) for mesh in meshes)
         if self.path is None:
             (mesh,) = meshes
             return mesh, simplified
@@ -440,6 +449,21 @@ class Writing:
                 for whole in timed():
                     mesh_format(self.path.suffix.lower()).write(whole, file, about, self.clock.work)
         return None if several else mesh, simplified
+
+    def _tops(self) -> np.ndarray:
+        """Upper faces of the layers that are advised to slicers, mm."""
+        from ..records import SliceJob
+        from ..slicing import adapted, plan_stack
+        from ..volume.amount import sizing
+
+        what, work = self.what, self.clock.work
+        assert what.heights is not None and what.heights[1] is not None
+        with self.clock("slicing"):
+            size = sizing(self.scene, what.size, what.scale, work)
+            how = what.edits(self.scene)
+            job = SliceJob(layer=what.heights[0], printing=how, pixel=PIXEL, up=what.up, scale=what.scale)
+            stack = plan_stack(self.scene.root, job, work, size)
+            return adapted(stack, what.heights[1], work).tops
 
     def _painted(self, meshes: Iterator[Mesh], finish: Finish) -> Iterator[Mesh]:
         """Colour the vertices. Edits that are no formulas have the colour of the object there."""

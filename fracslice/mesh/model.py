@@ -178,6 +178,8 @@ class Mesh(Triangles):
         Named numbers of the vertices.
     filaments : Filaments, optional
         Filaments of the triangles: their colours, and of which each triangle is.
+    tops : ndarray of float64, optional
+        Upper faces of the layers that are advised to slicers, above the lowest point.
 
     Raises
     ------

@@ -238,3 +238,26 @@ def test_what_is_wrong_is_one_line(
 def test_python_says_what_it_expects() -> None:
     with pytest.raises(SceneError, match="filaments=1: expected a number from 2 to 16"):
         MeshJob(colour="point", filaments=1)
+
+
+def test_heights_of_layers_are_those_of_the_slope(tmp_path: Path) -> None:
+    """A ball on which the least height holds where the surface is flat, three times that at the middle."""
+    made = make_mesh(sphere(radius=10), voxel="1mm", heights="0.1mm..0.3mm")
+    path = made.mesh.export(tmp_path / "ball.3mf")
+    with zipfile.ZipFile(path) as file:
+        text = file.read("Metadata/Slic3r_PE_layer_heights_profile.txt").decode()
+        assert file.read("Metadata/layer_heights_profile.txt").decode() == text
+    assert of_strict_lib3mf(path)[0] == 0 and text.startswith("object_id=1|")
+    z, height = np.array(text.partition("|")[2].split(";"), float).reshape(-1, 2).T
+    assert z[0] == 0 and z[-1] == pytest.approx(np.ptp(made.vertices[:, 2]), abs=1e-6)
+    assert (z[2::2] == z[1:-1:2]).all() and (np.diff(z)[:-2:2] > 0.099).all()
+    slope = np.abs((z[::2] + z[1::2]) / 2 - 10) / 10  # vertical component of the normal
+    assert (height[::2][slope > 0.55] < 0.11).all() and (height[::2][slope < 0.25] > 0.29).all()
+    assert (height[::2] * slope < 0.1 + 0.3 * 0.04).all()
+
+
+def test_heights_need_a_range_and_a_file_that_holds_them(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match="heights: expected a range, such as"):
+        MeshJob(heights="0.1mm")
+    with pytest.raises(SceneError, match=r"expected a file that holds heights of layers, \.3mf"):
+        make_mesh(sphere(radius=10), heights="0.1mm..0.2mm", path=tmp_path / "x.stl")
