@@ -293,7 +293,12 @@ def make_and_write(scene: Scene, given: MeshFileOptions, work: Work) -> Result:
     if picture is not None:
         from fracslice.viewer import picture as draw
 
-        draw(result.mesh, picture)
+        shown = result.mesh
+        if shown.filaments is not None:
+            from fracslice.mesh.filaments import painted_mesh
+
+            shown = painted_mesh(shown)
+        draw(shown, picture)
     return result
 
 

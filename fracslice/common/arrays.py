@@ -251,10 +251,13 @@ NO_TRIANGLES = Triangles(np.empty((0, 3)), np.empty((0, 3), np.int32))
 
 
 def concatenate(parts: Sequence[T]) -> T:
-    """Concatenate triangles without welding, and without colours and scalars."""
+    """Concatenate triangles without welding and scalars, with colours if all have them."""
+    coloured = [part.colours for part in parts if len(part.vertices)]
+    known = [colours for colours in coloured if colours is not None]
     offsets = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
     triangles = [part.triangles + np.int32(offset) for part, offset in zip(parts, offsets, strict=True)]
-    return type(parts[0])(np.concatenate([part.vertices for part in parts]), np.concatenate(triangles))
+    whole = np.concatenate([part.vertices for part in parts]), np.concatenate(triangles)
+    return type(parts[0])(*whole, np.concatenate(known) if known and len(known) == len(coloured) else None)
 
 
 def count(part: Triangles) -> int:
@@ -281,7 +284,7 @@ def moved(part: Triangles, vertices: NDArray[np.float64], matrix: NDArray[np.flo
     `matrix`: its linear part, (3, 3).
     """
     order = -1 if np.linalg.det(matrix) < 0 else 1
-    return Triangles(vertices, part.triangles[:, ::order])
+    return Triangles(vertices, part.triangles[:, ::order], part.colours)
 
 
 DEEPEST, MOST_PARTS = 32, 1 << 16

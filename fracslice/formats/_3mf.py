@@ -449,7 +449,7 @@ class _Package:
         if sum(self.size(name, known)[0] for name, _ in self.build) > most:
             raise MeshError(f"not a valid 3MF file: it builds more than {most} vertices, triangles and parts")
         whole = concatenate([self.placed(*item) for item in self.build])
-        return Triangles(whole.vertices * MILLIMETRES[self.unit], whole.triangles)
+        return Triangles(whole.vertices * MILLIMETRES[self.unit], whole.triangles, whole.colours)
 
     def size(self, name: _Name, known: dict[_Name, tuple[int, int]], depth: int = 0) -> tuple[int, int]:
         """Vertices, triangles and objects of an expanded object, and levels of its components.
@@ -474,6 +474,60 @@ class _Package:
         whole = self.expanded[name]
         turned = sum(whole.vertices[:, k, None] * matrix[k] for k in range(3))
         return moved(whole, turned + matrix[3], matrix[:3])
+
+
+GREY = 0xC8C8C4
+"""Colour of what has none beside what has one, sRGB."""
+
+
+class _Coloured(_Package):
+    """Collects colours of the corners of triangles, too: those of groups of colours and of base materials."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.groups: dict[_Name, list[int]] = {}
+        self.group, self.own, self.corners = ("", ""), ("", "0"), array("q")
+
+    def start(self, name: str, get: dict[str, str]) -> None:
+        """Handle the start of an element."""
+        super().start(name, get)
+        match name.rpartition(":")[2]:
+            case "colorgroup" | "basematerials":
+                self.group = self.file, get["id"]
+                self.groups[self.group] = []
+            case "color" | "base":
+                text = get.get("color", get.get("displaycolor", ""))
+                self.groups.setdefault(self.group, []).append(int(text[1:7], 16))
+            case "object":
+                self.own = get.get("pid", ""), get.get("pindex", "0")
+            case "triangle":
+                group, first = get.get("pid", self.own[0]), get.get("p1", self.own[1])
+                known = self.groups.get((self.file, group), [])
+                for index in (first, get.get("p2", first), get.get("p3", first)):
+                    number = int(index)
+                    self.corners.append(known[number] if 0 <= number < len(known) else -1)
+
+    def end(self, name: str) -> None:
+        """Handle the end of an element."""
+        super().end(name)
+        if name.rpartition(":")[2] == "object":
+            mesh, colours = self.meshes[self.object], np.array(self.corners, dtype=np.int64)
+            self.corners = array("q")
+            if len(colours) and colours.max() >= 0:
+                self.meshes[self.object] = _split(mesh, np.where(colours < 0, GREY, colours))
+
+
+def _split(mesh: Triangles, colours: NDArray[np.int64]) -> Triangles:
+    """A mesh with a vertex for each colour of its corners, of which each is a number."""
+    both = mesh.triangles.reshape(-1).astype(np.int64) << 24 | colours
+    known, index = np.unique(both, return_inverse=True)
+    shown = np.stack([known >> 16 & 255, known >> 8 & 255, known & 255], 1).astype(np.uint8)
+    return Triangles(mesh.vertices[known >> 24], index.reshape(-1, 3).astype(np.int32), shown)
+
+
+def _read_coloured(path: Path) -> Triangles:
+    """The build of a file with its colours, mm."""
+    return _build(path, _Coloured())
 
 
 class _Lattices(_Package):
@@ -535,4 +589,4 @@ def _validated_mesh(vertices: array[float], triangles: array[int]) -> Triangles:
     return Triangles(corners, indices.astype(np.int32))
 
 
-FORMAT = MeshFormat(_read, _write, has_unit=True, has_colours=True)
+FORMAT = MeshFormat(_read, _write, has_unit=True, has_colours=True, read_coloured=_read_coloured)

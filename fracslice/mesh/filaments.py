@@ -10,7 +10,7 @@ triangle is of one filament, or split into four at the middles of its sides, and
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations, permutations
 from typing import TYPE_CHECKING, NamedTuple
@@ -249,6 +249,39 @@ def filament_text(number: int) -> str:
         return "0"
     state = number + 1
     return f"{state - 3:X}C" if state > 2 else f"{state << 2:X}"
+
+
+def painted_mesh(mesh: Mesh) -> Mesh:
+    """The parts of painted triangles in the colours of their filaments, as a mesh for pictures."""
+    assert mesh.filaments is not None
+    texts, number = mesh.filaments.texts, mesh.filaments.text
+    single = {filament_text(k): k for k in range(MOST_FILAMENTS)}
+    known = np.array([single.get(text, -1) for text in texts])[number]
+    corners, own = [mesh.corners[known >= 0]], [known[known >= 0]]
+    for index in np.flatnonzero(known < 0).tolist():
+        parts = list(_parts(texts[number[index]], mesh.corners[index]))
+        corners.append(np.array([part for part, _ in parts]))
+        own.append(np.array([filament for _, filament in parts]))
+    points, filaments = np.concatenate(corners).reshape(-1, 3), np.repeat(np.concatenate(own), 3)
+    rows, corner = np.unique(np.column_stack([points, filaments]), axis=0, return_inverse=True)
+    colours = mesh.filaments.colours[rows[:, 3].astype(np.intp)]
+    return Mesh(rows[:, :3].copy(), corner.reshape(-1, 3).astype(np.int32), colours)
+
+
+def _parts(text: str, corners: NDArray[np.float64]) -> Iterator[tuple[NDArray[np.float64], int]]:
+    """Parts of a painted triangle with their filaments."""
+    left, at = [corners], len(text)
+    while left:
+        a, b, c = triangle = left.pop()
+        at -= 1
+        if text[at] == "3":
+            ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+            left += [np.array(part) for part in ((a, ab, ca), (ab, b, bc), (bc, c, ca), (ab, bc, ca))]
+        elif text[at] == "C":
+            at -= 1
+            yield triangle, int(text[at], 16) + 2
+        else:
+            yield triangle, max(int(text[at], 16) // 4 - 1, 0)
 
 
 CELLS = 64

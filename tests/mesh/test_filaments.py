@@ -13,6 +13,7 @@ import pytest
 from fracslice.cli.main import run
 
 from fracslice import make_mesh
+from fracslice.common.arrays import Filaments
 from fracslice.errors import SceneError
 from fracslice.formulas import box, material, sphere, transform, union
 from fracslice.mesh import Mesh
@@ -23,6 +24,7 @@ from fracslice.mesh.filaments import (
     nearest_filament,
     oklab,
     paint_triangles,
+    painted_mesh,
     surface_points,
 )
 from fracslice.records import MeshJob, Palette
@@ -111,6 +113,13 @@ def test_large_triangles_are_split_where_colours_meet() -> None:
         return np.floor(points @ normal / 1.7).clip(0, 4).astype(np.uint8)
 
     of, texts, text = paint_triangles(cube, slab(cube.vertices), slab, Work())
+    grey = np.arange(5, dtype=np.uint8)[:, None] * np.uint8([50, 50, 50])
+    drawn = painted_mesh(Mesh(cube.vertices, cube.triangles, filaments=Filaments(grey, of, texts, text)))
+    assert drawn.volume == pytest.approx(125, rel=1e-9) and drawn.colours is not None
+    shown = drawn.colours[drawn.triangles][:, :, 0] // 50
+    there = drawn.corners.mean(1) @ normal / 1.7
+    inner = np.abs(there - np.rint(there)) * 1.7 > FINEST
+    assert inner.any() and (shown[inner] == slab(drawn.corners.mean(1))[inner, None]).all()
     for number, corners in enumerate(cube.corners):
         parts = unpainted(texts[text[number]], corners)
         shapes_of, filaments = np.array([one for one, _ in parts]), np.array([k for _, k in parts])
