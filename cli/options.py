@@ -359,7 +359,7 @@ class PreparationOptions(SceneOptions):
         return changed
 
 
-FOR_SLICERS = frozenset({"colour", "palette", "filaments", "bodies", "heights"})
+FOR_SLICERS = frozenset({"colour", "palette", "filaments", "bodies", "heights", "paint_supports"})
 """Fields of meshes with colours, and with hints for slicers."""
 
 

@@ -9,7 +9,7 @@ from .options import MeshOptions, argument, command
 class ShowOptions(MeshOptions):
     """Options of `show`."""
 
-    without = frozenset({"bodies", "heights"})
+    without = frozenset({"bodies", "heights", "paint_supports"})
     source: str = argument("MODEL|SCENE")
 
 

@@ -286,6 +286,11 @@ class MeshJob(Placed):
             "steep",
         )
     )
+    paint_supports: bool = attribute(
+        Flag,
+        False,
+        "in an .3mf file, triangles are painted at which slicers shall put supports: islands, flat overhangs",
+    )
     proved: bool = attribute(
         Flag, False, "space is skipped by proofs only, not by the measured bounds of fractals"
     )
@@ -307,6 +312,10 @@ class MeshJob(Placed):
             raise SceneError("bodies: expected filaments, too, such as 4")
         if self.heights is not None and self.heights[1] is None:
             raise SceneError("heights: expected a range, such as 0.1mm..0.3mm")
+        if self.paint_supports and self.colour is not None and self.filaments is None:
+            raise SceneError("paint_supports and a colour: expected filaments, too")
+        if self.paint_supports and self.bodies:
+            raise SceneError("paint_supports and bodies: expected one of them")
 
     def edits(self, scene: Scene) -> Print:
         """Changes for printing.

@@ -79,6 +79,7 @@ class MeshKeywords(PlacedKeywords, total=False):
     filaments: int | str | Sequence[str] | None
     bodies: bool | None
     heights: AnyLength | Sequence[AnyLength | None] | None
+    paint_supports: bool | None
     proved: bool | None
 
 

@@ -201,14 +201,14 @@ class Triangles:
     colours: NDArray[np.uint8] | None = None  # of the vertices, sRGB, (n, 3)
     scalars: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)  # of the vertices, (n,)
     filaments: Filaments | None = None  # of the triangles
-    tops: NDArray[np.float64] | None = (
-        None  # upper faces of the layers that are advised, above the lowest point
-    )
+    tops: NDArray[np.float64] | None = None  # upper faces of layers that are advised, above the lowest point
+    supported: NDArray[np.bool_] | None = None  # triangles at which supports are advised, (m,)
 
     @property
     def _arrays(self) -> tuple[Any, ...]:
         """Values of the fields."""
-        return self.vertices, self.triangles, self.colours, dict(self.scalars), self.filaments, self.tops
+        hints = self.filaments, self.tops, self.supported
+        return self.vertices, self.triangles, self.colours, dict(self.scalars), *hints
 
     def in_order(self) -> Triangles:
         """Sort the vertices by their first use, so that the triangles alone determine the arrays."""
@@ -223,8 +223,9 @@ class Triangles:
         """
         colours = None if self.colours is None else self.colours[index]
         scalars = {name: values[index] for name, values in self.scalars.items()}
-        filaments = self.filaments if len(triangles) == len(self.triangles) else None
-        return Triangles(self.vertices[index], triangles, colours, scalars, filaments, self.tops)
+        same = len(triangles) == len(self.triangles)
+        hints = (self.filaments, self.tops, self.supported) if same else (None, self.tops, None)
+        return Triangles(self.vertices[index], triangles, colours, scalars, *hints)
 
     def to_trimesh(self) -> trimesh.Trimesh:
         """Copy of the mesh as a `trimesh.Trimesh`, unprocessed.

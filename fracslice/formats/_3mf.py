@@ -65,12 +65,14 @@ def _write(mesh: Triangles, file: BinaryIO, metadata: Mapping[str, str], work: W
     """
     mesh = mesh.in_order()
     coloured, texts = mesh.colours is not None, 0
+    if mesh.supported is not None:
+        texts = len(ENFORCED) * int(mesh.supported.sum())
     parts, more = [mesh], _layer_heights(mesh)
     if mesh.filaments is not None:
         more |= _settings(mesh.filaments)
         parts += mesh.filaments.bodies
         lengths = np.array([len(text) for text in mesh.filaments.texts])
-        texts = 2 * int(lengths[mesh.filaments.text].sum())
+        texts += 2 * int(lengths[mesh.filaments.text].sum())
     vertices, triangles = (sum(len(getattr(p, name)) for p in parts) for name in ("vertices", "triangles"))
     is_large = _is_large(vertices, triangles, coloured, texts)
     blocks = work.ordered(lambda text: deflate(text()), _model(mesh, metadata))
@@ -189,7 +191,11 @@ def _model(mesh: Triangles, metadata: Mapping[str, str]) -> Iterator[Text]:
     if mesh.filaments is not None:
         yield from _printed(mesh, mesh.filaments, metadata)
         return
-    if mesh.colours is None:
+    if mesh.supported is not None:
+        spaces = f'<model xmlns:slic3rpe="{PAINTS}" '
+        yield from _texts(*_head(metadata, MODEL.replace("<model ", spaces)), PLAIN)
+        yield from _painted_element(mesh)
+    elif mesh.colours is None:
         yield from _texts(*_head(metadata), PLAIN)
         yield from mesh_element(mesh)
     else:
@@ -211,7 +217,7 @@ def _printed(mesh: Triangles, filaments: Filaments, metadata: Mapping[str, str])
         yield from _texts(f'<m:colorgroup id="{group}">{colour}</m:colorgroup>\n'.encode())
     if not filaments.bodies:
         yield from _texts(f'<object id="1" type="model" pid="{GROUP}" pindex="0">'.encode())
-        yield from _painted_element(mesh, filaments)
+        yield from _painted_element(mesh)
         yield from _texts(END)
         return
     for k, number, body in _numbered(filaments):
@@ -223,20 +229,28 @@ def _printed(mesh: Triangles, filaments: Filaments, metadata: Mapping[str, str])
     yield from _texts(PLAIN, f"<components>{''.join(components)}</components>".encode(), END)
 
 
-def _painted_element(mesh: Triangles, filaments: Filaments) -> Iterator[Text]:
-    """Mesh element whose triangles have the colour group of their filament, and its painting."""
+ENFORCED = ' slic3rpe:custom_supports="4" paint_supports="4"'
+"""Attributes of a triangle at which slicers put supports."""
+
+
+def _painted_element(mesh: Triangles) -> Iterator[Text]:
+    """Mesh element whose triangles have the colour group of their filament, and their painting."""
     yield from _texts(VERTICES)
     yield from vertex_rows(mesh.vertices)
     yield from _texts(TRIANGLES)
-    plain = "0"  # a triangle that is not painted
-    texts = [f' slic3rpe:mmu_segmentation="{t}" paint_color="{t}"' * (t != plain) for t in filaments.texts]
-    groups = [f' pid="{GROUP + k}" p1="0"' if k else "" for k in range(len(filaments.colours))]
+    groups, texts, plain = [""], [""], "0"  # the text of a triangle that is not painted
+    of = text = np.zeros(len(mesh.triangles), np.int32)
+    if (painted := mesh.filaments) is not None:
+        groups = [f' pid="{GROUP + k}" p1="0"' if k else "" for k in range(len(painted.colours))]
+        texts = [f' slic3rpe:mmu_segmentation="{t}" paint_color="{t}"' * (t != plain) for t in painted.texts]
+        of, text = painted.of.astype(np.int32), painted.text
+    held = of * 0 if mesh.supported is None else mesh.supported.astype(np.int32)
+    rows = np.column_stack([mesh.triangles, of, text, held])
 
     def block(part: slice) -> bytes:
-        given = mesh.triangles[part].tolist(), filaments.of[part].tolist(), filaments.text[part].tolist()
         lines = (
-            f'<triangle v1="{a}" v2="{b}" v3="{c}"{groups[of]}{texts[text]}/>\n'
-            for (a, b, c), of, text in zip(*given, strict=True)
+            f'<triangle v1="{a}" v2="{b}" v3="{c}"{groups[k]}{texts[t]}{ENFORCED * h}/>\n'
+            for a, b, c, k, t, h in rows[part].tolist()
         )
         return "".join(lines).encode()
 

@@ -152,14 +152,14 @@ class _Job:
             if self.what.colour is not None and not mesh_format(ending).has_colours:
                 coloured = ", ".join(name for name in ENDINGS if mesh_format(name).has_colours)
                 raise SceneError(f"colour: expected a file that holds colours: {coloured}")
-            if self.what.heights is not None and ending != ".3mf":
-                raise SceneError("heights: expected a file that holds heights of layers, .3mf")
-            if self.what.bodies and ending != ".3mf":
-                raise SceneError("bodies: expected a file that holds several, .3mf")
+            for name in ("heights", "bodies", "paint_supports"):
+                if getattr(self.what, name) and ending != ".3mf":
+                    raise SceneError(f"{name}: expected a file that holds them, .3mf")
         if self.what.colour is not None and self.clock.work.cluster is not None:
             raise SceneError(f"colour {self.what.colour}: expected no cluster and no shard")
-        if self.what.heights is not None and self.clock.work.cluster is not None:
-            raise SceneError("heights: expected no cluster and no shard")
+        for name in ("heights", "paint_supports"):
+            if getattr(self.what, name) and self.clock.work.cluster is not None:
+                raise SceneError(f"{name}: expected no cluster and no shard")
 
     @contextmanager
     def aside(self) -> Iterator[Callable[[], Path] | None]:
@@ -429,6 +429,10 @@ class Writing:
             meshes = tips_last(meshes, finish.tips)
         if self.what.colour is not None:
             meshes = self._painted(meshes, finish)
+        if self.what.paint_supports:
+            from ..mesh.checks import overhanging
+
+            meshes = (replace(mesh, supported=overhanging(mesh)) for mesh in meshes)
         if self.what.heights is not None:
             meshes = (replace(mesh, tops=self._tops()) for mesh in meshes)
         if self.path is None:

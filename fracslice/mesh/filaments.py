@@ -126,7 +126,7 @@ PLASTIC = np.array([0.7548776662466927, 0.5698402909980532])
 """Steps of a sequence that fills the unit square evenly (M. Roberts 2018, after the plastic number)."""
 
 
-def surface_points(mesh: Mesh, count: int) -> NDArray[np.float64]:
+def spread_points(mesh: Mesh, count: int) -> NDArray[np.float64]:
     """Points that are spread evenly over the triangles, the same on any machine, float64 [count, 3]."""
     upto = np.cumsum(np.linalg.norm(mesh.normals, axis=1))
     number = np.arange(count)
@@ -149,7 +149,7 @@ def with_filaments(
     """
     assert mesh.colours is not None
     if isinstance(wanted, int):
-        filaments = chosen_colours(colours_at(surface_points(mesh, SAMPLES)), np.ones(SAMPLES), wanted)
+        filaments = chosen_colours(colours_at(spread_points(mesh, SAMPLES)), np.ones(SAMPLES), wanted)
     else:
         filaments = parse_colours(wanted)
     numbers = nearest_filament(mesh.colours, filaments)

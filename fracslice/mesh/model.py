@@ -180,6 +180,8 @@ class Mesh(Triangles):
         Filaments of the triangles: their colours, and of which each triangle is.
     tops : ndarray of float64, optional
         Upper faces of the layers that are advised to slicers, above the lowest point.
+    supported : ndarray of bool, shape (m,), optional
+        Triangles at which supports are advised to slicers.
 
     Raises
     ------

@@ -25,7 +25,7 @@ from fracslice.mesh.filaments import (
     oklab,
     paint_triangles,
     painted_mesh,
-    surface_points,
+    spread_points,
 )
 from fracslice.records import MeshJob, Palette
 from fracslice.work import Work
@@ -71,7 +71,7 @@ def test_colours_between_vertices_count() -> None:
     )
     assert made.colours is not None and len(np.unique(made.colours, axis=0)) == 1
     assert made.mesh.filaments is not None and len(made.mesh.filaments.colours) == 2
-    points = surface_points(shapes.cube(2, (0, 0, 0)), 6000)
+    points = spread_points(shapes.cube(2, (0, 0, 0)), 6000)
     for axis in range(3):
         for side in (0, 2):
             assert (points[:, axis] == side).sum() == pytest.approx(1000, abs=3)
@@ -232,7 +232,7 @@ def test_palettes_have_the_names_of_materials() -> None:
         ("--colour material --palette viridis", "palette: expected a property of the orbit as the colour"),
         ("--filaments 3", "filaments: expected a colour, too, such as material or point"),
         ("--colour point --bodies", "bodies: expected filaments, too, such as 4"),
-        ("--colour point --filaments 2 --bodies", "bodies: expected a file that holds several, .3mf"),
+        ("--colour point --filaments 2 --bodies", "bodies: expected a file that holds them, .3mf"),
     ],
 )
 def test_what_is_wrong_is_one_line(
@@ -268,5 +268,5 @@ def test_heights_of_layers_are_those_of_the_slope(tmp_path: Path) -> None:
 def test_heights_need_a_range_and_a_file_that_holds_them(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="heights: expected a range, such as"):
         MeshJob(heights="0.1mm")
-    with pytest.raises(SceneError, match=r"expected a file that holds heights of layers, \.3mf"):
+    with pytest.raises(SceneError, match="heights: expected a file that holds them"):
         make_mesh(sphere(radius=10), heights="0.1mm..0.2mm", path=tmp_path / "x.stl")
