@@ -411,9 +411,15 @@ class LayerOptions(PreparationOptions):
 
 
 def write_page(
-    stack: Stack, report: PrintReport, lines: Sequence[str], title: str, path: str, work: Work
+    stack: Stack,
+    report: PrintReport,
+    lines: Sequence[str],
+    title: str,
+    path: str,
+    work: Work,
+    views: Sequence[bytes] = (),
 ) -> None:
-    """Write the summary page of layers that were checked."""
+    """Write the summary page of layers that were checked; `views`: pictures of the object, PNG."""
     import numpy as np
 
     from fracslice.checks.problems import verdict
@@ -424,7 +430,7 @@ def write_page(
         worst_layers(stack, report.worst, picture, work)
         problems = [str(problem) for problem in report.problems]
         areas, worst = np.array(report.areas), picture.getvalue()
-        file.write(page(title, lines, verdict(report.problems), problems, stack.tops, areas, worst))
+        file.write(page(title, lines, verdict(report.problems), problems, stack.tops, areas, worst, views))
 
 
 class ClusterOptions(RunOptions):

@@ -18,11 +18,12 @@ from .._native import bounds, connected_components, near
 from ..common.arrays import dot
 from ..common.messages import format_count, lacking
 from ..errors import MeshError
+from ..printing.walls import MeshSurface, thin_walls
 from ..volume import Plan
 from ..work import Work
 from .cleaning import Finished, quantise_mesh
 from .fit import NEAR, surface_error, surface_points
-from .model import Mesh, Nearest, component_sizes
+from .model import COLOUR, Mesh, Nearest, build, component_sizes
 from .shells import nesting
 
 
@@ -517,3 +518,22 @@ def _patches(mesh: Mesh, some: NDArray[np.bool_]) -> NDArray[np.intp]:
     result = np.zeros(len(mesh.triangles), np.intp)
     result[some] = labels[corners[:, 0]]
     return result
+
+
+HANGS, IS_THIN = (214, 40, 40), (240, 160, 30)
+"""Colours of triangles that hang in the air, and of thin walls, sRGB."""
+
+
+def marked(mesh: Mesh, wall: float, threads: int = 0) -> Mesh:
+    """A mesh for pictures: in red what hangs in the air, in orange walls that are thinner than `wall` mm."""
+    from scipy.spatial import cKDTree
+
+    tree = build(mesh, threads, halved=True)
+    walls = thin_walls(MeshSurface(mesh.vertices, mesh.triangles, *tree), len(mesh.triangles), wall, threads)
+    colours = np.tile(np.array(COLOUR, np.uint8), (len(mesh.triangles), 1))
+    if len(walls.width):
+        near, _ = cKDTree(walls.middle).query(mesh.corners.mean(1), distance_upper_bound=0.75 * wall)
+        colours[np.isfinite(near)] = IS_THIN
+    colours[overhanging(mesh)] = HANGS
+    corners = np.arange(3 * len(mesh.triangles), dtype=np.int32).reshape(-1, 3)
+    return Mesh(mesh.corners.reshape(-1, 3), corners, np.repeat(colours, 3, axis=0))

@@ -14,7 +14,7 @@ import pytest
 from fracslice import make_mesh
 from fracslice.errors import SceneError
 from fracslice.formulas import box, cylinder, sphere, transform, union
-from fracslice.mesh.checks import overhanging
+from fracslice.mesh.checks import HANGS, IS_THIN, marked, overhanging
 from fracslice.records import MeshJob
 from tests.mesh import shapes
 
@@ -42,6 +42,21 @@ def test_what_stands_on_the_plate_needs_none_and_the_lowest_of_a_hanging_ball_do
     near = low[np.hypot(low[:, 0] - x, low[:, 1]) < 4]
     assert near[:, 2].min() == pytest.approx(10, abs=0.1) and near[:, 2].max() < 10 + 4 * (1 - 0.707) + 0.1
     assert held.mean() < 0.2 and not held[made.corners.mean(1)[:, 2] < 9].any()
+
+
+def test_pictures_mark_what_hangs_and_what_is_thin() -> None:
+    fin = transform(box(size=(0.6, 12, 10)), translate=(10, 0, 18))
+    mesh = make_mesh(union(TABLE, fin), voxel="0.5mm").mesh
+    shown = marked(mesh, 0.8)
+    assert shown.colours is not None and shown.volume == pytest.approx(mesh.volume)
+    colours, middles = shown.colours[shown.triangles[:, 0]], shown.corners.mean(1)
+    x = mesh.vertices[:, 0].max() - 5  # of the fin
+    in_fin = (middles[:, 2] > 24.5) & (middles[:, 2] < 33)
+    sides = in_fin & (np.abs(np.abs(middles[:, 0] - x) - 0.3) < 0.01)
+    assert sides.any() and (colours[sides] == IS_THIN).all(1).mean() > 0.95
+    far = np.abs(middles[:, 0] - x) > 1.5
+    assert not (colours[far] == IS_THIN).all(1).any()
+    assert np.array_equal((colours == HANGS).all(1), overhanging(mesh))
 
 
 @pytest.mark.skipif(not shutil.which("prusa-slicer"), reason="needs prusa-slicer")
