@@ -188,7 +188,7 @@ def of_mesh(given: CheckOptions, work: Work) -> Checked:
     layered = in_layers(given, size.longest)
     faults = problems_of("mesh", MeshEvidence(report.mesh, report.problems, made.whole))
     how = given.printing(scene.printing)
-    whole = Variant(scene.root, size, how, given.up, scene, faults)
+    whole = Variant(scene.root, size, how, given.up, scene, faults, mesh=made.whole)
     layers, lines, problems = of_layers(whole, layered, work)
     return report.as_dict() | {"layers": layers}, [summary(given.source, report), *lines], problems
 
@@ -246,7 +246,8 @@ def of_model(given: CheckOptions, work: Work) -> Checked:
     sides = Sizing(side, 1 / factor, (factor,) * 3)
     field = MeshField(replace(mesh, vertices=mesh.vertices - mesh.bounds.mean(0)))
     turns = given.up == UP and x == y == z
-    made = Variant(field, sides, given.printing(Print()), given.up, faults=faults, turns=turns)
+    how = given.printing(Print())
+    made = Variant(field, sides, how, given.up, faults=faults, mesh=mesh, turns=turns)
     layers, lines, problems = of_layers(made, layered, work)
     return numbers | {"layers": layers}, [line, *lines], problems
 
@@ -278,6 +279,7 @@ class Variant:
     scene: Scene | None = None  # that it was read from; None for a model
     faults: Sequence[Problem] = ()  # problems of its mesh
     flags: tuple[str, ...] = ()
+    mesh: Mesh | None = None  # its mesh, if there is one
     turns: bool = True  # whether --fix may try other directions up
 
     def changed(self, settings: dict[str, str]) -> Variant:
@@ -337,7 +339,8 @@ def of_layers(made: Variant, given: CheckOptions, work: Work) -> Checked:
     if best.shown and given.picture:
         draw(*best.shown, given.picture, work)
     if best.shown and given.html:
-        write_page(*best.shown, [figures_of(best.shown[1])], given.source, given.html, work)
+        drawn = views(made.mesh, given) if made.mesh is not None and best is first else []
+        write_page(*best.shown, [figures_of(best.shown[1])], given.source, given.html, work, drawn)
     if given.fixed:
         write_mesh(best.variant, given, work)
     lines = [f"{given.source}: {first.text}"]
@@ -347,6 +350,15 @@ def of_layers(made: Variant, given: CheckOptions, work: Work) -> Checked:
     lines += refused
     lines += [f"with {flags}: {best.text}"] if flags else []
     return {"before": first.numbers, "flags": flags, "after": best.numbers}, lines, best.problems
+
+
+def views(mesh: Mesh, given: CheckOptions) -> list[bytes]:
+    """Pictures of a mesh from above and from below, with what hangs in the air and what is thin."""
+    from fracslice.mesh.checks import marked
+    from fracslice.mesh.model import AXES, BELOW, thumbnail
+
+    shown = marked(mesh, given.wall, given.threads)
+    return [thumbnail(shown, axes) for axes in (AXES, BELOW)]
 
 
 def mended_object(first: Attempt, given: CheckOptions, work: Work) -> tuple[Attempt, list[str]]:

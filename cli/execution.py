@@ -189,13 +189,16 @@ def is_model(source: str) -> bool:
     return Path(source).suffix.lower() in ENDINGS
 
 
-def load_model(source: str) -> Mesh:
-    """Read the mesh of a model file. Raises `BadInput` if it cannot be read."""
-    from fracslice.mesh.models import read_mesh
+def load_model(source: str, coloured: bool = False) -> Mesh:
+    """Read the mesh of a model file. Raises `BadInput` if it cannot be read.
+
+    `coloured`: with colours, not welded.
+    """
+    from fracslice.mesh.models import read_coloured, read_mesh
 
     try:
         with stopped_at_once():
-            return read_mesh(source)
+            return read_coloured(source) if coloured else read_mesh(source)
     except MeshError as error:
         raise BadInput(str(error)) from error
 

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import click
 
-from fracslice.common.messages import decimal
+from fracslice.common.messages import decimal, format_count
 from fracslice.common.parameters import alternatives
 from fracslice.formats import ENDINGS
+from fracslice.records import PartsJob
 
 from .execution import (
     DENSITIES,
     BadInput,
     check_folder,
     check_targets,
+    figures,
     load_scene,
     of_mesh,
     refuse_moved,
@@ -27,6 +29,7 @@ from .execution import (
 )
 from .options import (
     AMOUNT,
+    FOR_SLICERS,
     INTERVAL,
     SECONDS,
     ClusterOptions,
@@ -41,6 +44,8 @@ from .options import (
 from .sweeps import MOST, TABLE, families, going_on, is_table, with_suffix
 
 if TYPE_CHECKING:
+    from fracslice.fields.box import Triple
+    from fracslice.jobs.divided import Parted
     from fracslice.jobs.report import Report, Result
     from fracslice.scene import Scene
     from fracslice.store import Store
@@ -90,10 +95,18 @@ class MeshFileOptions(ClusterOptions, MeshOptions):
     price: float | None = option(AMOUNT, "Price of a kilogram.")
 
 
-@command(MeshFileOptions)
+class WholeOptions(MeshFileOptions):
+    """Options of `mesh`."""
+
+    records = (PartsJob,)
+    bed: Triple | None
+    parts: tuple[int, int, int] | str | None
+
+
+@command(WholeOptions)
 @families("output", "report", "picture")
-def mesh(given: MeshFileOptions) -> int:
-    """Make a printable mesh of SCENE, and print a summary.
+def mesh(given: WholeOptions) -> int:
+    """Make a printable mesh of SCENE, and print a summary. With --bed or --parts, make it in parts.
 
     Exit status: 1 if the mesh would not print; the file is written. A mesh
     that does not fit in memory is made piece after piece if it goes to an .stl file.
@@ -104,7 +117,55 @@ def mesh(given: MeshFileOptions) -> int:
     fracslice mesh geode -o geode.3mf --thickness 0.8mm --bridge 1.5mm
     fracslice mesh menger-sponge -o sponge.stl --set menger.level=1..3
     """
-    return make_files(given)
+    return make_files(given) if given.bed is None and given.parts is None else make_parted(given)
+
+
+NO_PARTS = frozenset({"implicit", "report", "seconds", "every", "cluster", "shard", "store", *FOR_SLICERS})
+"""Options that parts do not have."""
+
+
+def make_parted(given: WholeOptions) -> int:
+    """Make the meshes of an object in parts, and one file or several."""
+    from fracslice.fields.devices import choose_device
+    from fracslice.jobs.divided import make_parts, write_parts
+    from fracslice.jobs.mesh import metadata
+
+    refuse_options(NO_PARTS, "not for an object in parts")
+    how = PartsJob(**given.values(PartsJob))
+    check_targets(given.source, given.output, given.picture)
+    if given.picture is not None:
+        from fracslice.viewer import need_pyvista
+
+        need_pyvista()
+    scene = load_scene(given.source, given.settings)
+    with given.working(store=store_in(given.cache), device=choose_device(given.device)) as work:
+        made = make_parts(scene, given.mesh_job(scene), how, work, given.output)
+        files = write_parts(made, given.output, metadata(scene), work)
+        if given.picture is not None:
+            from fracslice.viewer import picture as draw
+
+            draw(made.exploded(), given.picture)
+    if not given.quiet:
+        click.echo(os.linesep.join(parted_lines(made, [str(file) for file in files])))
+    return 1 if any(mesh.report.problems for mesh in made.meshes) else 0
+
+
+def parted_lines(made: Parted, files: list[str]) -> Iterator[str]:
+    """Lines on the parts of an object."""
+    divided, named = made.divided, made.named
+    for index, (name, mesh, count) in enumerate(named):
+        title = files[index] if len(files) == len(named) else f"{files[0]}, part {name}"
+        copies = f", {count} times" if count > 1 else ""
+        yield f"{title}: {figures(mesh.report.mesh, mesh.report.problems)}{copies}"
+    if divided.pegs:
+        size = f"{divided.diameter:g} mm thick, {divided.length:g} mm long"
+        yield f"{format_count(len(divided.pegs), 'peg')}, {size}"
+    if divided.bare:
+        yield f"{format_count(divided.bare, 'joint')} without a place for a peg: glue, or other --parts"
+    if silent := [str(n) for n, part in enumerate(divided.parts, 1) if part.number is None]:
+        yield f"no place for the number of part {', '.join(silent)}"
+    if made.bed is not None and len(files) == 1:
+        yield format_count(made.beds, "bed")
 
 
 def whole(scene: Scene, _: Work) -> Parts:
@@ -118,7 +179,7 @@ def make_files(given: MeshFileOptions, parts: Callable[[Scene, Work], Parts] = w
 
     check_outputs(given)
     if Path(given.output).suffix.lower() == GRID:
-        names = {"chord", "simplify", "faces", "colour", "cluster", "shard", "store"}
+        names = {"chord", "simplify", "faces", *FOR_SLICERS, "cluster", "shard", "store"}
         refuse_options(names, "only for meshes, and a .vdb file holds distances on a grid")
     if given.implicit:
         refuse_what_needs_triangles(given.output)
@@ -176,7 +237,7 @@ def refuse_what_needs_triangles(output: str) -> None:
         "chord",
         "simplify",
         "faces",
-        "colour",
+        *FOR_SLICERS,
         "dust",
         "report",
         "picture",
@@ -232,7 +293,12 @@ def make_and_write(scene: Scene, given: MeshFileOptions, work: Work) -> Result:
     if picture is not None:
         from fracslice.viewer import picture as draw
 
-        draw(result.mesh, picture)
+        shown = result.mesh
+        if shown.filaments is not None:
+            from fracslice.mesh.filaments import painted_mesh
+
+            shown = painted_mesh(shown)
+        draw(shown, picture)
     return result
 
 

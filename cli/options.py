@@ -18,6 +18,7 @@ import click
 
 from fracslice.common.parameters import (
     Choice,
+    Colours,
     Count,
     Duration,
     Flag,
@@ -137,6 +138,8 @@ def metavar(kind: Parameter) -> str:
     """What stands for a value in the help."""
     if isinstance(kind, Count):
         return "|".join([*kind.words, "N"])
+    if isinstance(kind, Colours):
+        return "N|COLOUR,..." if kind.counted else "NAME|COLOUR,..."
     if isinstance(kind, Choice | Listed):
         return "|".join(map(str, kind.choices if isinstance(kind, Choice) else kind.values))
     if isinstance(kind, Heights):
@@ -356,11 +359,15 @@ class PreparationOptions(SceneOptions):
         return changed
 
 
+FOR_SLICERS = frozenset({"colour", "palette", "filaments", "bodies", "heights", "paint_supports"})
+"""Fields of meshes with colours, and with hints for slicers."""
+
+
 class MeshOptions(PreparationOptions):
     """Options of meshes without colours."""
 
     records: ClassVar[Records] = (MeshJob,)
-    without = frozenset({"colour"})
+    without = FOR_SLICERS
 
     def mesh_job(self, scene: Scene) -> MeshJob:
         """Mesh job of a scene."""
@@ -404,9 +411,15 @@ class LayerOptions(PreparationOptions):
 
 
 def write_page(
-    stack: Stack, report: PrintReport, lines: Sequence[str], title: str, path: str, work: Work
+    stack: Stack,
+    report: PrintReport,
+    lines: Sequence[str],
+    title: str,
+    path: str,
+    work: Work,
+    views: Sequence[bytes] = (),
 ) -> None:
-    """Write the summary page of layers that were checked."""
+    """Write the summary page of layers that were checked; `views`: pictures of the object, PNG."""
     import numpy as np
 
     from fracslice.checks.problems import verdict
@@ -417,7 +430,7 @@ def write_page(
         worst_layers(stack, report.worst, picture, work)
         problems = [str(problem) for problem in report.problems]
         areas, worst = np.array(report.areas), picture.getvalue()
-        file.write(page(title, lines, verdict(report.problems), problems, stack.tops, areas, worst))
+        file.write(page(title, lines, verdict(report.problems), problems, stack.tops, areas, worst, views))
 
 
 class ClusterOptions(RunOptions):

@@ -9,12 +9,13 @@ from .options import MeshOptions, argument, command
 class ShowOptions(MeshOptions):
     """Options of `show`."""
 
+    without = frozenset({"bodies", "heights", "paint_supports"})
     source: str = argument("MODEL|SCENE")
 
 
 @command(ShowOptions)
 def show(given: ShowOptions) -> None:
-    """Open a window on a model file, or on the mesh of a scene.
+    """Open a window on a model file, or on the mesh of a scene, in its colours if it has some.
 
     All options but --threads and --quiet are for scenes.
 
@@ -28,7 +29,7 @@ def show(given: ShowOptions) -> None:
     if is_model(given.source):
         names = {*vars(given), "formulas"} - {"source", "threads", "quiet"}
         refuse_options(names, "only for scenes, and a model was given")
-        viewer.show(load_model(given.source))
+        viewer.show(load_model(given.source, coloured=True))
         return
     from fracslice.jobs.mesh import make_mesh
 

@@ -6,6 +6,7 @@ made from it.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Literal, TypeAlias, get_args
 
@@ -14,6 +15,7 @@ from .common.parameters import (
     AnyLength,
     AnyScale,
     Choice,
+    Colours,
     Count,
     Duration,
     Flag,
@@ -27,6 +29,7 @@ from .common.parameters import (
     Pixels,
     Record,
     Shift,
+    Sides,
     Triple,
     Vector,
     attribute,
@@ -50,6 +53,12 @@ RESOLUTION = 256.0
 
 Colour: TypeAlias = Literal["material", "point", "axes", "planes", "sphere", "steps", "direction"]
 """What the colours of vertices show: the materials of the scene, or a property of the orbit."""
+
+Palette: TypeAlias = Literal["viridis", "plasma", "inferno", "magma", "cividis", "twilight"]
+"""Palettes by name."""
+
+MOST_FILAMENTS = 16
+"""Most filaments that slicers tell apart in painted triangles."""
 
 COARSEST, FINEST = 8, 16384
 """Limits of the voxels along the longest side."""
@@ -252,6 +261,36 @@ class MeshJob(Placed):
         "property of the orbit",
         get_args(Colour),
     )
+    palette: str | Sequence[str] | None = attribute(
+        Colours,
+        None,
+        "palette that a property of the orbit is shown in, by name or as its colours; viridis by default",
+        words=get_args(Palette),
+    )
+    filaments: int | str | Sequence[str] | None = attribute(
+        Colours,
+        None,
+        "filaments that a coloured mesh is printed with: how many, or their colours; in .3mf files, "
+        "triangles are painted for slicers",
+        most=MOST_FILAMENTS,
+        counted=True,
+    )
+    bodies: bool = attribute(
+        Flag, False, "in place of painted triangles, an .3mf file has a body for each filament"
+    )
+    heights: Given[AnyLength | Sequence[AnyLength | None] | None, tuple[float, float | None] | None] = (
+        attribute(
+            Heights,
+            None,
+            "heights of layers for slicers in an .3mf file, such as 0.1mm..0.3mm: thick where the surface is "
+            "steep",
+        )
+    )
+    paint_supports: bool = attribute(
+        Flag,
+        False,
+        "in an .3mf file, triangles are painted at which slicers shall put supports: islands, flat overhangs",
+    )
     proved: bool = attribute(
         Flag, False, "space is skipped by proofs only, not by the measured bounds of fractals"
     )
@@ -265,6 +304,18 @@ class MeshJob(Placed):
         if self.simplify is not None and self.faces is not None:
             raise SceneError("simplify and faces: expected one of them")
         validate(self, SceneError)
+        if self.palette is not None and self.colour in (None, "material"):
+            raise SceneError("palette: expected a property of the orbit as the colour, such as point")
+        if self.filaments is not None and self.colour is None:
+            raise SceneError("filaments: expected a colour, too, such as material or point")
+        if self.bodies and self.filaments is None:
+            raise SceneError("bodies: expected filaments, too, such as 4")
+        if self.heights is not None and self.heights[1] is None:
+            raise SceneError("heights: expected a range, such as 0.1mm..0.3mm")
+        if self.paint_supports and self.colour is not None and self.filaments is None:
+            raise SceneError("paint_supports and a colour: expected filaments, too")
+        if self.paint_supports and self.bodies:
+            raise SceneError("paint_supports and bodies: expected one of them")
 
     def edits(self, scene: Scene) -> Print:
         """Changes for printing.
@@ -339,6 +390,56 @@ class MeshJob(Placed):
                 f"voxel {self.voxel:g}mm: expected {low:.4g}mm to {high:.4g}mm for an object of {size:g}mm"
             )
         return size / self.voxel
+
+
+@record
+class PartsJob(Record):
+    """Parameters of an object in parts.
+
+    Raises
+    ------
+    SceneError
+        For invalid values.
+    """
+
+    bed: Given[Sequence[AnyLength] | str | None, Triple | None] = attribute(
+        Sides, None, "make parts that fit a printer of this size, such as 220x220x250mm"
+    )
+    parts: Given[Sequence[int] | str | None, tuple[int, int, int] | str | None] = attribute(
+        Pixels,
+        None,
+        "parts along x, y and z, or auto: as few as fit the bed",
+        sign="x",
+        names=("parts along x", "y", "z"),
+        example="2x1x1",
+        letters="auto|NxNxN",
+        least=1,
+        most=64,
+        words=("auto",),
+    )
+    clearance: Given[AnyLength, float] = attribute(
+        Length, 0.15, "gap around the pegs that join parts", zero=True
+    )
+
+    def __post_init__(self) -> None:
+        validate(self, SceneError)
+        if self.parts == "auto" and self.bed is None:
+            raise SceneError("parts auto: expected a bed, too, such as 220x220x250mm")
+
+    def side(self, axis: int) -> float:
+        """Longest part along an axis, mm.
+
+        Parameters
+        ----------
+        axis : int
+            0 to 2.
+
+        Returns
+        -------
+        float
+            Side of the bed, or infinity.
+        """
+        return math.inf if self.bed is None else self.bed[axis]
 
 
 @record

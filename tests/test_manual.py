@@ -133,6 +133,7 @@ def test_commands_are_understood(line: str, folder: Path, monkeypatch, capfd) ->
         return
     for work in (
         "jobs.mesh.make_mesh",
+        "jobs.divided.make_parts",
         "mesh.checks.repair",
         "jobs.mesh.make_implicit",
         "slicing.plan_stack",
@@ -148,6 +149,7 @@ def test_commands_are_understood(line: str, folder: Path, monkeypatch, capfd) ->
     monkeypatch.setattr("fracslice.viewer.show", begin)
     monkeypatch.setattr("fracslice.studio.session.Studio", begin)
     monkeypatch.setattr("shutil.which", lambda name: name)
+    monkeypatch.setattr("fracslice.export.slicer_profiles.Shipped.write", lambda *_: [])
     monkeypatch.setattr("fracslice.viewer.need_screen", lambda: None)
     with pytest.raises(BegunError):
         print(run(words), capfd.readouterr().err)

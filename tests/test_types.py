@@ -25,7 +25,8 @@ ball = Scene(sphere(), size_mm="40mm", name="ball", view=View(), printing=how, a
 unit = Scene(sphere(), None, unit_mm="1cm")
 job = MeshJob(size="4cm", voxel="0.5mm", resolution=None, dust=1, printing=how,
               chord="10um", simplify="0.1mm", up=[0, 0, 1], scale="102%",
-              colour="point", proved=False, faces=None)
+              colour="point", proved=False, faces=None, palette=("#000", "#fff"), filaments=4,
+              bodies=True, heights=(0.1, "0.3mm"), paint_supports=False)
 layers = SliceJob(size="40mm", layer="0.1mm", pixel=("0.1mm", 0.1), up=(0, 0, 1), printing=how,
                   scale=(1, 1, 1.02), printer=None, compensation="50um", gamma=1, mirror=None, levels=8,
                   blur=1, sections=2)

@@ -75,6 +75,11 @@ class MeshKeywords(PlacedKeywords, total=False):
     faces: int | None
     dust: float | None
     colour: Colour | None
+    palette: str | Sequence[str] | None
+    filaments: int | str | Sequence[str] | None
+    bodies: bool | None
+    heights: AnyLength | Sequence[AnyLength | None] | None
+    paint_supports: bool | None
     proved: bool | None
 
 

@@ -181,6 +181,17 @@ def affine(values: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
     return linear, offset
 
 
+@dataclass(frozen=True, eq=False)
+class Filaments:
+    """Filaments of which triangles are printed."""
+
+    colours: NDArray[np.uint8]  # of the filaments, sRGB, (k, 3)
+    of: NDArray[np.uint8]  # filament of the largest part of each triangle, (m,)
+    texts: tuple[str, ...]  # how triangles are painted, as slicers store it
+    text: NDArray[np.int32]  # number of the text of each triangle, (m,)
+    bodies: tuple[Triangles, ...] = ()  # the solid of each filament, if they are wanted
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Triangles:
     """Triangles as they are in a file. `Mesh` adds measures and checks of the arrays."""
@@ -189,11 +200,15 @@ class Triangles:
     triangles: NDArray[np.int32]  # vertex indices, (m, 3), counter-clockwise seen from outside
     colours: NDArray[np.uint8] | None = None  # of the vertices, sRGB, (n, 3)
     scalars: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)  # of the vertices, (n,)
+    filaments: Filaments | None = None  # of the triangles
+    tops: NDArray[np.float64] | None = None  # upper faces of layers that are advised, above the lowest point
+    supported: NDArray[np.bool_] | None = None  # triangles at which supports are advised, (m,)
 
     @property
     def _arrays(self) -> tuple[Any, ...]:
         """Values of the fields."""
-        return self.vertices, self.triangles, self.colours, dict(self.scalars)
+        hints = self.filaments, self.tops, self.supported
+        return self.vertices, self.triangles, self.colours, dict(self.scalars), *hints
 
     def in_order(self) -> Triangles:
         """Sort the vertices by their first use, so that the triangles alone determine the arrays."""
@@ -202,13 +217,15 @@ class Triangles:
         return self._taken(*in_order(self.triangles, len(self.vertices)))
 
     def _taken(self, index: NDArray[Any], triangles: NDArray[np.int32]) -> Triangles:
-        """Triangles of some of the vertices, with their colours and scalars.
+        """Triangles of some of the vertices, with colours and scalars; with filaments, if none is left out.
 
         `index`: int (k,), of the vertices; `triangles`: int32 (m, 3), of their numbers among these.
         """
         colours = None if self.colours is None else self.colours[index]
         scalars = {name: values[index] for name, values in self.scalars.items()}
-        return Triangles(self.vertices[index], triangles, colours, scalars)
+        same = len(triangles) == len(self.triangles)
+        hints = (self.filaments, self.tops, self.supported) if same else (None, self.tops, None)
+        return Triangles(self.vertices[index], triangles, colours, scalars, *hints)
 
     def to_trimesh(self) -> trimesh.Trimesh:
         """Copy of the mesh as a `trimesh.Trimesh`, unprocessed.
@@ -235,10 +252,13 @@ NO_TRIANGLES = Triangles(np.empty((0, 3)), np.empty((0, 3), np.int32))
 
 
 def concatenate(parts: Sequence[T]) -> T:
-    """Concatenate triangles without welding, and without colours and scalars."""
+    """Concatenate triangles without welding and scalars, with colours if all have them."""
+    coloured = [part.colours for part in parts if len(part.vertices)]
+    known = [colours for colours in coloured if colours is not None]
     offsets = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
     triangles = [part.triangles + np.int32(offset) for part, offset in zip(parts, offsets, strict=True)]
-    return type(parts[0])(np.concatenate([part.vertices for part in parts]), np.concatenate(triangles))
+    whole = np.concatenate([part.vertices for part in parts]), np.concatenate(triangles)
+    return type(parts[0])(*whole, np.concatenate(known) if known and len(known) == len(coloured) else None)
 
 
 def count(part: Triangles) -> int:
@@ -265,7 +285,7 @@ def moved(part: Triangles, vertices: NDArray[np.float64], matrix: NDArray[np.flo
     `matrix`: its linear part, (3, 3).
     """
     order = -1 if np.linalg.det(matrix) < 0 else 1
-    return Triangles(vertices, part.triangles[:, ::order])
+    return Triangles(vertices, part.triangles[:, ::order], part.colours)
 
 
 DEEPEST, MOST_PARTS = 32, 1 << 16

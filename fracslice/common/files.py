@@ -16,7 +16,7 @@ import tempfile
 import threading
 import zipfile
 import zlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -550,7 +550,8 @@ RELATIONS = (
     '<Relationship Target="/3D/3dmodel.model" Id="model" '
     'Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>'
 )
-SMALL = ("[Content_Types].xml", TYPES.encode()), ("_rels/.rels", RELATIONS.encode())
+CONTENT = "[Content_Types].xml"
+SMALL = (CONTENT, TYPES.encode()), ("_rels/.rels", RELATIONS.encode())
 """Members of a package besides the model."""
 
 LEVEL = 3  # of deflate: a third of the time of the default 6, for files a twentieth larger
@@ -588,10 +589,19 @@ def combine_checksums(one: TextSum, other: TextSum) -> TextSum:
     return TextSum(crc32_combine(one.crc, other.crc, other.size), one.size + other.size)
 
 
-def join(file: BinaryIO, fragments: Iterable[Fragment], is_large: bool) -> None:
-    """Write a package whose model is made of fragments. Its members carry no time."""
+def join(
+    file: BinaryIO, fragments: Iterable[Fragment], is_large: bool, more: Mapping[str, bytes] | None = None
+) -> None:
+    """Write a package whose model is made of fragments. Its members carry no time.
+
+    `more`: further members, texts by their names.
+    """
+    more = dict(more or {})
+    endings = sorted({name.rpartition(".")[2] for name in more})
+    kinds = "".join(f'<Default Extension="{end}" ContentType="text/plain"/>' for end in endings)
+    small = dict(SMALL) | {CONTENT: TYPES.replace("</Types>", f"{kinds}</Types>").encode()} | more
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=LEVEL) as archive:
-        for name, text in SMALL:
+        for name, text in small.items():
             archive.writestr(zipfile.ZipInfo(name), text, zipfile.ZIP_DEFLATED)
         info, whole = zipfile.ZipInfo("3D/3dmodel.model"), TextSum(0, 0)
         info.compress_type, info.external_attr = zipfile.ZIP_DEFLATED, 0o600 << 16

@@ -225,6 +225,55 @@ class Count(Parameter):
 
 
 @dataclass(frozen=True)
+class Colours(Parameter):
+    """Colours as in #000,#fff,#e33; in place of them, one of some words, or how many there are.
+
+    Attributes
+    ----------
+    least, most : int
+        Inclusive limits of their number.
+    words : tuple of str
+        Words that are allowed, too.
+    counted : bool
+        True if a number of colours is allowed, too.
+    """
+
+    least: int = 2
+    most: int = 8
+    words: tuple[str, ...] = ()
+    counted: bool = False
+
+    @property
+    def expects(self) -> str:
+        limits = f"{self.least} to {self.most}"
+        count = [f"a number from {limits}"] if self.counted else []
+        return alternatives(*self.words, *count, f"{limits} colours such as #000,#fff,#e33")
+
+    def read(self, text: str) -> Any:
+        if self.counted and re.fullmatch(r"\s*[0-9]{1,9}\s*", text):
+            return self.check(int(text))
+        return self.check(text.strip())
+
+    def check(self, value: Any) -> Any:
+        if isinstance(value, str) and value in self.words:
+            return value
+        if isinstance(value, Integral) and self.counted and self.least <= int(value) <= self.most:
+            return int(value)
+        given = value.split(",") if isinstance(value, str) else list(items(value))
+        matches = [_COLOUR.fullmatch(one.strip()) if isinstance(one, str) else None for one in given]
+        if not self.least <= len(given) <= self.most or None in matches:
+            raise ValueError(self.expects)
+        digits = [match[1].lower() for match in matches if match]
+        return tuple(f"#{d if len(d) == 6 else ''.join(2 * c for c in d)}" for d in digits)
+
+    def text(self, value: Any) -> str:
+        return str(value) if isinstance(value, str | int) else ",".join(value)
+
+
+_COLOUR = re.compile(r"#([0-9a-fA-F]{6}|[0-9a-fA-F]{3})")
+
+
+@dataclass(frozen=True)
 class Vector(Bounded):
     """Several finite numbers, separated by spaces; the limits hold for each.
 
@@ -693,6 +742,37 @@ class Heights(Length):
 
 
 @dataclass(frozen=True)
+class Sides(Length):
+    """Parameter kind of three lengths, such as 220x220x250mm: a unit is that of the lengths before it, too.
+    Its values are in mm.
+    """
+
+    expects = "three lengths such as 220x220x250mm"
+
+    def read(self, text: str) -> Any:
+        """Parse three lengths with x between; see `Parameter.read`."""
+        words = [word.strip() for word in text.split("x")]
+        unit = words[-1].lstrip("0123456789.+-eE ")
+        return self.check(tuple(word if word[-1:].isalpha() else word + unit for word in words))
+
+    def check(self, value: Any) -> Any:
+        """Validate text or three lengths; see `Parameter.check`."""
+        if isinstance(value, str):
+            return self.read(value)
+        try:
+            sides = tuple(Length(None, "").check(side) for side in items(value))
+        except ValueError:
+            sides = ()
+        if len(sides) != 3:
+            raise ValueError(self.expects)
+        return sides
+
+    def text(self, value: Any) -> str:
+        """Format three lengths; see `Parameter.text`."""
+        return f"{'x'.join(f'{side:.6g}' for side in value)}mm"
+
+
+@dataclass(frozen=True)
 class Percent(Parameter):
     """Parameter kind of scale factors along x, y and z: percentages, or numbers in Python."""
 
@@ -735,6 +815,8 @@ class Pixels(Parameter):
         Text of a value, and what stands for it in the help of a command.
     least, most : int
         Inclusive limits of each number.
+    words : tuple of str
+        Words that are allowed in place of numbers.
     """
 
     sign: str = ","
@@ -743,22 +825,25 @@ class Pixels(Parameter):
     letters: str = "X,Y,W,H"
     least: int = 0
     most: int = 32768
+    words: tuple[str, ...] = ()
 
     @property
     def expects(self) -> str:
         """Description of the accepted values."""
         *others, last = self.names
         names = f"{', '.join(others)} and {last}"
-        return f"{names}, such as {self.example}, from {self.least} to {self.most}"
+        return alternatives(*self.words, f"{names}, such as {self.example}, from {self.least} to {self.most}")
 
-    def read(self, text: str) -> tuple[int, ...]:
+    def read(self, text: str) -> Any:
         """Parse numbers with the sign between; see `Parameter.read`."""
+        if text.strip() in self.words:
+            return text.strip()
         words = [word.strip() for word in text.split(self.sign)]
         if not all(re.fullmatch(r"\d{1,9}", word) for word in words):
             raise ValueError(self.expects)
         return self.check(tuple(map(int, words)))
 
-    def check(self, value: Any) -> tuple[int, ...]:
+    def check(self, value: Any) -> Any:
         """Validate text or numbers; see `Parameter.check`."""
         if isinstance(value, str):
             return self.read(value)
@@ -771,7 +856,7 @@ class Pixels(Parameter):
 
     def text(self, value: Any) -> str:
         """Format the numbers; see `Parameter.text`."""
-        return self.sign.join(map(str, value))
+        return value if isinstance(value, str) else self.sign.join(map(str, value))
 
 
 def picture_size(default: Any, doc: str) -> Pixels:

@@ -24,6 +24,7 @@ import tempfile
 import threading
 import time
 import uuid
+import zipfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -31,12 +32,14 @@ from functools import partial
 from http.client import HTTPConnection, HTTPException
 from io import BufferedReader
 from pathlib import Path
+from typing import IO, NamedTuple
 from urllib.parse import quote, urlsplit
 
 from ..common.files import check_target, read_text, reporting_errors, temporary_folder
 from ..common.parameters import printable
 from ..errors import ExportError
 from ..work import Work
+from .slicer_profiles import Shipped, shipped
 
 PACKET = 1 << 20
 """Bytes of a packet of SDCP."""
@@ -260,6 +263,10 @@ when the work is cancelled, and when this process is killed.
 """
 
 _WARNING = re.compile(r"\b(warning|error)\b", re.IGNORECASE)
+_SETTING = re.compile(r"""[;\s,{-]*([\w.]+\s*=|["'][\w. ]+["']\s*[=:])""")
+"""A setting, such as error_limit = 3 or "error": 3."""
+LONGEST_LINE = 300
+"""Most characters of a line that is passed on."""
 _LOG = re.compile(r"^\[[^]]*\]\s*\[[^]]*\]\s*\[(\w+)\]\s*")
 """Time, thread and severity before a message of PrusaSlicer."""
 
@@ -273,6 +280,7 @@ class FilamentSlicer:
     model: str  # extensions of the file that it reads and of the one that it writes
     output: str
     command: Command  # makes its command line
+    folders: tuple[str, ...] = ()  # names of folders in which its profiles may be
 
     @property
     def program(self) -> str:
@@ -288,16 +296,87 @@ class FilamentSlicer:
         """Check that the program is installed and its profiles can be passed to it."""
         self.command(self.program, profiles, Path(self.model), Path(self.output))
 
-    def slice(self, model: Path, profiles: Sequence[str], path: Path, work: Work) -> list[str]:
-        """Slice a model."""
+    def shipped(self) -> Shipped:
+        """Profiles of the printers that it knows."""
+        return shipped(self.title, self.folders, self.program)
+
+    def slice(
+        self, model: Path, profiles: Sequence[str], path: Path, work: Work
+    ) -> tuple[list[str], Figures]:
+        """Slice a model. Returns warnings, and what the file says of the print."""
         program, target = self.program, check_target(path)
         with temporary_folder(target.parent) as folder:
             made = folder / target.name
             output = _run_program(self.command(program, profiles, model, made), work, self.title)
             if not made.exists():
                 raise ExportError(f"{self.title} wrote no file: {_last(output)}")
+            figures = read_figures(made)
             os.replace(made, target)
-        return _warnings(output)
+        return _warnings(output), figures
+
+
+class Figures(NamedTuple):
+    """What a slicer says of a print; None for what it does not."""
+
+    seconds: float | None = None
+    grams: float | None = None
+    cost: float | None = None
+    metres: float | None = None
+
+
+EDGE = 1 << 18
+"""Bytes at either end of G-code in which the comments on the whole print are."""
+_TIMES = (
+    re.compile(rb"^; estimated printing time \(normal mode\) = (.+)$", re.M),  # PrusaSlicer, OrcaSlicer
+    re.compile(rb"^;.* total estimated time: (.+)$", re.M),  # Bambu Studio
+    re.compile(rb"^;TIME:([\d.]+)\s*$", re.M),  # CuraEngine
+)
+_GRAMS = re.compile(rb"^; total filament (?:used \[g\] =|weight \[g\] ?:)(.+)$", re.M)
+_COST = re.compile(rb"^; total filament cost =(.+)$", re.M)
+_LENGTHS = (
+    (0.001, re.compile(rb"^; (?:filament used \[mm\] =|total filament length \[mm\] ?:)(.+)$", re.M)),
+    (1.0, re.compile(rb"^;Filament used:(.+)$", re.M)),
+)
+_UNITS = {b"d": 86400, b"h": 3600, b"m": 60, b"s": 1, b"": 1}
+
+
+def read_figures(path: Path) -> Figures:
+    """Read what G-code says of a print: that of a file, or of all plates of a project."""
+    if path.suffix.lower() != ".3mf":
+        with reporting_errors(path), open(path, "rb") as file:
+            return _figures(file)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = [name for name in archive.namelist() if name.endswith(".gcode")]
+            plates = [_figures(archive.open(name)) for name in names]
+    except (OSError, zipfile.BadZipFile):
+        return Figures()
+    sums = zip(*plates, strict=True) if plates else ()
+    return Figures(*(None if None in some else sum(filter(None, some)) for some in sums))
+
+
+def _figures(file: IO[bytes]) -> Figures:
+    """Figures in the comments at both ends of G-code."""
+    text = file.read(EDGE)
+    rest = b""
+    while more := file.read(1 << 20):
+        rest = (rest + more)[-EDGE:]
+    text += b"\n" + rest
+    time = next((match[1] for pattern in _TIMES if (match := pattern.search(text))), None)
+    grams, cost = (_sum(match[1]) if (match := of.search(text)) else None for of in (_GRAMS, _COST))
+    length = next((unit * (_sum(m[1]) or 0) for unit, of in _LENGTHS if (m := of.search(text))), None)
+    return Figures(None if time is None else _seconds(time), grams or None, cost or None, length or None)
+
+
+def _sum(text: bytes) -> float | None:
+    """Sum of the numbers of each filament, such as 1.5, 2.0 or 1.5m."""
+    return sum(map(float, re.findall(rb"\d+\.?\d*", text))) or None
+
+
+def _seconds(text: bytes) -> float | None:
+    """Seconds of a time such as 1d 2h 3m 4s."""
+    parts = re.findall(rb"(\d+\.?\d*)([dhms]?)", text)
+    return sum(float(number) * _UNITS[unit] for number, unit in parts) or None
 
 
 def _run_program(command: Sequence[str], work: Work, title: str) -> list[str]:
@@ -326,8 +405,9 @@ def _last(lines: Sequence[str]) -> str:
 
 
 def _warnings(lines: Sequence[str]) -> list[str]:
-    """Lines that warn, without time and thread, each once."""
-    return list(dict.fromkeys(_LOG.sub(r"\1: ", line.strip()) for line in lines if _WARNING.search(line)))
+    """Lines that warn, without time and thread, each once and shortened; settings are none."""
+    told = (_LOG.sub(r"\1: ", line.strip()) for line in lines if _WARNING.search(line))
+    return list(dict.fromkeys(printable(line[:LONGEST_LINE]) for line in told if not _SETTING.match(line)))
 
 
 def _prusa(program: str, profiles: Sequence[str], model: Path, path: Path) -> list[str]:
@@ -363,9 +443,15 @@ def _cura(program: str, profiles: Sequence[str], model: Path, path: Path) -> lis
 
 
 SLICERS = {
-    "prusa": FilamentSlicer("PrusaSlicer", ("prusa-slicer", "PrusaSlicer"), ".3mf", ".gcode", _prusa),
-    "orca": FilamentSlicer("OrcaSlicer", ("orca-slicer", "OrcaSlicer"), ".3mf", ".3mf", _orca),
-    "bambu": FilamentSlicer("Bambu Studio", ("bambu-studio", "BambuStudio"), ".3mf", ".3mf", _orca),
+    "prusa": FilamentSlicer(
+        "PrusaSlicer", ("prusa-slicer", "PrusaSlicer"), ".3mf", ".gcode", _prusa, ("PrusaSlicer",)
+    ),
+    "orca": FilamentSlicer(
+        "OrcaSlicer", ("orca-slicer", "OrcaSlicer"), ".3mf", ".3mf", _orca, ("OrcaSlicer",)
+    ),
+    "bambu": FilamentSlicer(
+        "Bambu Studio", ("bambu-studio", "BambuStudio"), ".3mf", ".3mf", _orca, ("BambuStudio",)
+    ),
     "cura": FilamentSlicer("CuraEngine", ("CuraEngine", "curaengine"), ".stl", ".gcode", _cura),
 }
 """Slicers by name in commands."""

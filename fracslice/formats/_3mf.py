@@ -1,7 +1,8 @@
 """3MF, by the core specification 1.3.
 
-Written: one object in millimetres and, for colours, materials 1.2. Read: the build, with the production
-extension.
+Written: one object in millimetres and, for colours, materials 1.2. Triangles of filaments are painted, too,
+in attributes that PrusaSlicer reads (Format/3mf.cpp), and Bambu Studio and OrcaSlicer (bbs_3mf.cpp), which
+take the filament of an object from its group of one colour. Read: the build, with the production extension.
 """
 
 from __future__ import annotations
@@ -9,19 +10,29 @@ from __future__ import annotations
 import zipfile
 import zlib
 from array import array
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from html import escape
 from itertools import chain
 from pathlib import Path
-from typing import IO, Any, BinaryIO
+from typing import IO, Any, BinaryIO, NamedTuple
 from xml.parsers import expat
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import COPIES, DEEPEST, LARGEST, MOST_PARTS, Triangles, concatenate, count, moved
-from ..common.files import HEAD, Fragment, Text, append, deflate, join, number_rows, open_regular, rows
+from ..common.arrays import (
+    COPIES,
+    DEEPEST,
+    LARGEST,
+    MOST_PARTS,
+    Filaments,
+    Triangles,
+    concatenate,
+    count,
+    moved,
+)
+from ..common.files import HEAD, ROWS, Fragment, Text, append, deflate, join, number_rows, open_regular, rows
 from ..errors import MeshError
 from ..work import Work
 from . import MeshFormat
@@ -42,8 +53,9 @@ TRIANGLE, END_OF_ROW = ('<triangle v1="', '" v2="', '" v3="'), '"/>\n'
 CORE_NAMES = {"Title", "Designer", "Description", "Copyright", "LicenseTerms", "Rating", "Application"}
 CORE_NAMES |= {"CreationDate", "ModificationDate"}
 MATERIALS = "http://schemas.microsoft.com/3dmanufacturing/material/2015/02"
+PAINTS = "http://schemas.slic3r.org/3mf/2017/06"
 GROUP = 2
-"""Number of the group of colours, of the materials extension."""
+"""Number of the group of colours, of the materials extension; the first one, if each filament has its own."""
 
 
 def _write(mesh: Triangles, file: BinaryIO, metadata: Mapping[str, str], work: Work) -> None:
@@ -52,10 +64,88 @@ def _write(mesh: Triangles, file: BinaryIO, metadata: Mapping[str, str], work: W
     See `MeshFormat`. Metadata that 3MF does not define get fracslice's namespace.
     """
     mesh = mesh.in_order()
-    coloured = mesh.colours is not None
-    is_large = _is_large(len(mesh.vertices), len(mesh.triangles), coloured)
+    coloured, texts = mesh.colours is not None, 0
+    if mesh.supported is not None:
+        texts = len(ENFORCED) * int(mesh.supported.sum())
+    parts, more = [mesh], _layer_heights(mesh)
+    if mesh.filaments is not None:
+        more |= _settings(mesh.filaments)
+        parts += mesh.filaments.bodies
+        lengths = np.array([len(text) for text in mesh.filaments.texts])
+        texts += 2 * int(lengths[mesh.filaments.text].sum())
+    vertices, triangles = (sum(len(getattr(p, name)) for p in parts) for name in ("vertices", "triangles"))
+    is_large = _is_large(vertices, triangles, coloured, texts)
     blocks = work.ordered(lambda text: deflate(text()), _model(mesh, metadata))
-    join(file, (partial(append, block) for block in blocks), is_large)
+    join(file, (partial(append, block) for block in blocks), is_large, more)
+
+
+PROFILES = "Metadata/Slic3r_PE_layer_heights_profile.txt", "Metadata/layer_heights_profile.txt"
+"""Where PrusaSlicer, and Bambu Studio and OrcaSlicer, have heights of layers."""
+
+
+def _layer_heights(mesh: Triangles) -> dict[str, bytes]:
+    """Heights of layers over z, as slicers read them: at both faces of each layer; the last is the top."""
+    if mesh.tops is None:
+        return {}
+    top, inner = float(np.ptp(mesh.vertices[:, 2])), mesh.tops[:-1]
+    tops = np.array([*inner[inner < top], top])
+    bottoms, heights = np.array([0.0, *tops[:-1]]), np.diff(mesh.tops, prepend=0.0)[: len(tops)]
+    rows = np.stack([bottoms, heights, tops, heights], 1).reshape(-1).tolist()
+    text = f"object_id=1|{';'.join(f'{number:.6f}' for number in rows)}\n".encode()
+    return dict.fromkeys(PROFILES, text)
+
+
+def _settings(filaments: Filaments) -> dict[str, bytes]:
+    """Filaments of bodies, as Bambu Studio and OrcaSlicer read them."""
+    if not filaments.bodies:
+        return {}
+    parts = "".join(
+        f'<part id="{number}" subtype="normal_part"><metadata key="name" value="filament {k}"/>'
+        f'<metadata key="extruder" value="{k}"/></part>\n'
+        for k, number, _ in _numbered(filaments)
+    )
+    whole = f'<object id="1">\n<metadata key="extruder" value="1"/>\n{parts}</object>\n'
+    return {"Metadata/model_settings.config": f"{HEAD}<config>\n{whole}</config>\n".encode()}
+
+
+def _numbered(filaments: Filaments) -> Iterator[tuple[int, int, Triangles]]:
+    """Bodies that are not empty, with the numbers of their filaments, from 1, and of their objects."""
+    for k, body in enumerate(filaments.bodies, 1):
+        if len(body.triangles):
+            yield k, GROUP + len(filaments.colours) + k, body
+
+
+class ObjectCopies(NamedTuple):
+    """An object that is built at some places."""
+
+    name: str
+    mesh: Triangles  # mm
+    offsets: list[tuple[float, float, float]]  # mm
+
+
+def write_objects(
+    objects: Sequence[ObjectCopies], file: BinaryIO, metadata: Mapping[str, str], work: Work
+) -> None:
+    """Write several objects, without colours, streamed as one is."""
+
+    def texts() -> Iterator[Text]:
+        yield from _texts(*_head(metadata))
+        for number, placed in enumerate(objects, 1):
+            head = f'<object id="{number}" name="{escape(placed.name)}" type="model">'
+            yield from _texts(head.encode())
+            yield from mesh_element(placed.mesh.in_order())
+            yield from _texts(b"</object>\n")
+        items = "".join(
+            f'<item objectid="{number}" transform="1 0 0 0 1 0 0 0 1 {x:.6g} {y:.6g} {z:.6g}"/>\n'
+            for number, placed in enumerate(objects, 1)
+            for x, y, z in placed.offsets
+        )
+        yield from _texts(f"</resources>\n<build>\n{items}</build>\n</model>\n".encode())
+
+    vertices = sum(len(placed.mesh.vertices) for placed in objects)
+    triangles = sum(len(placed.mesh.triangles) for placed in objects)
+    blocks = work.ordered(lambda text: deflate(text()), texts())
+    join(file, (partial(append, block) for block in blocks), _is_large(vertices, triangles, False))
 
 
 def write_fragments(
@@ -79,10 +169,13 @@ def write_fragments(
     join(file, fragments, _is_large(vertices[0], triangles[0], False))
 
 
-def _is_large(vertices: int, triangles: int, coloured: bool) -> bool:
-    """True if the text may exceed the 2 GiB of a plain ZIP member; rows take at most 66 and 54 bytes."""
-    vertex, triangle = (92, 108) if coloured else (66, 54)  # with a colour for each vertex
-    return vertex * vertices + triangle * triangles > 2**31 - 2**20
+def _is_large(vertices: int, triangles: int, coloured: bool, painted: int = 0) -> bool:
+    """True if the text may exceed the 2 GiB of a plain ZIP member; rows take at most 66 and 54 bytes.
+
+    `painted`: bytes of the painting.
+    """
+    vertex, triangle = (92, 140) if coloured else (66, 54)  # with a colour for each vertex, or painted
+    return vertex * vertices + triangle * triangles + painted > 2**31 - 2**20
 
 
 def _head(metadata: Mapping[str, str], model: str = MODEL) -> Iterator[bytes]:
@@ -95,7 +188,14 @@ def _head(metadata: Mapping[str, str], model: str = MODEL) -> Iterator[bytes]:
 
 
 def _model(mesh: Triangles, metadata: Mapping[str, str]) -> Iterator[Text]:
-    if mesh.colours is None:
+    if mesh.filaments is not None:
+        yield from _printed(mesh, mesh.filaments, metadata)
+        return
+    if mesh.supported is not None:
+        spaces = f'<model xmlns:slic3rpe="{PAINTS}" '
+        yield from _texts(*_head(metadata, MODEL.replace("<model ", spaces)), PLAIN)
+        yield from _painted_element(mesh)
+    elif mesh.colours is None:
         yield from _texts(*_head(metadata), PLAIN)
         yield from mesh_element(mesh)
     else:
@@ -106,6 +206,57 @@ def _model(mesh: Triangles, metadata: Mapping[str, str]) -> Iterator[Text]:
         yield from _texts(f'</m:colorgroup>\n<object id="1" type="model" pid="{GROUP}" pindex="0">'.encode())
         yield from mesh_element(mesh, index.reshape(-1).astype(np.int32))
     yield from _texts(END)
+
+
+def _printed(mesh: Triangles, filaments: Filaments, metadata: Mapping[str, str]) -> Iterator[Text]:
+    """A mesh of filaments, each with a group of one colour: as painted triangles, or as a body for each."""
+    spaces = f'<model xmlns:m="{MATERIALS}" xmlns:slic3rpe="{PAINTS}" '
+    yield from _texts(*_head(metadata, MODEL.replace("<model ", spaces)))
+    for group, (red, green, blue) in enumerate(filaments.colours.tolist(), GROUP):
+        colour = f'<m:color color="#{red:02X}{green:02X}{blue:02X}"/>'
+        yield from _texts(f'<m:colorgroup id="{group}">{colour}</m:colorgroup>\n'.encode())
+    if not filaments.bodies:
+        yield from _texts(f'<object id="1" type="model" pid="{GROUP}" pindex="0">'.encode())
+        yield from _painted_element(mesh)
+        yield from _texts(END)
+        return
+    for k, number, body in _numbered(filaments):
+        of = f'pid="{GROUP + k - 1}" pindex="0"'
+        yield from _texts(f'<object id="{number}" name="filament {k}" type="model" {of}>'.encode())
+        yield from mesh_element(body.in_order())
+        yield from _texts(b"</object>\n")
+    components = (f'<component objectid="{number}"/>' for _, number, _ in _numbered(filaments))
+    yield from _texts(PLAIN, f"<components>{''.join(components)}</components>".encode(), END)
+
+
+ENFORCED = ' slic3rpe:custom_supports="4" paint_supports="4"'
+"""Attributes of a triangle at which slicers put supports."""
+
+
+def _painted_element(mesh: Triangles) -> Iterator[Text]:
+    """Mesh element whose triangles have the colour group of their filament, and their painting."""
+    yield from _texts(VERTICES)
+    yield from vertex_rows(mesh.vertices)
+    yield from _texts(TRIANGLES)
+    groups, texts, plain = [""], [""], "0"  # the text of a triangle that is not painted
+    of = text = np.zeros(len(mesh.triangles), np.int32)
+    if (painted := mesh.filaments) is not None:
+        groups = [f' pid="{GROUP + k}" p1="0"' if k else "" for k in range(len(painted.colours))]
+        texts = [f' slic3rpe:mmu_segmentation="{t}" paint_color="{t}"' * (t != plain) for t in painted.texts]
+        of, text = painted.of.astype(np.int32), painted.text
+    held = of * 0 if mesh.supported is None else mesh.supported.astype(np.int32)
+    rows = np.column_stack([mesh.triangles, of, text, held])
+
+    def block(part: slice) -> bytes:
+        lines = (
+            f'<triangle v1="{a}" v2="{b}" v3="{c}"{groups[k]}{texts[t]}{ENFORCED * h}/>\n'
+            for a, b, c, k, t, h in rows[part].tolist()
+        )
+        return "".join(lines).encode()
+
+    for begin in range(0, len(mesh.triangles), ROWS):
+        yield partial(block, slice(begin, begin + ROWS))
+    yield from _texts(END_OF_MESH)
 
 
 def _texts(*blocks: bytes) -> Iterator[Text]:
@@ -219,7 +370,7 @@ class _Relations:
 _Name = tuple[str, str]
 """File of an object in the package, and its identifier there."""
 
-_Placed = tuple[_Name, NDArray[np.float64]]
+_Part = tuple[_Name, NDArray[np.float64]]
 """Object and its transform."""
 
 
@@ -235,8 +386,8 @@ class _Package:
 
     def __init__(self) -> None:
         self.meshes: dict[_Name, Triangles] = {}
-        self.parts: dict[_Name, list[_Placed]] = {}
-        self.build: list[_Placed] = []
+        self.parts: dict[_Name, list[_Part]] = {}
+        self.build: list[_Part] = []
         self.unit, self.file, self.object = "millimeter", "", ("", "")
         self.vertices, self.triangles = array("d"), array("q")
         self.count = 0
@@ -258,7 +409,7 @@ class _Package:
         with archive.open(file) as part:
             _parse(part, self.start, self.end)
 
-    def named(self, build: list[_Placed]) -> set[str]:
+    def named(self, build: list[_Part]) -> set[str]:
         """Files of the objects that are built or components of others."""
         return {name[0] for placed in (build, *self.parts.values()) for name, _ in placed}
 
@@ -282,7 +433,7 @@ class _Package:
             case "model":
                 self.unit = get.get("unit", self.unit)
 
-    def reference(self, get: dict[str, str]) -> _Placed:
+    def reference(self, get: dict[str, str]) -> _Part:
         """The object that an item or a component names, in this file or in that of its path."""
         self.count_part()
         paths = [value for key, value in get.items() if key.rpartition(":")[2] == "path"]
@@ -312,7 +463,7 @@ class _Package:
         if sum(self.size(name, known)[0] for name, _ in self.build) > most:
             raise MeshError(f"not a valid 3MF file: it builds more than {most} vertices, triangles and parts")
         whole = concatenate([self.placed(*item) for item in self.build])
-        return Triangles(whole.vertices * MILLIMETRES[self.unit], whole.triangles)
+        return Triangles(whole.vertices * MILLIMETRES[self.unit], whole.triangles, whole.colours)
 
     def size(self, name: _Name, known: dict[_Name, tuple[int, int]], depth: int = 0) -> tuple[int, int]:
         """Vertices, triangles and objects of an expanded object, and levels of its components.
@@ -337,6 +488,60 @@ class _Package:
         whole = self.expanded[name]
         turned = sum(whole.vertices[:, k, None] * matrix[k] for k in range(3))
         return moved(whole, turned + matrix[3], matrix[:3])
+
+
+GREY = 0xC8C8C4
+"""Colour of what has none beside what has one, sRGB."""
+
+
+class _Coloured(_Package):
+    """Collects colours of the corners of triangles, too: those of groups of colours and of base materials."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.groups: dict[_Name, list[int]] = {}
+        self.group, self.own, self.corners = ("", ""), ("", "0"), array("q")
+
+    def start(self, name: str, get: dict[str, str]) -> None:
+        """Handle the start of an element."""
+        super().start(name, get)
+        match name.rpartition(":")[2]:
+            case "colorgroup" | "basematerials":
+                self.group = self.file, get["id"]
+                self.groups[self.group] = []
+            case "color" | "base":
+                text = get.get("color", get.get("displaycolor", ""))
+                self.groups.setdefault(self.group, []).append(int(text[1:7], 16))
+            case "object":
+                self.own = get.get("pid", ""), get.get("pindex", "0")
+            case "triangle":
+                group, first = get.get("pid", self.own[0]), get.get("p1", self.own[1])
+                known = self.groups.get((self.file, group), [])
+                for index in (first, get.get("p2", first), get.get("p3", first)):
+                    number = int(index)
+                    self.corners.append(known[number] if 0 <= number < len(known) else -1)
+
+    def end(self, name: str) -> None:
+        """Handle the end of an element."""
+        super().end(name)
+        if name.rpartition(":")[2] == "object":
+            mesh, colours = self.meshes[self.object], np.array(self.corners, dtype=np.int64)
+            self.corners = array("q")
+            if len(colours) and colours.max() >= 0:
+                self.meshes[self.object] = _split(mesh, np.where(colours < 0, GREY, colours))
+
+
+def _split(mesh: Triangles, colours: NDArray[np.int64]) -> Triangles:
+    """A mesh with a vertex for each colour of its corners, of which each is a number."""
+    both = mesh.triangles.reshape(-1).astype(np.int64) << 24 | colours
+    known, index = np.unique(both, return_inverse=True)
+    shown = np.stack([known >> 16 & 255, known >> 8 & 255, known & 255], 1).astype(np.uint8)
+    return Triangles(mesh.vertices[known >> 24], index.reshape(-1, 3).astype(np.int32), shown)
+
+
+def _read_coloured(path: Path) -> Triangles:
+    """The build of a file with its colours, mm."""
+    return _build(path, _Coloured())
 
 
 class _Lattices(_Package):
@@ -398,4 +603,4 @@ def _validated_mesh(vertices: array[float], triangles: array[int]) -> Triangles:
     return Triangles(corners, indices.astype(np.int32))
 
 
-FORMAT = MeshFormat(_read, _write, has_unit=True, has_colours=True)
+FORMAT = MeshFormat(_read, _write, has_unit=True, has_colours=True, read_coloured=_read_coloured)

@@ -31,6 +31,8 @@ class MeshFormat(NamedTuple):
     has_unit: bool = False  # True if a file states its unit; otherwise mm are assumed
     has_colours: bool = False  # True if programs read colours of vertices from a file
     most: int = 1 << 26  # most bytes of a file that a scene names
+    # reads colours of vertices, too, if `read` does not; vertices with several are as many
+    read_coloured: Callable[[Path], Triangles] | None = None
 
 
 ENDINGS = tuple(f".{module.name.removeprefix('_')}" for module in iter_modules(__path__))

@@ -24,6 +24,7 @@ from ..common.arrays import (
     Triangles,
     concatenate,
     count,
+    from_linear,
     moved,
     to_linear,
 )
@@ -74,7 +75,7 @@ def _linear(colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-WIDTHS = {"SCALAR": 1, "VEC3": 3}
+WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
 TRIANGLES, STRIP, FAN = 4, 5, 6
 """Modes of a primitive of GLB."""
 
@@ -95,7 +96,7 @@ def _read(path: Path) -> Triangles:
         whole = _Tree(read_bytes(path)).laid_out()
     except (*BROKEN, struct.error) as error:
         raise MeshError("not a whole GLB file: it is cut short, broken or of another kind") from error
-    return Triangles(whole.vertices @ GLTF_AXES, whole.triangles)
+    return Triangles(whole.vertices @ GLTF_AXES, whole.triangles, whole.colours)
 
 
 class _Tree:
@@ -179,7 +180,19 @@ class _Tree:
             corners = corners[np.stack([count, count + 1 + count % 2, count + 2 - count % 2], axis=1)]
         elif mode == FAN:
             corners = corners[np.stack([count + 1, count + 2, 0 * count], axis=1)]
-        return Triangles(vertices, corners.reshape(-1, 3).astype(np.int32))
+        colours = self.colours(primitive["attributes"].get("COLOR_0"), len(vertices))
+        return Triangles(vertices, corners.reshape(-1, 3).astype(np.int32), colours)
+
+    def colours(self, index: Any, count: int) -> NDArray[np.uint8] | None:
+        """Colours of vertices, from linear light to sRGB; None without, or if there is not one for each."""
+        if index is None:
+            return None
+        kind = self.item("accessors", index)["type"]
+        light = self.values(index, kind) if kind in ("VEC3", "VEC4") else np.empty((0, 3))
+        if len(light) != count or not np.isfinite(light).all():
+            return None
+        shown: NDArray[np.uint8] = np.rint(255 * from_linear(light[:, :3].clip(0, 1))).astype(np.uint8)
+        return shown
 
     def values(self, index: Any, kind: str) -> NDArray[Any]:
         """Numbers of an accessor, [n, 1 or 3]."""

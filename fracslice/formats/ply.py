@@ -97,7 +97,17 @@ def _read(path: Path) -> Triangles:
         raise MeshError("not a whole PLY file: it is cut short, broken or of another kind") from error
     if len(corners) and not 0 <= corners.min() <= corners.max() < len(x):
         raise MeshError("not a valid PLY file: a face names a vertex that does not exist")
-    return Triangles(np.stack([x, y, z], axis=1).astype(np.float64), fans(lengths, corners.astype(np.int32)))
+    points = np.stack([x, y, z], axis=1).astype(np.float64)
+    return Triangles(points, fans(lengths, corners.astype(np.int32)), _colours(tables["vertex"], len(points)))
+
+
+def _colours(vertex: dict[str, _Column], count: int) -> NDArray[np.uint8] | None:
+    """Colours of the vertices, if the file has them as bytes."""
+    columns = [vertex[name].values for name in ("red", "green", "blue") if name in vertex]
+    if [len(column) for column in columns] != [count] * 3:
+        return None
+    colours = np.stack(columns, axis=1)
+    return colours.astype(np.uint8) if ((colours >= 0) & (colours <= 255)).all() else None
 
 
 def numbers_of(column: _Column) -> Numbers:

@@ -106,6 +106,8 @@ def import_ahead() -> None:
 
 OWN = "the triangles are those of the model; with a voxel or a resolution it is meshed anew"
 """Note on a scene that is nothing but a model."""
+PIXEL = 0.2
+"""Pixels by which the slope of the surface is measured for heights of layers, mm."""
 
 TRIES = 2
 """How many times a job that lost its object samples finer."""
@@ -153,8 +155,14 @@ class _Job:
             if self.what.colour is not None and not mesh_format(ending).has_colours:
                 coloured = ", ".join(name for name in ENDINGS if mesh_format(name).has_colours)
                 raise SceneError(f"colour: expected a file that holds colours: {coloured}")
+            for name in ("heights", "bodies", "paint_supports"):
+                if getattr(self.what, name) and ending != ".3mf":
+                    raise SceneError(f"{name}: expected a file that holds them, .3mf")
         if self.what.colour is not None and self.clock.work.cluster is not None:
             raise SceneError(f"colour {self.what.colour}: expected no cluster and no shard")
+        for name in ("heights", "paint_supports"):
+            if getattr(self.what, name) and self.clock.work.cluster is not None:
+                raise SceneError(f"{name}: expected no cluster and no shard")
 
     @contextmanager
     def aside(self) -> Iterator[Callable[[], Path] | None]:
@@ -434,6 +442,12 @@ class Writing:
             meshes = tips_last(meshes, finish.tips)
         if self.what.colour is not None:
             meshes = self._painted(meshes, finish)
+        if self.what.paint_supports:
+            from ..mesh.checks import overhanging
+
+            meshes = (replace(mesh, supported=overhanging(mesh)) for mesh in meshes)
+        if self.what.heights is not None:
+            meshes = (replace(mesh, tops=self._tops()) for mesh in meshes)
         if self.path is None:
             (mesh,) = meshes
             return mesh, simplified
@@ -453,19 +467,45 @@ class Writing:
                     mesh_format(self.path.suffix.lower()).write(whole, file, about, self.clock.work)
         return None if several else mesh, simplified
 
+    def _tops(self) -> np.ndarray:
+        """Upper faces of the layers that are advised to slicers, mm."""
+        from ..records import SliceJob
+        from ..slicing import adapted, plan_stack
+        from ..volume.amount import sizing
+
+        what, work = self.what, self.clock.work
+        assert what.heights is not None and what.heights[1] is not None
+        with self.clock("slicing"):
+            size = sizing(self.scene, what.size, what.scale, work)
+            how = what.edits(self.scene)
+            job = SliceJob(layer=what.heights[0], printing=how, pixel=PIXEL, up=what.up, scale=what.scale)
+            stack = plan_stack(self.scene.root, job, work, size)
+            return adapted(stack, what.heights[1], work).tops
+
     def _painted(self, meshes: Iterator[Mesh], finish: Finish) -> Iterator[Mesh]:
         """Colour the vertices. Edits that are no formulas have the colour of the object there."""
-        from ..rendering.materials import paint
+        from ..rendering.materials import Paint, paint
 
-        assert self.what.colour is not None
+        what, work = self.what, self.clock.work
+        colour, palette = what.colour, what.palette
+        assert colour is not None
         field: Any = finish.of.planned.root
         while field.tree is None:
             field = field.root
+
+        def paint_at(points: np.ndarray) -> Paint:
+            return paint(field.tree, finish.place.units(points), colour, work, palette)
+
         for mesh in meshes:
             with self.clock("colouring"):
-                points = finish.place.units(mesh.vertices)
-                done = paint(field.tree, points, self.what.colour, self.clock.work)
-            yield replace(mesh, colours=done.colours, scalars=done.scalars)
+                done = paint_at(mesh.vertices)
+                made = replace(mesh, colours=done.colours, scalars=done.scalars)
+                if what.filaments is not None:
+                    from ..mesh.filaments import with_filaments
+
+                    how = what.filaments, lambda points: paint_at(points).colours, what.bodies
+                    made = with_filaments(made, *how, work)
+            yield made
 
 
 def metadata(scene: Scene) -> dict[str, str]:

@@ -1,5 +1,5 @@
-"""Checks of a mesh: counts of defects, sums over its pieces, distances, what of the surface it lacks, and a
-verdict; repair of models that are no solid, by MeshLab's filters.
+"""Checks of a mesh: counts of defects, sums over its pieces, distances, what of the surface it lacks, what
+hangs in the air, and a verdict; repair of models that are no solid, by MeshLab's filters.
 
 Bodies that overlap are united, and triangles that cut each other replaced, by the winding number (Zhou,
 Grinspun, Zorin and Jacobson, "Mesh Arrangements for Solid Geometry", 2016).
@@ -18,11 +18,12 @@ from .._native import bounds, connected_components, near
 from ..common.arrays import dot
 from ..common.messages import format_count, lacking
 from ..errors import MeshError
+from ..printing.walls import MeshSurface, thin_walls
 from ..volume import Plan
 from ..work import Work
 from .cleaning import Finished, quantise_mesh
 from .fit import NEAR, surface_error, surface_points
-from .model import Mesh, Nearest, component_sizes
+from .model import COLOUR, Mesh, Nearest, build, component_sizes
 from .shells import nesting
 
 
@@ -463,3 +464,76 @@ class _Edges(NamedTuple):
         ends = ends.reshape(-1, 2).astype(np.int32)
         chains = np.concatenate([ends, ends[:, :1]], 1)
         return int(connected_components(np.ascontiguousarray(chains), len(used), 0)[1])
+
+
+STEEP, FLAT = 0.70710678, 0.8660254
+"""Least parts of normals that point down: of what needs supports, 45 degrees, and of flat overhangs, 30."""
+LARGE = 25.0
+"""Area of a flat overhang, mm2."""
+PLATE, AROUND = 0.05, 2.0
+"""Height up to which a mesh lies on the plate, and how far above a local minimum it is held, mm."""
+
+
+def overhanging(mesh: Mesh) -> NDArray[np.bool_]:
+    """True for triangles that supports have to hold, bool [m]; the mesh stands on its lowest point, mm."""
+    normals, height = mesh.normals, mesh.vertices[:, 2] - mesh.vertices[:, 2].min()
+    area = np.linalg.norm(normals, axis=1)
+    down = -normals[:, 2] / np.maximum(area, 1e-30)
+    top = height[mesh.triangles].max(1)
+    above = top > PLATE
+    flat = above & (down > FLAT)
+    patch = _patches(mesh, flat)
+    large = np.bincount(patch[flat], area[flat] / 2, patch.max(initial=0) + 1) >= LARGE
+    result = flat & large[patch]
+    steep = above & (down > STEEP)
+    patch = _patches(mesh, steep)
+    least = np.full(patch.max(initial=0) + 1, -np.inf)  # of patches without a local minimum: none is held
+    minima = _minima(mesh, height) & (height > PLATE)
+    starts = minima[mesh.triangles].any(1) & steep
+    least[patch[starts]] = np.inf
+    np.minimum.at(least, patch[starts], height[mesh.triangles[starts]].min(1))
+    held: NDArray[np.bool_] = result | (steep & (top <= least[patch] + AROUND))
+    return held
+
+
+def _minima(mesh: Mesh, height: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """True for vertices that are no higher than their neighbours, bool [n]."""
+    lowest = height.copy()
+    for a in range(3):
+        for b in range(3):
+            np.minimum.at(lowest, mesh.triangles[:, a], height[mesh.triangles[:, b]])
+    result: NDArray[np.bool_] = lowest == height
+    return result
+
+
+def _patches(mesh: Mesh, some: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Number of the patch of each of some triangles that share vertices; 0 for the others, int [m]."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    corners = mesh.triangles[some]
+    one, other = corners.reshape(-1), np.roll(corners, 1, axis=1).reshape(-1)
+    links = coo_array((np.ones(len(one), bool), (one, other)), shape=(len(mesh.vertices),) * 2)
+    labels = connected_components(links, directed=False)[1]
+    result = np.zeros(len(mesh.triangles), np.intp)
+    result[some] = labels[corners[:, 0]]
+    return result
+
+
+HANGS, IS_THIN = (214, 40, 40), (240, 160, 30)
+"""Colours of triangles that hang in the air, and of thin walls, sRGB."""
+
+
+def marked(mesh: Mesh, wall: float, threads: int = 0) -> Mesh:
+    """A mesh for pictures: in red what hangs in the air, in orange walls that are thinner than `wall` mm."""
+    from scipy.spatial import cKDTree
+
+    tree = build(mesh, threads, halved=True)
+    walls = thin_walls(MeshSurface(mesh.vertices, mesh.triangles, *tree), len(mesh.triangles), wall, threads)
+    colours = np.tile(np.array(COLOUR, np.uint8), (len(mesh.triangles), 1))
+    if len(walls.width):
+        near, _ = cKDTree(walls.middle).query(mesh.corners.mean(1), distance_upper_bound=0.75 * wall)
+        colours[np.isfinite(near)] = IS_THIN
+    colours[overhanging(mesh)] = HANGS
+    corners = np.arange(3 * len(mesh.triangles), dtype=np.int32).reshape(-1, 3)
+    return Mesh(mesh.corners.reshape(-1, 3), corners, np.repeat(colours, 3, axis=0))

@@ -176,6 +176,12 @@ class Mesh(Triangles):
         Colours of the vertices, sRGB.
     scalars : mapping of str to ndarray of float32, shape (n,)
         Named numbers of the vertices.
+    filaments : Filaments, optional
+        Filaments of the triangles: their colours, and of which each triangle is.
+    tops : ndarray of float64, optional
+        Upper faces of the layers that are advised to slicers, above the lowest point.
+    supported : ndarray of bool, shape (m,), optional
+        Triangles at which supports are advised to slicers.
 
     Raises
     ------
@@ -553,23 +559,29 @@ AMBIENT = 0.2
 AXES = np.array([[0.876, 0.482, 0.0], [-0.2385, 0.4336, 0.8689], [0.4188, -0.7614, 0.4949]])
 """Directions in space that point to the right, up, and to the viewer."""
 
+BELOW = np.array([[0.876, 0.482, 0.0], [0.2385, -0.4336, 0.8689], [0.4188, -0.7614, -0.4949]])
+"""The same for a viewer who looks from below."""
+
 LIGHT = np.array([-0.48, 0.62, 0.62])
 """Direction to the light: right, up, to the viewer."""
 
 
-def thumbnail(mesh: Mesh) -> bytes:
-    """Draw a mesh in its colours, or in clay, on a transparent background."""
+def thumbnail(mesh: Mesh, axes: NDArray[np.float64] = AXES) -> bytes:
+    """Draw a mesh in its colours, or in clay, on a transparent background.
+
+    `axes`: directions in space that point to the right, up, and to the viewer.
+    """
     from PIL import Image
 
     file = io.BytesIO()
-    drawn = Image.fromarray(_render_small(mesh, WIDTH * FINER, HEIGHT * FINER))
+    drawn = Image.fromarray(_render_small(mesh, axes, WIDTH * FINER, HEIGHT * FINER))
     drawn.resize((WIDTH, HEIGHT), Image.Resampling.BOX).save(file, "PNG")
     return file.getvalue()
 
 
-def _render_small(mesh: Mesh, width: int, height: int) -> np.ndarray:
+def _render_small(mesh: Mesh, axes: NDArray[np.float64], width: int, height: int) -> np.ndarray:
     """The picture with one sample per pixel, uint8 [height, width, 4]."""
-    seen = mesh.vertices @ AXES.T
+    seen = mesh.vertices @ axes.T
     low, high = seen.min(0), seen.max(0)
     across = np.maximum((high - low)[:2] / (width, height), 1e-30).max() / FILLED
     seen = (seen - (low + high) / 2) / across + (width / 2, height / 2, 0)

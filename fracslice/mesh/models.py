@@ -7,7 +7,7 @@ from __future__ import annotations
 import hashlib
 import os
 import warnings
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -25,7 +25,7 @@ from ..fields.devices import ArrayField
 from ..fields.field import Bounds, Device, Kernel, Precision
 from ..fields.node import TriangleMesh
 from ..fields.registry import Node, get
-from ..formats import ENDINGS, mesh_format
+from ..formats import ENDINGS, MeshFormat, mesh_format
 from .checks import MeshReport, check_mesh
 from .cleaning import quantise_mesh
 from .model import Mesh, build
@@ -46,7 +46,36 @@ def read_mesh(path: str | Path) -> Mesh:
 
     Returns `Mesh` in mm.
     """
-    path = Path(path)
+
+    def welded(form: MeshFormat, file: Path) -> Mesh:
+        whole = form.read(file)
+        return quantise_mesh(Mesh(whole.vertices, whole.triangles))
+
+    mesh = _read(Path(path), welded)
+    most = np.bincount(mesh.triangles.ravel()).max()
+    if most > MOST_AROUND:
+        raise MeshError(
+            f"{path}: {most} corners of triangles meet at a vertex: expected at most {MOST_AROUND}"
+        )
+    return mesh
+
+
+def read_coloured(path: str | Path) -> Mesh:
+    """Read a mesh file with the colours of its vertices, for windows and pictures; nothing is welded.
+
+    Returns `Mesh` in mm.
+    """
+
+    def whole(form: MeshFormat, file: Path) -> Mesh:
+        made = (form.read_coloured or form.read)(file)
+        return Mesh(made.vertices, made.triangles, made.colours)
+
+    mesh = _read(Path(path), whole)
+    return mesh if mesh.colours is not None else read_mesh(path)
+
+
+def _read(path: Path, make: Callable[[MeshFormat, Path], Mesh]) -> Mesh:
+    """Mesh of a file, by the reader of its format."""
     if (ending := path.suffix.lower()) not in ENDINGS:
         raise MeshError(f"{path}: not a model file that can be read; known are {', '.join(ENDINGS)}")
     try:
@@ -54,19 +83,13 @@ def read_mesh(path: str | Path) -> Mesh:
             raise MeshError("the file is empty")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of NumPy: coordinates that are not finite are refused
-            whole = mesh_format(ending).read(path)
-            mesh = quantise_mesh(Mesh(whole.vertices, whole.triangles))
+            mesh = make(mesh_format(ending), path)
     except FileNotFoundError:
         raise MeshError(f"{path}: no such file") from None
     except (OSError, MeshError) as error:
         raise MeshError(f"{path}: {getattr(error, 'strerror', None) or error}") from error
     if not len(mesh.triangles):
         raise MeshError(f"{path}: the file has no triangles")
-    most = np.bincount(mesh.triangles.ravel()).max()
-    if most > MOST_AROUND:
-        raise MeshError(
-            f"{path}: {most} corners of triangles meet at a vertex: expected at most {MOST_AROUND}"
-        )
     return mesh
 
 

@@ -13,6 +13,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -560,13 +561,22 @@ class Paint:
     scalars: Mapping[str, NDArray[np.float32]]
 
 
-def paint(root: Node, points: NDArray[np.float64], shown: str, work: Work) -> Paint:
+def paint(
+    root: Node,
+    points: NDArray[np.float64],
+    shown: str,
+    work: Work,
+    palette: str | Sequence[str] | None = None,
+) -> Paint:
     """Evaluate the colours of a scene.
 
-    `points`: float64 (n, 3), scene units.
+    `points`: float64 (n, 3), scene units; `palette`: of a property of the orbit, its name or colours such as
+    #e33399.
     """
     if shown != MATERIAL:
-        root = material(_plain(root), palette=PALETTE, trap=shown)
+        own = palette or PALETTE
+        chosen = {"palette": own} if isinstance(own, str) else {"colour": list(chain(*map(_components, own)))}
+        root = material(_plain(root), trap=shown, **chosen)
     functions, parameters = _link_painting(root)
     evaluator = Evaluator(ON_ARRAYS, functions)
     values = np.empty((5, len(points)))
@@ -581,6 +591,11 @@ def paint(root: Node, points: NDArray[np.float64], shown: str, work: Work) -> Pa
     tone = {"trap" if shown == MATERIAL else shown: values[4].astype(np.float32)}
     number = {MATERIAL: values[3].astype(np.float32)} if shown == MATERIAL else {}
     return Paint(_encode_srgb(values[:3].T), {**tone, **number})
+
+
+def _components(colour: str) -> tuple[float, ...]:
+    """Red, green and blue of a text such as #e33399, from 0 to 1."""
+    return tuple(int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5))
 
 
 def _plain(node: Node) -> Node:

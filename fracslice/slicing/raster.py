@@ -309,12 +309,13 @@ def page(
     tops: NDArray[np.float64],
     areas: NDArray[np.float64],
     picture: bytes,
+    views: Sequence[bytes] = (),
 ) -> bytes:
     """Compose a summary page.
 
-    `tops`, `areas`: float64 [n], mm, mm2.
+    `tops`, `areas`: float64 [n], mm, mm2; `views`: pictures of the object, PNG.
     """
-    image = b64encode(picture).decode("ascii")
+    shown = [f'<img alt="The object" width="48%" src="{_source(view)}">' for view in views]
     text = [
         "<!DOCTYPE html>",
         f'<html lang="en"><meta charset="utf-8"><title>{escape(title)}</title><style>{_STYLE}</style>',
@@ -322,15 +323,21 @@ def page(
         *(f"<p>{escape(line)}</p>" for line in lines),
         f"<h2>{escape(verdict.capitalize())}</h2>",
         *(["<ul>", *(f"<li>{escape(problem)}</li>" for problem in problems), "</ul>"] if problems else []),
+        *(["<h2>The object</h2>", "<p>Red hangs in the air, orange is thin.</p>", *shown] if shown else []),
         "<h2>Cross-section over height</h2>",
         "<p>The force that peels a layer from the film grows with its area.</p>",
         plot(tops, areas),
         "<h2>Worst layers</h2>",
         "<p>Red has nothing below it.</p>",
-        f'<img alt="Worst layers" src="data:image/png;base64,{image}">',
+        f'<img alt="Worst layers" src="{_source(picture)}">',
         "</html>",
     ]
     return "\n".join([*text, ""]).encode()
+
+
+def _source(picture: bytes) -> str:
+    """A PNG as the source of an image."""
+    return f"data:image/png;base64,{b64encode(picture).decode('ascii')}"
 
 
 def plot(tops: NDArray[np.float64], areas: NDArray[np.float64]) -> str:

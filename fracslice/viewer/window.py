@@ -18,7 +18,7 @@ from ..common.messages import lacking
 from ..common.parameters import Choice, Vector, validate_value
 from ..errors import RenderError
 from ..mesh.model import Mesh
-from ..mesh.models import read_mesh
+from ..mesh.models import read_coloured
 from . import plotter
 from .plotter import body, set_lighting
 
@@ -160,7 +160,7 @@ def show(mesh: Mesh | str | Path) -> None:
         If the file cannot be read.
     """
     name = "" if isinstance(mesh, Mesh) else f"{Path(mesh).name}: "
-    model = mesh if isinstance(mesh, Mesh) else read_mesh(mesh)
+    model = mesh if isinstance(mesh, Mesh) else read_coloured(mesh)
     need_screen()
     ViewerWindow(model, name).plotter.show()
 

@@ -259,6 +259,14 @@ def test_a_page_holds_figures_problems_pictures_and_the_cross_section(
     capfd.readouterr()
     assert run(["check", str(balls), *COARSE, "--html", str(page)]) == 1
     assert "36 layers, 8.00 x 8.00 x 18.00 mm" in page.read_text()
+    assert 'alt="The object"' not in page.read_text()  # without a mesh
+    assert run(["check", str(balls), "--resolution", "40", "-q", "--html", str(page)]) == 1
+    above, below = (
+        Image.open(io.BytesIO(base64.b64decode(part.partition("base64,")[2].partition('"')[0])))
+        for part in page.read_text().split('alt="The object"')[1:]
+    )
+    red = [((np.asarray(one)[:, :, 0] > 2 * np.asarray(one)[:, :, 1]).mean()) for one in (above, below)]
+    assert red[1] > red[0] >= 0 and red[1] > 0.001  # of the ball in the air, from below
     assert run(["check", str(balls), *COARSE, "--html", "page.txt"]) == 2
     assert "page.txt: expected a file name that ends in .html" in capfd.readouterr().err
 

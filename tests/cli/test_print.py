@@ -6,12 +6,15 @@ import json
 import subprocess
 import sys
 import time
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from fracslice.cli.main import run
 
+from fracslice.export.sending import Figures, read_figures
+from fracslice.export.slicer_profiles import shipped
 from fracslice.mesh.models import read_mesh
 
 PROGRAM = """#!{python}
@@ -167,3 +170,122 @@ def wait_until(true: Callable[[], bool]) -> None:
     while not true():
         assert time.monotonic() < end
         time.sleep(0.05)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="programs are scripts")
+def test_the_summary_has_what_the_slicer_says(
+    ball: Path, installed: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Time, weight and cost; and no settings that happen to have the word."""
+    said = r"; filament used [mm] = 920.5, 79.5\n; total filament used [g] = 12.31\n"
+    said += r"; total filament cost = 0.5\n"
+    said += r"; estimated printing time (normal mode) = 1d 2h 3m 40s\n"
+    script = PROGRAM.replace('write("G28")', f'write("G28\\n{said}")').replace(
+        'print("Slicing done"',
+        'print(\'error_limit = 3\\n"warning": [1, 2]\\nnozzle_error = 4\')\nprint("Done"',
+    )
+    install(installed, "prusa-slicer", "--output", "model.3mf", script=script)
+    out = ball.with_name("ball.gcode")
+    assert printed(ball, "-o", out, *COARSE) == 0
+    shown, warned = capfd.readouterr()
+    assert shown.splitlines()[-1] == f"{out}: made by PrusaSlicer, 26 h 4 min, 12.3 g, cost 0.50"
+    assert warned == "PrusaSlicer: warning: Low bed adhesion\n"
+
+
+def test_figures_are_read_of_each_slicer(tmp_path: Path) -> None:
+    """As their sources write them: OrcaSlicer's project of two plates, Bambu Studio's head, CuraEngine's."""
+    head = "; HEADER_BLOCK_START\n; BambuStudio 02.00\n"
+    head += "; model printing time: 1h 2m; total estimated time: 1h 5m 6s\n"
+    head += "; total filament length [mm] : 1000.5,499.5\n; total filament weight [g] : 3.0,1.5\n"
+    with zipfile.ZipFile(tmp_path / "two.3mf", "w") as file:
+        for plate in (1, 2):
+            file.writestr(f"Metadata/plate_{plate}.gcode", head + "G1 X1\n" * 200_000)
+    assert read_figures(tmp_path / "two.3mf") == Figures(2 * 3906, 9.0, None, pytest.approx(3.0))
+    (tmp_path / "c.gcode").write_text(";FLAVOR:Marlin\n;TIME:6543.5\n;Filament used: 1.25m, 0.75m\nG28\n")
+    assert read_figures(tmp_path / "c.gcode") == Figures(6543.5, None, None, 2.0)
+    (tmp_path / "d.gcode").write_text("G28\n")
+    assert read_figures(tmp_path / "d.gcode") == Figures()
+
+
+BUNDLE = """# vendor
+[printer:*common*]
+printer_technology = FFF
+nozzle_diameter = 0.4
+start_gcode = G28 ; home\\nG1 Z5 = here
+[printer:Own One]
+inherits = *common*
+default_print_profile = 0.2mm
+default_filament_profile = "My PLA";"other"
+[printer:Own Resin]
+printer_technology = SLA
+[print:*base*]
+layer_height = 0.1
+perimeters = 2
+[print:0.2mm]
+inherits = *base*; *missing none*
+layer_height = 0.2
+[print:*missing none*]
+perimeters = 4
+[filament:My PLA]
+temperature = 215
+compatible_printers_condition = nozzle_diameter[0]!=0.8
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="programs are scripts")
+def test_printers_of_a_bundle_are_one_profile_with_what_they_inherit(
+    ball: Path, installed: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("fracslice.export.slicer_profiles.Path.home", lambda: ball.parent)
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(ball.parent))
+    script = PROGRAM.replace(
+        "print(", "shutil.copy(sys.argv[sys.argv.index('--load') + 1], {model!r} + '.ini')\nprint(", 1
+    )
+    install(installed, "prusa-slicer", "--output", "model.3mf", script=script)
+    profiles = installed / "resources" / "profiles"
+    profiles.mkdir(parents=True)
+    (profiles / "Own.ini").write_text(BUNDLE)
+    out = ball.with_name("ball.gcode")
+    assert printed(ball, "-o", out, "--printer", "Own One", "-q", *COARSE) == 0
+    given = dict(line.split(" = ", 1) for line in (installed / "model.3mf.ini").read_text().splitlines())
+    assert given["layer_height"] == "0.2" and given["perimeters"] == "4" and given["temperature"] == "215"
+    assert given["start_gcode"] == "G28 ; home\\nG1 Z5 = here" and given["nozzle_diameter"] == "0.4"
+    assert given["printer_settings_id"] == "Own One" and "inherits" not in given
+    assert run(["print", "--printer", "list"]) == 0
+    shown = capfd.readouterr().out.splitlines()
+    assert "Own One" in shown and not {"Own Resin", "*common*"} & set(shown)
+    out.unlink()
+    assert printed(ball, "-o", out, "--printer", "Own Onf", *COARSE) == 2
+    error = capfd.readouterr().err
+    assert "printer 'Own Onf': no such printer of PrusaSlicer; did you mean Own One?" in error
+    assert error.count("\n") == 1 and not out.exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="programs are scripts")
+def test_printers_of_a_tree_are_three_profiles(
+    ball: Path, installed: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a model, that of its usual nozzle; inherited filaments of the library, too."""
+    monkeypatch.setattr("fracslice.export.slicer_profiles.Path.home", lambda: ball.parent)
+    tree = {
+        "BBL/machine/Own X1": {"type": "machine_model"},
+        "BBL/machine/Own X1 0.4 nozzle": {
+            "type": "machine",
+            "inherits": "fdm_own",
+            "default_print_profile": "0.20mm",
+            "default_filament_profile": ["Own PLA"],
+        },
+        "BBL/machine/fdm_own": {"type": "machine", "nozzle_diameter": ["0.4"]},
+        "BBL/process/0.20mm": {"type": "process", "layer_height": "0.2"},
+        "BBL/filament/Own PLA": {"type": "filament", "inherits": "fdm_pla"},
+        "OrcaFilamentLibrary/filament/base/fdm_pla": {"type": "filament", "density": ["1.24"]},
+    }
+    for name, values in tree.items():
+        file = installed / "resources" / "profiles" / f"{name}.json"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(json.dumps(values))
+    found = shipped("OrcaSlicer", ("OrcaSlicer",), str(installed / "orca-slicer"))
+    assert {"Own X1", "Own X1 0.4 nozzle"} == {name for name in found.printers if name.startswith("Own")}
+    machine, process, filament = (json.loads(file.read_text()) for file in found.write("Own X1", ball.parent))
+    assert machine["nozzle_diameter"] == ["0.4"] and machine["type"] == "machine"
+    assert process["layer_height"] == "0.2" and filament["density"] == ["1.24"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +10,11 @@ import pytest
 from fracslice.cli.main import run
 
 from fracslice import make_mesh
-from fracslice.errors import SceneError
+from fracslice.common.files import RELATIONS
+from fracslice.errors import MeshError, SceneError
 from fracslice.formulas import julia, mandelbox, material, sphere, transform, union
 from fracslice.mesh import Mesh
+from fracslice.mesh.models import read_coloured
 from fracslice.rendering.materials import paint
 from fracslice.work import Work
 
@@ -131,3 +134,41 @@ def test_the_command_and_what_it_refuses(tmp_path: Path, capsys: pytest.CaptureF
     assert not (tmp_path / "a.stl").exists()
     with pytest.raises(SceneError, match="colour='red': expected material, point"):
         make_mesh(sphere(), size="1cm", resolution=8, colour="red")  # type: ignore[arg-type]
+
+
+def test_colours_are_read_back(two: Mesh, tmp_path: Path) -> None:
+    """By `show`: of vertices, and in .3mf files of corners: a vertex has one for each colour."""
+    assert two.colours is not None
+    for name in ("two.ply", "two.glb", "two.3mf"):
+        read = read_coloured(two.export(tmp_path / name))
+        assert read.colours is not None and read.volume == pytest.approx(two.volume, rel=1e-5)
+        off = read.colours[read.triangles].astype(int) - two.colours[two.triangles]
+        assert np.abs(off).max() <= (3 if name == "two.glb" else 0)  # linear light in bytes
+    plain = read_coloured(Mesh(two.vertices, two.triangles).export(tmp_path / "plain.3mf"))
+    assert plain.colours is None and len(plain.vertices) == len(two.vertices)
+
+
+def test_show_opens_on_coloured_files(two: Mesh, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    meshes: list[Mesh] = []
+    monkeypatch.setattr("fracslice.viewer.show", meshes.append)
+    assert run(["show", str(two.export(tmp_path / "two.3mf"))]) == 0
+    assert meshes[0].colours is not None
+    assert len(np.unique(meshes[0].colours, axis=0)) == len(np.unique(two.colours, axis=0))
+
+
+def test_a_file_with_bad_colours_is_one_line(tmp_path: Path) -> None:
+    text = [f'<vertex x="{x}" y="{y}" z="0"/>' for x, y in ((0, 0), (1, 0), (0, 1))]
+    rows = '<triangle v1="0" v2="1" v3="2" pid="2" p1="9"/>'
+    head = '<m:colorgroup id="2"><m:color color="#zz0000"/></m:colorgroup>'
+    mesh = f"<mesh><vertices>{''.join(text)}</vertices><triangles>{rows}</triangles></mesh>"
+    model = f'<resources>{head}<object id="1">{mesh}</object></resources><build><item objectid="1"/></build>'
+    for broken in (True, False):
+        own = model if broken else model.replace("#zz0000", "#aa0000")
+        with zipfile.ZipFile(tmp_path / "x.3mf", "w") as file:
+            file.writestr("_rels/.rels", RELATIONS)
+            file.writestr("3D/3dmodel.model", f'<model xmlns:m="m">{own}</model>')
+        if broken:
+            with pytest.raises(MeshError, match="not a valid 3MF file"):
+                read_coloured(tmp_path / "x.3mf")
+        else:
+            assert read_coloured(tmp_path / "x.3mf").colours is None  # no such colour in the group
