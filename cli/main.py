@@ -47,6 +47,7 @@ NAMES = (
     "fly",
     "formulas",
     "mesh",
+    "plate",
     "print",
     "render",
     "repair",

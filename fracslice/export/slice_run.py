@@ -189,11 +189,9 @@ class SliceRun:
 
     def key(self, form: str) -> str:
         """Key of everything that determines the bytes of encoded layers."""
-        stack = [getattr(self.stack, f.name) for f in fields(self.stack) if f.name != "root"]
         screen = [getattr(self.screen, f.name) for f in fields(self.screen) if f.name != "stack"]
-        field = self.stack.root.key
         return key(
-            *(program(), toolchain(), form, field, *stack, *screen),
+            *(program(), toolchain(), form, *self.stack.identity, *screen),
             *(self.resin, self.sections, sorted(self.metadata.items())),
         )
 

@@ -1,7 +1,7 @@
 """3MF, by the core specification 1.3.
 
-Written: one object in millimetres and, for colours, materials 1.2. Read: the build, with the production
-extension.
+Written: one object in millimetres and, for colours, materials 1.2; or objects and a build of them.
+Read: the build, with the production extension.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import zipfile
 import zlib
 from array import array
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from html import escape
 from itertools import chain
@@ -56,6 +56,30 @@ def _write(mesh: Triangles, file: BinaryIO, metadata: Mapping[str, str], work: W
     is_large = _is_large(len(mesh.vertices), len(mesh.triangles), coloured)
     blocks = work.ordered(lambda text: deflate(text()), _model(mesh, metadata))
     join(file, (partial(append, block) for block in blocks), is_large)
+
+
+def write_build(
+    meshes: Sequence[Triangles],
+    items: Sequence[tuple[int, NDArray[np.float64]]],
+    file: BinaryIO,
+    metadata: Mapping[str, str],
+    work: Work,
+) -> None:
+    """Write meshes, each as an object, and a build: numbers of meshes, and transforms as four rows."""
+
+    def texts() -> Iterator[Text]:
+        yield from _texts(*_head(metadata))
+        for number, mesh in enumerate(meshes, 1):
+            yield from _texts(f'<object id="{number}" type="model">'.encode())
+            yield from mesh_element(mesh.in_order())
+            yield from _texts(b"</object>\n")
+        places = [(k + 1, " ".join(f"{v:.9g}" for v in matrix.ravel().tolist())) for k, matrix in items]
+        built = [f'<item objectid="{number}" transform="{place}"/>\n' for number, place in places]
+        yield from _texts(f"</resources>\n<build>\n{''.join(built)}</build>\n</model>\n".encode())
+
+    vertices, triangles = (sum(len(getattr(m, name)) for m in meshes) for name in ("vertices", "triangles"))
+    blocks = work.ordered(lambda text: deflate(text()), texts())
+    join(file, (partial(append, block) for block in blocks), _is_large(vertices, triangles, False))
 
 
 def write_fragments(
