@@ -19,6 +19,7 @@ from .common.parameters import (
     Flag,
     Given,
     Heights,
+    Holes,
     Length,
     Listed,
     Number,
@@ -50,6 +51,9 @@ RESOLUTION = 256.0
 
 Colour: TypeAlias = Literal["material", "point", "axes", "planes", "sphere", "steps", "direction"]
 """What the colours of vertices show: the materials of the scene, or a property of the orbit."""
+
+DrainPlaces: TypeAlias = "str | Sequence[Sequence[float]]"
+"""Places of drain holes."""
 
 COARSEST, FINEST = 8, 16384
 """Limits of the voxels along the longest side."""
@@ -155,7 +159,14 @@ class Print(Part):
         Length, 0.0, "the object is hollowed out, leaving walls this thick", zero=True
     )
     drain: Given[AnyLength, float] = attribute(
-        Length, 3.0, "diameter of the two holes that let the resin out of the hollow", zero=True
+        Length, 3.0, "diameter of the holes that let the resin out of the hollow", zero=True
+    )
+    drain_at: Given[DrainPlaces, Literal["auto"] | tuple[tuple[float, ...], ...]] = attribute(
+        Holes,
+        (),
+        "holes at these places, mm from the middle of the object and above its lowest point, through the "
+        "nearest wall or in a direction, x,y,z,u,v,w; or auto: where resin or air cannot get out; by default "
+        "two for each hollow",
     )
     base: Given[AnyLength, float] = attribute(
         Length, 0.0, "height that is cut off at the bottom, to stand flat", zero=True
@@ -184,7 +195,8 @@ class Print(Part):
     @property
     def whole(self) -> bool:
         """True if connected components and cavities are only kept or removed as a whole."""
-        return not any((self.bridge, self.gap, self.thickness, self.hollow, self.base, self.raft))
+        made = self.bridge, self.gap, self.thickness, self.hollow, self.base, self.raft, self.drain_at
+        return not any(made)
 
 
 @record
