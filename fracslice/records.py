@@ -164,9 +164,7 @@ class Print(Part):
     drain_at: Given[DrainPlaces, Literal["auto"] | tuple[tuple[float, ...], ...]] = attribute(
         Holes,
         (),
-        "holes at these places, mm from the middle of the object and above its lowest point, through the "
-        "nearest wall or in a direction, x,y,z,u,v,w; or auto: where resin or air cannot get out; by default "
-        "two for each hollow",
+        "holes at places, mm, or where resin or air cannot get out (auto); by default two for each hollow",
     )
     base: Given[AnyLength, float] = attribute(
         Length, 0.0, "height that is cut off at the bottom, to stand flat", zero=True
