@@ -361,6 +361,12 @@ class RasterOptions(Record):
     compensation: Given[AnyLength, float] = attribute(
         Shift, 0.0, "all outlines move outwards by this, or inwards if it is negative; at most 1mm"
     )
+    elephant_foot: Given[AnyLength, float] = attribute(
+        Length,
+        0.0,
+        "outlines of the bottom layers move inwards by this, those of transition layers by less; at most 1mm",
+        zero=True,
+    )
     gamma: float = attribute(Number, 1.0, "gamma of grey levels", above=0, most=10)
     mirror: bool | None = described(None, "mirrors along x; None as the printer needs it")
     levels: int = attribute(
@@ -370,8 +376,9 @@ class RasterOptions(Record):
 
     def __post_init__(self) -> None:
         validate(self, SliceError)
-        if not abs(self.compensation) <= 1:
-            raise SliceError(f"compensation {self.compensation:g} mm: expected at most 1 mm")
+        for name, length in (("compensation", self.compensation), ("elephant_foot", self.elephant_foot)):
+            if not abs(length) <= 1:
+                raise SliceError(f"{name} {length:g} mm: expected at most 1 mm")
 
 
 @record

@@ -27,8 +27,8 @@ job = MeshJob(size="4cm", voxel="0.5mm", resolution=None, dust=1, printing=how,
               chord="10um", simplify="0.1mm", up=[0, 0, 1], scale="102%",
               colour="point", proved=False, faces=None)
 layers = SliceJob(size="40mm", layer="0.1mm", pixel=("0.1mm", 0.1), up=(0, 0, 1), printing=how,
-                  scale=(1, 1, 1.02), printer=None, compensation="50um", gamma=1, mirror=None, levels=8,
-                  blur=1, sections=2)
+                  scale=(1, 1, 1.02), printer=None, compensation="50um", elephant_foot=0, gamma=1,
+                  mirror=None, levels=8, blur=1, sections=2)
 held: tuple[float | None, float, float] = ball.size_mm, how.gap, layers.pixels[0]
 mesh = make_mesh(scene(sphere(), size="40mm"), voxel="2mm", thickness="3mm", scale="102%,102%,101%")
 slices = slice_layers(sphere(), ("0.1mm", 0.2), size="1cm", pixel="0.1mm", bridge=1)

@@ -209,6 +209,7 @@ class SliceRun:
             "grey_levels": screen.levels,
             "blur_pixels": screen.blur,
             "compensation_mm": screen.compensation,
+            "elephant_foot_mm": screen.elephant_foot,
             "mirror": screen.mirrored,
             "layers": [
                 {"file": f"{name}{i:05d}.png", "top_mm": round(float(z), 6)} for i, z in enumerate(stack.tops)

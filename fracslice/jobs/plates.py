@@ -75,7 +75,9 @@ class PlateRecipe:
         names = ", ".join(part.name for part in scenes)
         about = {"Title": names, "scene_hash": key(*(scenes[part].hash for part in self.parts))}
         files = about, whole.mesh, whole.picture, first.created
-        return SliceRun(plate, Screen.of(plate, job), work, first.resin, *files, job.sections, self)
+        return SliceRun(
+            plate, Screen.of(plate, job, first.resin), work, first.resin, *files, job.sections, self
+        )
 
     def _plate(self, stacks: dict[SliceRecipe, Stack], work: Work) -> Stack:
         """Place the parts."""

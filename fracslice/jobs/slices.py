@@ -108,7 +108,9 @@ class SliceRecipe:
         about = {"Title": self.name, "scene_hash": scene.hash}
         model = StackModel(scene, job, replace(work, cluster=None))
         files = about, model.mesh, model.picture, self.created
-        return SliceRun(stack, Screen.of(stack, job), work, self.resin, *files, job.sections, self)
+        return SliceRun(
+            stack, Screen.of(stack, job, self.resin), work, self.resin, *files, job.sections, self
+        )
 
     def encoder(self, run: SliceRun) -> Encode:
         """Return the function that encodes the layers of a run in this format; see `Recipe.encoder`."""

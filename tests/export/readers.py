@@ -69,18 +69,19 @@ def goo(data: bytes) -> Read:
     layers, columns, rows, mirror_x, mirror_y = file.get("I2H2?")
     file.get("3f")
     thickness, exposure = file.get("2f")
-    file.get("?8fI16f2H")
+    rests, _, motion = file.get("?8f")[2:8], file.get("I"), file.get("16f")
+    file.get("2H")
     (each_layer,) = file.get("?")
     seconds, volume, weight, _ = file.get("I3f")
     file.raw(8)
     begin, grey, _ = file.get("I?H")
     assert each_layer and grey and begin == file.at == 195477
-    read = Read(
-        [], [], [], previews, {"volume": volume, "weight": weight, "texts": texts, "mirror": mirror_x}
-    )
+    about = {"volume": volume, "weight": weight, "texts": texts, "mirror": mirror_x}
+    read = Read([], [], [], previews, about | {"rests": rests, "motion": motion, "layers": []})
     for _ in range(layers):
         _, _, top, seconds = file.get("H3f")
-        file.get("12fH")
+        read.about["layers"].append(file.get("12f"))
+        file.get("H")
         file.expect(b"\r\n")
         (size,) = file.get("I")
         picture = file.raw(size)

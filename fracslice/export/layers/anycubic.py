@@ -61,8 +61,8 @@ def _section(name: str, contents: bytes, counted: int = 0) -> bytes:
 def _settings(job: PrintData) -> bytes:
     resin, (rows, columns) = job.resin, job.run.screen.shape
     return _HEADER.pack(
-        *(1000 * max(job.printer.pixel), float(job.heights.max()), resin.exposure, resin.wait),
-        *(resin.bottom_exposure, resin.bottom_layers, resin.lift, resin.lift_speed / 60),
+        *(1000 * max(job.printer.pixel), float(job.heights.max()), resin.exposure, resin.rest),
+        *(resin.bottom_exposure, resin.bottom_layers, resin.whole_lift, resin.lift_speed / 60),
         *(resin.retract_speed / 60, job.volume_ml, 1, columns, rows, job.weight_g, job.cost, DOLLARS),
         *(1, round(job.seconds), resin.transition_layers, 0),
     )
@@ -76,7 +76,7 @@ def _preview(job: PrintData, wide: bool) -> bytes:
 
 def _layers(job: PrintData, first: int) -> bytes:
     places = accumulate(job.sizes, initial=first)
-    how = job.resin.lift, job.resin.lift_speed / 60
+    how = job.resin.whole_lift, job.resin.lift_speed / 60
     return b"".join(
         _LAYER.pack(place, size, *how, float(exposure), float(height))
         for place, size, exposure, height in zip(places, job.sizes, job.exposures, job.heights, strict=False)
@@ -84,10 +84,17 @@ def _layers(job: PrintData, first: int) -> bytes:
 
 
 def _motion(job: PrintData) -> bytes:
-    """Version 516: motion in two steps, of bottom layers and of others."""
+    """Version 516: motion in two steps, of bottom layers and of others: way, speed up and speed down of each.
+
+    The way back has the same steps.
+    """
     resin = job.resin
-    step = resin.lift / 2, resin.lift_speed / 60, resin.retract_speed / 60
-    steps = struct.pack("<I6f", 2, *step, *step)
+    last = (resin.retract_speed_2 if resin.retract_2 else resin.retract_speed) / 60
+    first = resin.lift, resin.lift_speed / 60, last
+    then = resin.lift_2, resin.lift_speed_2 / 60, resin.retract_speed / 60
+    if not resin.lift_2:
+        first, then = (resin.lift / 2, *first[1:]), (resin.lift / 2, first[1], then[2])
+    steps = struct.pack("<I6f", 2, *first, *then)
     return b"EXTRA".ljust(12, b"\0") + struct.pack("<I", 24) + steps + steps
 
 
