@@ -40,6 +40,7 @@ from .execution import NOTHING, StoppedError
 NAMES = (
     "animate",
     "bench",
+    "calibrate",
     "check",
     "cut",
     "explore",
