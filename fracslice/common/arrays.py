@@ -210,6 +210,10 @@ class Triangles:
         scalars = {name: values[index] for name, values in self.scalars.items()}
         return Triangles(self.vertices[index], triangles, colours, scalars)
 
+    def thumbnail(self) -> bytes | None:
+        """A small picture as PNG; None if nothing draws one."""
+        return None
+
     def to_trimesh(self) -> trimesh.Trimesh:
         """Copy of the mesh as a `trimesh.Trimesh`, unprocessed.
 

@@ -550,8 +550,25 @@ RELATIONS = (
     '<Relationship Target="/3D/3dmodel.model" Id="model" '
     'Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>'
 )
+THUMBNAIL = "Metadata/thumbnail.png"
+SHOWN = (
+    f'<Relationship Target="/{THUMBNAIL}" Id="thumbnail" '
+    'Type="http://schemas.openxmlformats.org/package/2006/relationships/metadata/thumbnail"/>'
+)
 SMALL = ("[Content_Types].xml", TYPES.encode()), ("_rels/.rels", RELATIONS.encode())
-"""Members of a package besides the model."""
+"""Members of a package besides the model, without a picture of it."""
+
+
+def _small(picture: bytes | None) -> Iterator[tuple[str, bytes]]:
+    """Members of a package besides the model, with a PNG picture of it if there is one."""
+    if picture is None:
+        yield from SMALL
+        return
+    png = '<Default Extension="png" ContentType="image/png"/></Types>'
+    yield "[Content_Types].xml", TYPES.replace("</Types>", png).encode()
+    yield "_rels/.rels", RELATIONS.replace("</Relationships>", f"{SHOWN}</Relationships>").encode()
+    yield THUMBNAIL, picture
+
 
 LEVEL = 3  # of deflate: a third of the time of the default 6, for files a twentieth larger
 
@@ -588,10 +605,10 @@ def combine_checksums(one: TextSum, other: TextSum) -> TextSum:
     return TextSum(crc32_combine(one.crc, other.crc, other.size), one.size + other.size)
 
 
-def join(file: BinaryIO, fragments: Iterable[Fragment], is_large: bool) -> None:
-    """Write a package whose model is made of fragments. Its members carry no time."""
+def join(file: BinaryIO, fragments: Iterable[Fragment], is_large: bool, picture: bytes | None = None) -> None:
+    """Write a package whose model is made of fragments, and a picture of it. Its members carry no time."""
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=LEVEL) as archive:
-        for name, text in SMALL:
+        for name, text in _small(picture):
             archive.writestr(zipfile.ZipInfo(name), text, zipfile.ZIP_DEFLATED)
         info, whole = zipfile.ZipInfo("3D/3dmodel.model"), TextSum(0, 0)
         info.compress_type, info.external_attr = zipfile.ZIP_DEFLATED, 0o600 << 16

@@ -1,6 +1,6 @@
 """3MF, by the core specification 1.3.
 
-Written: one object in millimetres and, for colours, materials 1.2; or objects and a build of them.
+Written: one object in millimetres, with colours by materials 1.2, or objects and a build; a thumbnail.
 Read: the build, with the production extension.
 """
 
@@ -51,11 +51,11 @@ def _write(mesh: Triangles, file: BinaryIO, metadata: Mapping[str, str], work: W
 
     See `MeshFormat`. Metadata that 3MF does not define get fracslice's namespace.
     """
-    mesh = mesh.in_order()
+    picture, mesh = mesh.thumbnail(), mesh.in_order()
     coloured = mesh.colours is not None
     is_large = _is_large(len(mesh.vertices), len(mesh.triangles), coloured)
     blocks = work.ordered(lambda text: deflate(text()), _model(mesh, metadata))
-    join(file, (partial(append, block) for block in blocks), is_large)
+    join(file, (partial(append, block) for block in blocks), is_large, picture)
 
 
 def write_build(
@@ -64,8 +64,12 @@ def write_build(
     file: BinaryIO,
     metadata: Mapping[str, str],
     work: Work,
+    picture: bytes | None = None,
 ) -> None:
-    """Write meshes, each as an object, and a build: numbers of meshes, and transforms as four rows."""
+    """Write meshes, each as an object, and a build: numbers of meshes, and transforms as four rows.
+
+    `picture`: of all, as PNG.
+    """
 
     def texts() -> Iterator[Text]:
         yield from _texts(*_head(metadata))
@@ -79,7 +83,7 @@ def write_build(
 
     vertices, triangles = (sum(len(getattr(m, name)) for m in meshes) for name in ("vertices", "triangles"))
     blocks = work.ordered(lambda text: deflate(text()), texts())
-    join(file, (partial(append, block) for block in blocks), _is_large(vertices, triangles, False))
+    join(file, (partial(append, block) for block in blocks), _is_large(vertices, triangles, False), picture)
 
 
 def write_fragments(

@@ -33,7 +33,6 @@ from ..work import Work
 from .slices import SliceRecipe, StackModel, rendered
 
 if TYPE_CHECKING:
-    from ..common.arrays import Triangles
     from ..mesh import Mesh
     from ..slicing.stack import Standing
 
@@ -215,7 +214,8 @@ def write_meshes(
     items = [(k, _transform(spot, corner)) for k, spot in zip(places, spots, strict=True)]
     if Path(path).suffix.lower() == ".3mf":
         with replacing(path) as file:
-            write_build(meshes, items, file, {"Application": APPLICATION, **about}, work)
+            whole = _laid_out(meshes, items)
+            write_build(meshes, items, file, {"Application": APPLICATION, **about}, work, whole.thumbnail())
     else:
         write(_laid_out(meshes, items), path, about, work)
     return spots
@@ -230,10 +230,11 @@ def _transform(spot: Spot, corner: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1], [*(corner + spot.middle), 0]], float)
 
 
-def _laid_out(meshes: Sequence[Mesh], items: Sequence[tuple[int, NDArray[np.float64]]]) -> Triangles:
+def _laid_out(meshes: Sequence[Mesh], items: Sequence[tuple[int, NDArray[np.float64]]]) -> Mesh:
     """All parts as one mesh."""
-    from ..common.arrays import Triangles, concatenate, product
+    from ..common.arrays import concatenate, product
+    from ..mesh import Mesh
 
     return concatenate(
-        [Triangles(product(meshes[k].vertices, m[:3]) + m[3], meshes[k].triangles) for k, m in items]
+        [Mesh(product(meshes[k].vertices, m[:3]) + m[3], meshes[k].triangles) for k, m in items]
     )

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fracslice.cli.main import run
+from PIL import Image
 from scipy.ndimage import label
 
 from fracslice.mesh.models import read_mesh
@@ -54,8 +55,25 @@ def test_meshes_of_a_plate(ball: Path, tmp_path: Path) -> None:
         low, high = mesh.vertices.min(0), mesh.vertices.max(0)
         assert (low + high)[:2] / 2 == pytest.approx([30, 25], abs=0.5)
         assert high[0] - low[0] == pytest.approx(42, abs=1.5)
-    text = zipfile.ZipFile(tmp_path / "two.3mf").read("3D/3dmodel.model").decode()
+    archive = zipfile.ZipFile(tmp_path / "two.3mf")
+    assert Image.open(archive.open("Metadata/thumbnail.png")).size == (480, 360)
+    text = archive.read("3D/3dmodel.model").decode()
     assert (text.count("<object "), text.count("<item ")) == (1, 2)
+
+
+def test_lib3mf_reads_a_plate_in_strict_mode(ball: Path, tmp_path: Path) -> None:
+    lib3mf = pytest.importorskip("lib3mf")
+    path = tmp_path / "three.3mf"
+    given = ["-o", str(path), "--copies", "3", "--resolution", "16", "--threads", "1"]
+    assert run(["plate", str(ball), *given]) == 0
+    model = lib3mf.get_wrapper().CreateModel()
+    reader = model.QueryReader("3mf")
+    reader.SetStrictModeActive(True)
+    reader.ReadFromFile(str(path))
+    assert reader.GetWarningCount() == 0
+    assert model.GetBuildItems().Count() == 3
+    assert model.GetMeshObjects().Count() == 1
+    assert model.HasPackageThumbnailAttachment()
 
 
 @pytest.mark.parametrize(
