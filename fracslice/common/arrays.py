@@ -211,7 +211,13 @@ class Triangles:
         return Triangles(self.vertices[index], triangles, colours, scalars)
 
     def thumbnail(self) -> bytes | None:
-        """A small picture as PNG; None if nothing draws one."""
+        """Draw a small picture; `Mesh` does.
+
+        Returns
+        -------
+        bytes or None
+            A PNG file; None if nothing draws one.
+        """
         return None
 
     def to_trimesh(self) -> trimesh.Trimesh:

@@ -368,7 +368,13 @@ class Mesh(Triangles):
         return self.thumbnail()
 
     def thumbnail(self) -> bytes | None:
-        """Draw the mesh in its colours, or in clay, as a small PNG picture; None without triangles."""
+        """Draw the mesh in its colours, or in clay, on a transparent background.
+
+        Returns
+        -------
+        bytes or None
+            A PNG file of 480 x 360 pixels; None without triangles.
+        """
         return thumbnail(self) if len(self.triangles) else None
 
     @staticmethod
