@@ -58,6 +58,7 @@ READERS = {
     "cbddlp": (readers.ctb, lambda image: (image.astype(int) + 32) // 64),
     "pwmx": (readers.photon, quantised(4)),
     "nanodlp": (readers.nanodlp, lambda image: image),
+    "cxdlpv4": (readers.cxdlp, lambda image: image >> 1),
 }
 """Readers of the formats of known printers, and what a format keeps of a grey level."""
 
@@ -80,6 +81,8 @@ CASES = {
     "cbddlp": ("part.cbddlp", readers.ctb, lambda image: (image.astype(int) + 32) // 64),
     "pwmx 1": ("part.pwmx", readers.photon, quantised(4)),
     "pwma 516": ("part.pwma", readers.photon, quantised(4)),
+    "pm5 517": ("part.pm5", readers.photon, quantised(4)),
+    "cxdlpv4": ("part.cxdlpv4", readers.cxdlp, lambda image: image >> 1),
     "nanodlp": ("part.nanodlp", readers.nanodlp, lambda image: image),
 }
 

@@ -11,7 +11,7 @@ from typing import BinaryIO
 from ..._slices import Encoding
 from ...slicing.printers import Resin
 from ...version import __version__
-from ..layer_formats import PrintData, pixel_format, rgb565
+from ..layer_formats import PrintData, pixel_format, rgb565, second_stages
 
 MAGIC = b"\x07\0\0\0DLP\0"
 DELIMITER = b"\r\n"
@@ -59,7 +59,7 @@ def _settings(job: PrintData) -> bytes:
         *(_rests(resin) * 2),
         resin.bottom_exposure,
         resin.bottom_layers,
-        *(*first, *(_second(resin)[:2] * 2), *(_second(resin)[2:] * 2)),
+        *(*first, *(second_stages(resin)[:2] * 2), *(second_stages(resin)[2:] * 2)),
         *(255, 255, True, round(job.seconds)),
         *(1000 * job.volume_ml, job.weight_g, job.cost, b"", HEADER, True, resin.transition_layers),
     )
@@ -69,8 +69,8 @@ def _layer(job: PrintData, index: int, size: int) -> bytes:
     resin = job.resin
     return _LAYER.pack(
         *(0, 0, float(job.tops[index]), float(job.exposures[index]), 0, *_rests(resin)),
-        *(resin.lift, resin.lift_speed, *_second(resin)[:2]),
-        *(resin.retract, resin.retract_speed, *_second(resin)[2:]),
+        *(resin.lift, resin.lift_speed, *second_stages(resin)[:2]),
+        *(resin.retract, resin.retract_speed, *second_stages(resin)[2:]),
         *(255, DELIMITER, size),
     )
 
@@ -78,12 +78,6 @@ def _layer(job: PrintData, index: int, size: int) -> bytes:
 def _rests(resin: Resin) -> tuple[float, float, float]:
     """Rests after a layer, after the lift and before a layer, s."""
     return resin.wait_after, resin.wait_lifted, resin.wait
-
-
-def _second(resin: Resin) -> tuple[float, float, float, float]:
-    """Second stages of the lift and of the way back, mm and mm/min; zeros where there is none."""
-    up = (resin.lift_2, resin.lift_speed_2) if resin.lift_2 else (0.0, 0.0)
-    return (*up, resin.retract_2, resin.retract_speed_2) if resin.retract_2 else (*up, 0.0, 0.0)
 
 
 FORMATS = (pixel_format("goo", Encoding.GOO, _assemble, endings=(".goo", ".prz"), also={".prz": ".goo"}),)
