@@ -303,7 +303,9 @@ class Variant:
 
 def options_of(settings: dict[str, str]) -> tuple[str, ...]:
     """Print settings as options."""
-    return tuple(f"--{name} {text}" for name, text in settings.items())
+    from fracslice.checks.problems import as_option
+
+    return tuple(as_option(name, text) for name, text in settings.items())
 
 
 @dataclass(frozen=True)

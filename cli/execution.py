@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from fracslice.mesh import Mesh
     from fracslice.mesh.checks import MeshReport
     from fracslice.scene import Scene
+    from fracslice.slicing import Stack
     from fracslice.volume import Drain
     from fracslice.work import Work
 
@@ -390,14 +391,23 @@ def starts(drains: Sequence[Drain]) -> np.ndarray:
 
 
 def trapped_volume(run: SliceRun) -> tuple[int, float]:
-    """Number and volume, mm3, of the cavities of a stack."""
+    """Number and volume, mm3, of the cavities of a stack, or of all parts of a plate."""
+    if not run.stack.parts:
+        return _trapped(run.stack, run.work)
+    alone = {id(part.stack): part.stack for part in run.stack.parts}
+    known = {k: _trapped(stack, run.work) for k, stack in alone.items()}
+    counts, volumes = zip(*(known[id(part.stack)] for part in run.stack.parts), strict=True)
+    return sum(counts), sum(volumes)
+
+
+def _trapped(stack: Stack, work: Work) -> tuple[int, float]:
+    """Number and volume, mm3, of the cavities of one object."""
     from fracslice.volume.amount import count_sealed
 
-    stack = run.stack
     narrowest = min((2 * drain.radius for drain in stack.drains), default=math.inf)
     longest = max(stack.outer.size)
     cell = max(min(longest / CELLS, narrowest / 3), longest / FINEST)
-    count, volume = count_sealed(stack.root, stack.outer, cell, run.work)
+    count, volume = count_sealed(stack.root, stack.outer, cell, work)
     return count, volume * stack.scale**3
 
 

@@ -40,6 +40,7 @@ from .execution import NOTHING, StoppedError
 NAMES = (
     "animate",
     "bench",
+    "calibrate",
     "check",
     "cut",
     "explore",
@@ -47,6 +48,7 @@ NAMES = (
     "fly",
     "formulas",
     "mesh",
+    "plate",
     "print",
     "render",
     "repair",

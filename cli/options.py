@@ -23,6 +23,7 @@ from fracslice.common.parameters import (
     Duration,
     Flag,
     Heights,
+    Holes,
     Listed,
     Number,
     Parameter,
@@ -148,6 +149,8 @@ def metavar(kind: Parameter) -> str:
         return kind.unit.upper() or ("N" if isinstance(kind, Number) else "X Y Z")
     if isinstance(kind, Pixels):
         return kind.letters
+    if isinstance(kind, Holes):
+        return f"X,Y,Z|{kind.WORD}"
     names = {Percent: "N%[,N%,N%]", Duration: "TIME"}
     return names.get(type(kind), "LENGTH")
 
@@ -159,6 +162,8 @@ def kind_option(kind: Parameter, default: Any, text: str = "") -> Any:
         return flag(f"{text}.")
     usual = "" if kind.default is None else kind.text(kind.default)
     text += f"; {usual} by default." if usual and usual not in ("0mm", "0") and "default" not in text else "."
+    if isinstance(kind, Holes):
+        return option(OfKind(kind), f"{text} Repeatable.", multiple=True, callback=partial(gathered, kind))
     if isinstance(kind, Vector):
         return option(
             NUMBER, text, metavar="X Y Z", nargs=3, default=default, callback=partial(checked, kind)
@@ -172,6 +177,13 @@ def checked(kind: Parameter, _: click.Context, __: click.Parameter, value: Any) 
         return kind.check(value)
     except ValueError as error:
         raise click.BadParameter(f"{kind.text(value)}: expected {error}") from None
+
+
+def gathered(kind: Holes, _: click.Context, __: click.Parameter, values: Sequence[Any]) -> Any:
+    """Holes of a repeated option."""
+    if kind.WORD in values and len(values) > 1:
+        raise click.BadParameter(f"{kind.WORD}: expected it alone, or places")
+    return (kind.WORD if kind.WORD in values else sum(values, ())) if values else None
 
 
 def read_seconds(text: str) -> float:
@@ -354,8 +366,10 @@ class PreparationOptions(SceneOptions):
         """Print settings, overridden by those of the options."""
         own = self.values(Print)
         changed = replace(given, **own)
-        if "drain" in own and not changed.hollow:
-            raise click.UsageError("--drain: expected --hollow, or a hollow in the scene's <print>")
+        if "drain" in own and not changed.hollow and not changed.drain_at:
+            raise click.UsageError(
+                "--drain: expected --hollow, --drain-at, or a hollow in the scene's <print>"
+            )
         return changed
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import partial
 from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,10 +20,12 @@ from fracslice.records import RasterOptions
 from .execution import check_targets, load_scene, of_layers, refuse_options
 from .options import (
     AMOUNT,
+    LENGTH,
     NUMBER,
     ClusterOptions,
     LayerOptions,
     Name,
+    Whole,
     argument,
     command,
     option,
@@ -58,12 +62,11 @@ def listed_resin(context: click.Context, _: click.Parameter, name: str | None) -
     context.exit()
 
 
-class SliceOptions(ClusterOptions, LayerOptions):
-    """Options of `slice`."""
+class LayerFileOptions(ClusterOptions, LayerOptions):
+    """Options of files of layers."""
 
     without = frozenset()
 
-    source: str = argument("SCENE|MODEL")
     output: str = output(
         "OUT",
         "A printer's file (.sl1, .goo, .ctb, .cbddlp, .pwmx, .nanodlp, ...), an .svg, .3mf, .cli or .json "
@@ -107,6 +110,18 @@ class SliceOptions(ClusterOptions, LayerOptions):
     price: float | None = option(AMOUNT, "Price of a litre of resin; the resin's by default.")
 
 
+COPIES = option(Whole(1, 1000), "How often each part stands on the plate; once by default.", default=1)
+SPACING = option(LENGTH, "Distance between the parts of a plate; 2mm by default.", default="2mm")
+
+
+class SliceOptions(LayerFileOptions):
+    """Options of `slice`."""
+
+    source: str = argument("SCENE|MODEL")
+    copies: int = COPIES
+    spacing: float = SPACING
+
+
 @command(SliceOptions, "slice")
 @families("output", "preview", "html")
 def slice_(given: SliceOptions) -> int:
@@ -121,6 +136,31 @@ def slice_(given: SliceOptions) -> int:
     fracslice slice menger-tower -o tower.sl1 --size 60mm --printer sl1s
     fracslice slice mandelbulb -o bulb.goo --printer mars-5 --exposure 2.5 30 --hollow 2mm
     fracslice slice my.xml -o layers --pixel 0.05mm --preview sheet.png
+    fracslice slice my.xml -o six.goo --printer mars-5 --size 30mm --copies 6
+    """
+
+    def planned(kind: str, resin: Resin | None) -> Callable[[Work], SliceRun]:
+        scene = load_scene(given.source, given.settings)
+        made = recipe(given, scene, kind, resin)
+        if given.copies == 1:
+            return partial(made.run, scene=scene)
+        from fracslice.jobs.plates import PlateRecipe
+
+        return PlateRecipe((made,) * given.copies, given.spacing).run
+
+    if given.copies == 1:
+        refuse_options({"spacing"}, "only for several parts: --copies, or fracslice plate")
+    return write_layers(given, [given.source], planned)
+
+
+def write_layers(
+    given: LayerFileOptions,
+    sources: Sequence[str],
+    planned: Callable[[str, Resin | None], Callable[[Work], SliceRun]],
+) -> int:
+    """Write layers, what describes them, and a summary.
+
+    planned: reads the scenes for a format and a resin, and returns the function that plans the layers.
     """
     from fracslice.export.layers import PICTURES, PRINTS, slice_format, write_slices
     from fracslice.export.resuming import KEPT
@@ -134,11 +174,12 @@ def slice_(given: SliceOptions) -> int:
         refuse_what_no_print_has(given, kind, resin)
     if given.address is not None:
         refuse_to_send(output, kind, given.address)
-    check_targets(given.source, None if Path(output).is_dir() else output, given.preview, given.html)
-    scene = load_scene(given.source, given.settings)
+    for source in sources:
+        check_targets(source, None if Path(output).is_dir() else output, given.preview, given.html)
+    plan = planned(kind, resin)
     last: list[str] = []
     with given.working(KEPT) as work:
-        run = recipe(given, scene, kind, resin).run(work, scene)
+        run = plan(work)
         write_slices(run, output, given.form)
         with keeping(f"{output} is written"):
             if given.preview:
@@ -157,7 +198,7 @@ def slice_(given: SliceOptions) -> int:
     return 1 if complete.problems else 0
 
 
-def recipe(given: SliceOptions, scene: Scene, kind: str, resin: Resin | None) -> SliceRecipe:
+def recipe(given: LayerFileOptions, scene: Scene, kind: str, resin: Resin | None) -> SliceRecipe:
     """Scene and settings of the layers."""
     from fracslice.jobs.slices import SliceRecipe
     from fracslice.scene.model import to_xml
@@ -173,7 +214,8 @@ def describe_layers(run: SliceRun, output: str, complete: Completeness) -> list[
     stack, screen = run.stack, run.screen
     size = " x ".join(map(decimal, stack.size))
     rows, columns = screen.shape
-    first = f"{output}: {format_count(len(stack.z), 'layer')} of {columns} x {rows} pixels, {size} mm"
+    parts = f"{format_count(len(stack.parts), 'part')}, " if stack.parts else ""
+    first = f"{output}: {parts}{format_count(len(stack.z), 'layer')} of {columns} x {rows} pixels, {size} mm"
     other = printers_file(screen.printer, output) if screen.printer else ""
     lost = [f"would not print: {', '.join(complete.problems)}"] if complete.problems else []
     start = [calibration(run.resin)] if run.resin and slice_format(output) in PRINTS else []
@@ -193,7 +235,7 @@ def calibration(resin: Resin) -> str:
     )
 
 
-def resin_of(given: SliceOptions) -> Resin | None:
+def resin_of(given: LayerFileOptions) -> Resin | None:
     """Exposure and motion of --resin, else of the printer's own; --exposure changes them. None if there is
     neither.
     """
@@ -211,7 +253,7 @@ def resin_of(given: SliceOptions) -> Resin | None:
     return replace(profile, exposure=exposure, bottom_exposure=bottom)
 
 
-def refuse_what_no_print_has(given: SliceOptions, kind: str, resin: Resin | None) -> None:
+def refuse_what_no_print_has(given: LayerFileOptions, kind: str, resin: Resin | None) -> None:
     """Raise a usage error for options that a printer's file does not allow.
 
     This is checked before print preparation, which may take minutes.

@@ -222,6 +222,31 @@ class Slab:
 def encoded(image: NDArray[uint8], encoding: Encoding) -> bytes:
     """Encode an image of any strides."""
 
+def plate_picture(
+    pieces: Sequence[tuple[Slab, int, bool, bool, tuple[int, int], bool, Sequence[tuple[int, int]]]],
+    pixels: tuple[int, int],
+    levels: bytes,
+    encoding: Encoding,
+) -> tuple[bytes, float, int]:
+    """Layers of several objects in one picture, encoded; they must not overlap.
+
+    Parameters
+    ----------
+    pieces : sequence of tuple
+        For each object its slab and the sampled layer, `transposed` and `backwards` as for `Slab.picture`,
+        rows and columns of the layer, whether its rows are shown in the other order, and the row and column
+        of the picture of its first pixel, for each time it is shown.
+    pixels, levels, encoding
+        As for `Slab.picture`.
+
+    Returns
+    -------
+    data : bytes
+        Encoded picture.
+    area, cut
+        As from `Slab.paint`, of all that is shown.
+    """
+
 def filtered(rows: NDArray[uint8], pixel: int) -> bytes:
     """Filter rows of bytes, each by the PNG filter with the smallest sum of absolute differences.
 

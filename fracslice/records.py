@@ -21,6 +21,7 @@ from .common.parameters import (
     Flag,
     Given,
     Heights,
+    Holes,
     Length,
     Listed,
     Number,
@@ -59,6 +60,8 @@ Palette: TypeAlias = Literal["viridis", "plasma", "inferno", "magma", "cividis",
 
 MOST_FILAMENTS = 16
 """Most filaments that slicers tell apart in painted triangles."""
+DrainPlaces: TypeAlias = "str | Sequence[Sequence[float]]"
+"""Places of drain holes."""
 
 COARSEST, FINEST = 8, 16384
 """Limits of the voxels along the longest side."""
@@ -164,7 +167,12 @@ class Print(Part):
         Length, 0.0, "the object is hollowed out, leaving walls this thick", zero=True
     )
     drain: Given[AnyLength, float] = attribute(
-        Length, 3.0, "diameter of the two holes that let the resin out of the hollow", zero=True
+        Length, 3.0, "diameter of the holes that let the resin out of the hollow", zero=True
+    )
+    drain_at: Given[DrainPlaces, Literal["auto"] | tuple[tuple[float, ...], ...]] = attribute(
+        Holes,
+        (),
+        "holes at places, mm, or where resin or air cannot get out (auto); by default two for each hollow",
     )
     base: Given[AnyLength, float] = attribute(
         Length, 0.0, "height that is cut off at the bottom, to stand flat", zero=True
@@ -193,7 +201,8 @@ class Print(Part):
     @property
     def whole(self) -> bool:
         """True if connected components and cavities are only kept or removed as a whole."""
-        return not any((self.bridge, self.gap, self.thickness, self.hollow, self.base, self.raft))
+        made = self.bridge, self.gap, self.thickness, self.hollow, self.base, self.raft, self.drain_at
+        return not any(made)
 
 
 @record
@@ -452,6 +461,12 @@ class RasterOptions(Record):
     compensation: Given[AnyLength, float] = attribute(
         Shift, 0.0, "all outlines move outwards by this, or inwards if it is negative; at most 1mm"
     )
+    elephant_foot: Given[AnyLength, float] = attribute(
+        Length,
+        0.0,
+        "outlines of the bottom layers move inwards by this, those of transition layers by less; at most 1mm",
+        zero=True,
+    )
     gamma: float = attribute(Number, 1.0, "gamma of grey levels", above=0, most=10)
     mirror: bool | None = described(None, "mirrors along x; None as the printer needs it")
     levels: int = attribute(
@@ -461,8 +476,9 @@ class RasterOptions(Record):
 
     def __post_init__(self) -> None:
         validate(self, SliceError)
-        if not abs(self.compensation) <= 1:
-            raise SliceError(f"compensation {self.compensation:g} mm: expected at most 1 mm")
+        for name, length in (("compensation", self.compensation), ("elephant_foot", self.elephant_foot)):
+            if not abs(length) <= 1:
+                raise SliceError(f"{name} {length:g} mm: expected at most 1 mm")
 
 
 @record

@@ -17,7 +17,7 @@ from fracslice.formats import write
 
 from .mesh import shapes
 
-for name in ("animation.film", "jobs.slices"):
+for name in ("animation.film", "jobs.slices", "scene.calibration"):
     import_module(f"fracslice.{name}")  # before a test replaces what they import
 
 ROOT = Path(__file__).parents[1]
@@ -142,6 +142,7 @@ def test_commands_are_understood(line: str, folder: Path, monkeypatch, capfd) ->
         "rendering.Renderer",
         "animation.Timeline",
         "bench.measurements.measure",
+        "scene.calibration.calibration",
         "viewer.fly",
         "cluster.connect",
     ):

@@ -19,7 +19,7 @@ from fracslice.scene.view import View
 from fracslice.slicing import SliceJob
 
 how = Print(cavities="fill", keep="largest", bridge=0, gap="0.1mm", thickness="1mm",
-            hollow=2, drain="3mm", base="1mm", raft=1.5)
+            hollow=2, drain="3mm", drain_at="0,0,1", base="1mm", raft=1.5)
 ball = Scene(sphere(), size_mm="40mm", name="ball", view=View(), printing=how, animation=None,
              tracks=(), unit_mm=None)
 unit = Scene(sphere(), None, unit_mm="1cm")
@@ -28,8 +28,8 @@ job = MeshJob(size="4cm", voxel="0.5mm", resolution=None, dust=1, printing=how,
               colour="point", proved=False, faces=None, palette=("#000", "#fff"), filaments=4,
               bodies=True, heights=(0.1, "0.3mm"), paint_supports=False)
 layers = SliceJob(size="40mm", layer="0.1mm", pixel=("0.1mm", 0.1), up=(0, 0, 1), printing=how,
-                  scale=(1, 1, 1.02), printer=None, compensation="50um", gamma=1, mirror=None, levels=8,
-                  blur=1, sections=2)
+                  scale=(1, 1, 1.02), printer=None, compensation="50um", elephant_foot=0, gamma=1,
+                  mirror=None, levels=8, blur=1, sections=2)
 held: tuple[float | None, float, float] = ball.size_mm, how.gap, layers.pixels[0]
 mesh = make_mesh(scene(sphere(), size="40mm"), voxel="2mm", thickness="3mm", scale="102%,102%,101%")
 slices = slice_layers(sphere(), ("0.1mm", 0.2), size="1cm", pixel="0.1mm", bridge=1)

@@ -53,6 +53,7 @@ class PrintKeywords(TypedDict, total=False):
     thickness: AnyLength | None
     hollow: AnyLength | None
     drain: AnyLength | None
+    drain_at: str | Sequence[Sequence[float]] | None
     base: AnyLength | None
     raft: AnyLength | None
 

@@ -36,11 +36,16 @@ class Problem:
         where = [] if self.layer is None else [f"layer {self.layer}"]
         if self.at is not None:
             where.append(f"at {place(self.at)} mm")
-        flags = " ".join(f"--{name} {value}" for name, value in self.mend)
+        flags = " ".join(as_option(name, value) for name, value in self.mend)
         hints = " or ".join(filter(None, [flags, self.advice]))
         return " ".join(filter(None, [f"{self.text}:" if where else self.text, ", ".join(where)])) + (
             f"; {hints}" if hints else ""
         )
+
+
+def as_option(name: str, value: str) -> str:
+    """A print setting as an option of a command."""
+    return f"--{name.replace('_', '-')} {value}"
 
 
 def verdict(problems: Sequence[Problem]) -> str:

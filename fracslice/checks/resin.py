@@ -20,6 +20,9 @@ from .solid_checks import may_close
 FILL = (("cavities", "fill"),)
 """Print setting that fills cavities."""
 
+DRAIN = (("drain_at", "auto"),)
+"""Print setting that drills holes where resin or air cannot get out."""
+
 
 def _cavities(of: LayersEvidence) -> Iterator[Problem]:
     cavities = of.report.cavities
@@ -43,11 +46,11 @@ def _hollows(
         volume = sum(h.volume for h in remaining)
         text = f"{format_count(len(remaining), noun)} with {significant(volume)} mm3 of resin"
         text += f", the largest {significant(largest.area)} mm2"
-        advice = "--up, or a drain hole"
+        advice = "--up"
         if kind == "cups" and all(hollow.layers[0] == 0 for hollow in remaining):
             advice += f", or {SUPPORTS}"  # off the plate, it is open upwards
         where = of.where(largest)
-        yield Problem(kind, text, advice=advice, count=len(remaining), resin=volume, **where)
+        yield Problem(kind, text, mend=DRAIN, advice=advice, count=len(remaining), resin=volume, **where)
 
     return find
 

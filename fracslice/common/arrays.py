@@ -227,6 +227,16 @@ class Triangles:
         hints = (self.filaments, self.tops, self.supported) if same else (None, self.tops, None)
         return Triangles(self.vertices[index], triangles, colours, scalars, *hints)
 
+    def thumbnail(self) -> bytes | None:
+        """Draw a small picture; `Mesh` does.
+
+        Returns
+        -------
+        bytes or None
+            A PNG file; None if nothing draws one.
+        """
+        return None
+
     def to_trimesh(self) -> trimesh.Trimesh:
         """Copy of the mesh as a `trimesh.Trimesh`, unprocessed.
 

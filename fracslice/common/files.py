@@ -553,6 +553,26 @@ RELATIONS = (
 CONTENT = "[Content_Types].xml"
 SMALL = (CONTENT, TYPES.encode()), ("_rels/.rels", RELATIONS.encode())
 """Members of a package besides the model."""
+THUMBNAIL = "Metadata/thumbnail.png"
+SHOWN = (
+    f'<Relationship Target="/{THUMBNAIL}" Id="thumbnail" '
+    'Type="http://schemas.openxmlformats.org/package/2006/relationships/metadata/thumbnail"/>'
+)
+KINDS = {"png": "image/png"}
+"""Types of further members by their extensions; of others, plain text."""
+
+
+def _small(more: Mapping[str, bytes], picture: bytes | None) -> dict[str, bytes]:
+    """Members of a package besides the model, with further ones, and a picture of it as PNG."""
+    more = {**more, **({} if picture is None else {THUMBNAIL: picture})}
+    endings = sorted({name.rpartition(".")[2] for name in more})
+    kinds = "".join(
+        f'<Default Extension="{end}" ContentType="{KINDS.get(end, "text/plain")}"/>' for end in endings
+    )
+    shown = "" if picture is None else SHOWN
+    relations = RELATIONS.replace("</Relationships>", f"{shown}</Relationships>").encode()
+    return {CONTENT: TYPES.replace("</Types>", f"{kinds}</Types>").encode(), "_rels/.rels": relations, **more}
+
 
 LEVEL = 3  # of deflate: a third of the time of the default 6, for files a twentieth larger
 
@@ -590,18 +610,18 @@ def combine_checksums(one: TextSum, other: TextSum) -> TextSum:
 
 
 def join(
-    file: BinaryIO, fragments: Iterable[Fragment], is_large: bool, more: Mapping[str, bytes] | None = None
+    file: BinaryIO,
+    fragments: Iterable[Fragment],
+    is_large: bool,
+    more: Mapping[str, bytes] | None = None,
+    picture: bytes | None = None,
 ) -> None:
     """Write a package whose model is made of fragments. Its members carry no time.
 
-    `more`: further members, texts by their names.
+    `more`: further members, texts by their names; `picture`: of the model, as PNG.
     """
-    more = dict(more or {})
-    endings = sorted({name.rpartition(".")[2] for name in more})
-    kinds = "".join(f'<Default Extension="{end}" ContentType="text/plain"/>' for end in endings)
-    small = dict(SMALL) | {CONTENT: TYPES.replace("</Types>", f"{kinds}</Types>").encode()} | more
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=LEVEL) as archive:
-        for name, text in small.items():
+        for name, text in _small(more or {}, picture).items():
             archive.writestr(zipfile.ZipInfo(name), text, zipfile.ZIP_DEFLATED)
         info, whole = zipfile.ZipInfo("3D/3dmodel.model"), TextSum(0, 0)
         info.compress_type, info.external_attr = zipfile.ZIP_DEFLATED, 0o600 << 16

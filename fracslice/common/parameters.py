@@ -345,6 +345,46 @@ class Points(Parameter):
 
 
 @dataclass(frozen=True)
+class Holes(Parameter):
+    """Places of holes, with spaces between them; or a word.
+
+    Numbers of a place have commas between them: a point, a direction and a diameter.
+    """
+
+    annotation: ClassVar[Any] = str | Sequence[Sequence[float]]
+    MOST: ClassVar[int] = 100
+    WORD: ClassVar[str] = "auto"
+
+    @property
+    def expects(self) -> str:
+        return f'"{self.WORD}", or places x,y,z: with a direction x,y,z,u,v,w, and a diameter behind that'
+
+    def read(self, text: str) -> Any:
+        return self.check(text)
+
+    def check(self, value: Any) -> Any:
+        if value == self.WORD:
+            return value
+        try:
+            given = value.split() if isinstance(value, str) else items(value)
+            words = [one.split(",") if isinstance(one, str) else items(one) for one in given]
+            holes = tuple(tuple(map(float, one)) for one in words)
+        except (TypeError, ValueError):
+            raise ValueError(self.expects) from None
+        if len(holes) > self.MOST or not all(map(self._is_hole, holes)):
+            raise ValueError(self.expects)
+        return holes
+
+    @staticmethod
+    def _is_hole(numbers: Sequence[float]) -> bool:
+        whole = len(numbers) in (3, 6, 7) and all(map(math.isfinite, numbers))
+        return whole and (len(numbers) < 6 or any(numbers[3:6])) and (len(numbers) < 7 or numbers[6] > 0)
+
+    def text(self, value: Any) -> str:
+        return value if value == self.WORD else " ".join(",".join(map(shortest, hole)) for hole in value)
+
+
+@dataclass(frozen=True)
 class Choice(Parameter):
     """One word of a list.
 

@@ -274,3 +274,24 @@ def rgb565(picture: NDArray[np.uint8]) -> NDArray[np.uint16]:
     """
     red, green, blue = np.moveaxis(picture.astype(np.uint16), 2, 0)
     return np.asarray((red >> 3) << 11 | (green >> 2) << 5 | blue >> 3)
+
+
+def rgb15_runs(picture: NDArray[np.uint8]) -> bytes:
+    """Runs of equal pixels of 15 bits; the bit after green marks a pixel that a run length follows.
+
+    `picture`: uint8 [height, width, 3].
+    """
+    pixels = (rgb565(picture) & ~np.uint16(0x20)).ravel()
+    starts = np.flatnonzero(np.diff(pixels, prepend=~pixels[:1]))
+    words: list[int] = []
+    for value, length in zip(pixels[starts], np.diff(starts, append=len(pixels)), strict=True):
+        for done in range(0, int(length), 0xFFE):
+            more = min(int(length) - done, 0xFFE) - 1
+            words += [int(value) | 0x20, 0x3000 | more] if more else [int(value)]
+    return np.array(words, "<u2").tobytes()
+
+
+def second_stages(resin: Resin) -> tuple[float, float, float, float]:
+    """Second stages of the lift and of the way back, mm and mm/min; zeros where there is none."""
+    up = (resin.lift_2, resin.lift_speed_2) if resin.lift_2 else (0.0, 0.0)
+    return (*up, resin.retract_2, resin.retract_speed_2) if resin.retract_2 else (*up, 0.0, 0.0)

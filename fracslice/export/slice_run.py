@@ -189,11 +189,9 @@ class SliceRun:
 
     def key(self, form: str) -> str:
         """Key of everything that determines the bytes of encoded layers."""
-        stack = [getattr(self.stack, f.name) for f in fields(self.stack) if f.name != "root"]
         screen = [getattr(self.screen, f.name) for f in fields(self.screen) if f.name != "stack"]
-        field = self.stack.root.key
         return key(
-            *(program(), toolchain(), form, field, *stack, *screen),
+            *(program(), toolchain(), form, *self.stack.identity, *screen),
             *(self.resin, self.sections, sorted(self.metadata.items())),
         )
 
@@ -211,6 +209,7 @@ class SliceRun:
             "grey_levels": screen.levels,
             "blur_pixels": screen.blur,
             "compensation_mm": screen.compensation,
+            "elephant_foot_mm": screen.elephant_foot,
             "mirror": screen.mirrored,
             "layers": [
                 {"file": f"{name}{i:05d}.png", "top_mm": round(float(z), 6)} for i, z in enumerate(stack.tops)

@@ -1,8 +1,9 @@
 """3MF, by the core specification 1.3.
 
-Written: one object in millimetres and, for colours, materials 1.2. Triangles of filaments are painted, too,
-in attributes that PrusaSlicer reads (Format/3mf.cpp), and Bambu Studio and OrcaSlicer (bbs_3mf.cpp), which
-take the filament of an object from its group of one colour. Read: the build, with the production extension.
+Written: one object in millimetres, with colours by materials 1.2, or objects and a build; a thumbnail.
+Triangles of filaments are painted, too, in attributes that PrusaSlicer reads (Format/3mf.cpp), and Bambu
+Studio and OrcaSlicer (bbs_3mf.cpp), which take the filament of an object from its group of one colour. Read:
+the build, with the production extension.
 """
 
 from __future__ import annotations
@@ -63,7 +64,7 @@ def _write(mesh: Triangles, file: BinaryIO, metadata: Mapping[str, str], work: W
 
     See `MeshFormat`. Metadata that 3MF does not define get fracslice's namespace.
     """
-    mesh = mesh.in_order()
+    picture, mesh = mesh.thumbnail(), mesh.in_order()
     coloured, texts = mesh.colours is not None, 0
     if mesh.supported is not None:
         texts = len(ENFORCED) * int(mesh.supported.sum())
@@ -76,7 +77,7 @@ def _write(mesh: Triangles, file: BinaryIO, metadata: Mapping[str, str], work: W
     vertices, triangles = (sum(len(getattr(p, name)) for p in parts) for name in ("vertices", "triangles"))
     is_large = _is_large(vertices, triangles, coloured, texts)
     blocks = work.ordered(lambda text: deflate(text()), _model(mesh, metadata))
-    join(file, (partial(append, block) for block in blocks), is_large, more)
+    join(file, (partial(append, block) for block in blocks), is_large, more, picture)
 
 
 PROFILES = "Metadata/Slic3r_PE_layer_heights_profile.txt", "Metadata/layer_heights_profile.txt"
@@ -115,37 +116,45 @@ def _numbered(filaments: Filaments) -> Iterator[tuple[int, int, Triangles]]:
             yield k, GROUP + len(filaments.colours) + k, body
 
 
-class ObjectCopies(NamedTuple):
+class Built(NamedTuple):
     """An object that is built at some places."""
 
-    name: str
     mesh: Triangles  # mm
-    offsets: list[tuple[float, float, float]]  # mm
+    places: Sequence[NDArray[np.float64]]  # four rows by which points, as rows, are moved, [4, 3], mm
+    name: str = ""
 
 
-def write_objects(
-    objects: Sequence[ObjectCopies], file: BinaryIO, metadata: Mapping[str, str], work: Work
+def write_build(
+    objects: Sequence[Built],
+    file: BinaryIO,
+    metadata: Mapping[str, str],
+    work: Work,
+    picture: bytes | None = None,
 ) -> None:
-    """Write several objects, without colours, streamed as one is."""
+    """Write objects, without colours, and a build of them, streamed as one object is.
+
+    `picture`: of all, as PNG.
+    """
 
     def texts() -> Iterator[Text]:
         yield from _texts(*_head(metadata))
-        for number, placed in enumerate(objects, 1):
-            head = f'<object id="{number}" name="{escape(placed.name)}" type="model">'
-            yield from _texts(head.encode())
-            yield from mesh_element(placed.mesh.in_order())
+        items = ""
+        for number, built in enumerate(objects, 1):
+            name = f' name="{escape(built.name)}"' if built.name else ""
+            yield from _texts(f'<object id="{number}"{name} type="model">'.encode())
+            yield from mesh_element(built.mesh.in_order())
             yield from _texts(b"</object>\n")
-        items = "".join(
-            f'<item objectid="{number}" transform="1 0 0 0 1 0 0 0 1 {x:.6g} {y:.6g} {z:.6g}"/>\n'
-            for number, placed in enumerate(objects, 1)
-            for x, y, z in placed.offsets
-        )
+            places = (" ".join(f"{v:.9g}" for v in place.ravel().tolist()) for place in built.places)
+            items += "".join(f'<item objectid="{number}" transform="{place}"/>\n' for place in places)
         yield from _texts(f"</resources>\n<build>\n{items}</build>\n</model>\n".encode())
 
-    vertices = sum(len(placed.mesh.vertices) for placed in objects)
-    triangles = sum(len(placed.mesh.triangles) for placed in objects)
-    blocks = work.ordered(lambda text: deflate(text()), texts())
-    join(file, (partial(append, block) for block in blocks), _is_large(vertices, triangles, False))
+    meshes = [built.mesh for built in objects]
+    vertices, triangles = (sum(len(getattr(m, name)) for m in meshes) for name in ("vertices", "triangles"))
+    blocks, is_large = (
+        work.ordered(lambda text: deflate(text()), texts()),
+        _is_large(vertices, triangles, False),
+    )
+    join(file, (partial(append, block) for block in blocks), is_large, picture=picture)
 
 
 def write_fragments(

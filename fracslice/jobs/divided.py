@@ -16,7 +16,7 @@ from ..common.files import check_target, replacing
 from ..errors import SceneError
 from ..fields.box import Triple
 from ..formats import check_format, write
-from ..formats._3mf import ObjectCopies, write_objects
+from ..formats._3mf import Built, write_build
 from ..mesh import Mesh
 from ..records import SAME, UP, MeshJob, PartsJob
 from ..scene import Print, Scene
@@ -46,17 +46,18 @@ class Parted:
         parts = [(str(n), mesh, 1) for n, mesh in enumerate(self.meshes, 1)]
         return parts + ([("peg", self.peg, len(self.divided.pegs))] if self.peg else [])
 
-    def placed(self) -> list[ObjectCopies]:
+    def placed(self) -> list[Built]:
         """Objects with their places on beds, whose first has its corner at the origin."""
         copies = [(name, mesh.mesh) for name, mesh, count in self.named for _ in range(count)]
         sizes = [(float(mesh.size[0]), float(mesh.size[1])) for _, mesh in copies]
-        offsets: dict[str, list[Triple]] = {}
+        places: dict[str, list[NDArray[np.float64]]] = {}
         for (name, mesh), (bed, x, y) in zip(copies, laid_out(sizes, self.bed), strict=True):
             start = bed * BED_TO_BED * self.bed[0] if self.bed else 0.0
             low = mesh.bounds[0]
-            offsets.setdefault(name, []).append((start + x - float(low[0]), y - float(low[1]), 0.0))
+            moved = np.vstack([np.eye(3), [start + x - low[0], y - low[1], 0.0]])
+            places.setdefault(name, []).append(moved)
         meshes = dict(copies)
-        return [ObjectCopies(name, meshes[name], some) for name, some in offsets.items()]
+        return [Built(meshes[name], some, name) for name, some in places.items()]
 
     @property
     def beds(self) -> int:
@@ -121,5 +122,5 @@ def write_parts(made: Parted, path: str | Path, about: dict[str, str], work: Wor
         pairs = zip(names, made.named, strict=True)
         return [write(mesh.mesh, name, about, work) for name, (_, mesh, _) in pairs]
     with replacing(path) as file:
-        write_objects(made.placed(), file, {"Application": APPLICATION} | about, work)
+        write_build(made.placed(), file, {"Application": APPLICATION} | about, work)
     return [path]

@@ -17,7 +17,7 @@ from ..records import COARSEST, RESOLUTION, MeshJob
 from ..scene import Scene
 from ..scene.reader import reads
 from ..scene.view import Film, View
-from ..slicing import SliceJob, plan_layers
+from ..slicing import SliceJob, Stack, plan_layers
 from ..slicing.printers import Resin
 from ..slicing.raster import Screen
 from ..volume.amount import orient_field, sizing
@@ -41,7 +41,7 @@ class StackModel:
     work: Work  # threads, progress and cancellation
 
     @cached_property
-    def _upright(self) -> Node:
+    def upright(self) -> Node:
         return cast(Node, orient_field(self.scene.root, self.job.up, work=self.work))
 
     def mesh(self) -> Mesh:
@@ -69,13 +69,17 @@ class StackModel:
 
         Returns uint8 [height, width, 3].
         """
-        from ..rendering import Renderer  # of printers' files only, while other threads slice
+        return rendered(self.upright, self.work)
 
-        width, height = SIZE
-        film = Film(width=width, height=height, samples=SAMPLES)
-        renderer = Renderer(self._upright, View(film=film), work=self.work, device="cpu")
-        *_, last = renderer.passes(SAMPLES)
-        return np.asarray(last.shown)
+
+def rendered(root: Node, work: Work) -> NDArray[np.uint8]:
+    """Picture of an object for a print file, uint8 [height, width, 3]."""
+    from ..rendering import Renderer  # of printers' files only, while other threads slice
+
+    width, height = SIZE
+    film = Film(width=width, height=height, samples=SAMPLES)
+    *_, last = Renderer(root, View(film=film), work=work, device="cpu").passes(SAMPLES)
+    return np.asarray(last.shown)
 
 
 @dataclass(frozen=True)
@@ -89,15 +93,24 @@ class SliceRecipe:
     resin: Resin | None = None  # as for `SliceRun`
     created: datetime = EPOCH
 
+    def read(self) -> Scene:
+        """Read the scene."""
+        return reads(self.scene, self.name, files_outside=True)
+
+    def plan(self, scene: Scene, work: Work) -> Stack:
+        """Plan the layers of the scene."""
+        return plan_layers(scene.root, self.job, work, sizing(scene, self.job.size, self.job.scale, work))
+
     def run(self, work: Work, scene: Scene | None = None) -> SliceRun:
         """Plan the layers; see `Recipe.run`."""
-        scene, job = scene or reads(self.scene, self.name, files_outside=True), self.job
-        size = sizing(scene, job.size, job.scale, work)
-        stack = plan_layers(scene.root, job, work, size)
+        scene, job = scene or self.read(), self.job
+        stack = self.plan(scene, work)
         about = {"Title": self.name, "scene_hash": scene.hash}
         model = StackModel(scene, job, replace(work, cluster=None))
         files = about, model.mesh, model.picture, self.created
-        return SliceRun(stack, Screen.of(stack, job), work, self.resin, *files, job.sections, self)
+        return SliceRun(
+            stack, Screen.of(stack, job, self.resin), work, self.resin, *files, job.sections, self
+        )
 
     def encoder(self, run: SliceRun) -> Encode:
         """Return the function that encodes the layers of a run in this format; see `Recipe.encoder`."""

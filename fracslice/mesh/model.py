@@ -27,7 +27,7 @@ from .._native import edge_topology as _edge_topology
 from .._native import foremost, surroundings
 from .._native import self_intersecting_triangles as _self_intersecting_triangles
 from .._native import tree as _tree
-from ..common.arrays import Triangles, from_linear, to_linear
+from ..common.arrays import Triangles, from_linear, product, to_linear
 from ..common.messages import format_count, lacking
 from ..common.parameters import AnyLength
 from ..errors import MeshError
@@ -371,6 +371,16 @@ class Mesh(Triangles):
     def _repr_png_(self) -> bytes | None:
         """Picture in a notebook; None for an empty mesh."""
 
+        return self.thumbnail()
+
+    def thumbnail(self) -> bytes | None:
+        """Draw the mesh in its colours, or in clay, on a transparent background.
+
+        Returns
+        -------
+        bytes or None
+            A PNG file of 480 x 360 pixels; None without triangles.
+        """
         return thumbnail(self) if len(self.triangles) else None
 
     @staticmethod
@@ -581,7 +591,7 @@ def thumbnail(mesh: Mesh, axes: NDArray[np.float64] = AXES) -> bytes:
 
 def _render_small(mesh: Mesh, axes: NDArray[np.float64], width: int, height: int) -> np.ndarray:
     """The picture with one sample per pixel, uint8 [height, width, 4]."""
-    seen = mesh.vertices @ axes.T
+    seen = product(mesh.vertices, axes.T)
     low, high = seen.min(0), seen.max(0)
     across = np.maximum((high - low)[:2] / (width, height), 1e-30).max() / FILLED
     seen = (seen - (low + high) / 2) / across + (width / 2, height / 2, 0)
@@ -598,7 +608,7 @@ def _shades(mesh: Mesh, seen: np.ndarray, which: np.ndarray) -> np.ndarray:
     a, b, c = (seen[corners[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
     normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-30)[:, None]
-    lit = np.maximum(normals @ LIGHT * np.sign(normals[:, 2]), 0)
+    lit = np.maximum(sum(normals[:, k] * LIGHT[k] for k in range(3)) * np.sign(normals[:, 2]), 0)
     own = np.array([COLOUR] if mesh.colours is None else mesh.colours[corners].mean(1)) / 255
     light = to_linear(own) * (AMBIENT + (1 - AMBIENT) * lit)[:, None]
     opaque = np.full((len(which), 1), 255, np.uint8)

@@ -181,7 +181,7 @@ def apply_print_edits(
 ) -> Plan:
     """Make the changes of a `Print`; see `fracslice.printing.printable`."""
     for name in ("bridge", "gap", "thickness", "hollow", "drain", "base", "raft"):
-        if (length := getattr(how, name)) > size.longest and (name != "drain" or how.hollow):
+        if (length := getattr(how, name)) > size.longest and (name != "drain" or how.hollow or how.drain_at):
             raise VolumeError(
                 f"{name} {length:g} mm: expected at most the object's size, {size.longest:g} mm"
             )
@@ -192,6 +192,10 @@ def apply_print_edits(
         job.put(change())
         job.work.progress(stage, 1.0)
     made = standing(job.planned, how, job.scale, job.work)
+    if how.drain and (how.hollow or how.drain_at):
+        from .drains import drained
+
+        made = drained(made, how, job.scale, job.work)
     if not measured or job.thin is None:
         return made
     thin, low = job.thin, made.box.lo[2]
@@ -394,7 +398,8 @@ class _Edits(Preparation):
         from .edits import hollows
 
         samples, how, root = self.sampled(self.how.hollow), self.how, self.root
-        cuts, drains = hollows(samples, how.hollow / self.scale, how.drain / self.scale, self.planned.outer)
+        drain = 0.0 if self.how.drain_at and self.how.drain_at != "auto" else how.drain / self.scale
+        cuts, drains = hollows(samples, how.hollow / self.scale, drain, self.planned.outer)
         if not cuts:
             raise VolumeError(f"walls of {how.hollow:g} mm leave nothing to hollow out")
         self.planned = replace(self.planned, drains=drains)

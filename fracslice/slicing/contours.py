@@ -4,6 +4,7 @@ zero set.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -66,6 +67,21 @@ class Contours:
     def area(self) -> float:
         """Total inside area, mm^2."""
         return float(self.areas.sum())
+
+
+def gathered(parts: Sequence[Contours]) -> Contours:
+    """Contours of several objects that do not touch."""
+    ends = np.cumsum([0, *(len(part.points) for part in parts)])
+    counts = np.cumsum([0, *map(len, parts)])
+    starts = [part.starts[:-1] + end for part, end in zip(parts, ends, strict=False)]
+    parents = [
+        np.where(part.parent < 0, -1, part.parent + count) for part, count in zip(parts, counts, strict=False)
+    ]
+    return Contours(
+        np.concatenate([part.points for part in parts]),
+        np.concatenate([*starts, ends[-1:]]).astype(np.int32),
+        np.concatenate(parents).astype(np.int32),
+    )
 
 
 def contours(slab: Slab, k: int, z: float, stack: Stack, exact: Kernel) -> Contours:

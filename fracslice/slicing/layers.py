@@ -27,13 +27,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import groupby
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
-from .._slices import BorderError, Encoding, Memory, ProbeBounds, Slab
+from .._slices import BorderError, Encoding, Memory, ProbeBounds, Slab, plate_picture
 from ..common.arrays import dot, quantile
 from ..common.parameters import Length, validate_value
 from ..errors import SliceError
@@ -42,8 +42,8 @@ from ..fields.field import Bounds, Field, Kernel
 from ..records import SliceJob
 from ..volume.amount import Completeness, Sizing, compare_volumes
 from ..work import Work
-from .contours import Contours, contours
-from .stack import Stack, plan_stack
+from .contours import Contours, contours, gathered
+from .stack import Stack, Standing, plan_stack
 
 if TYPE_CHECKING:
     from .feature_graph import Runs
@@ -54,6 +54,10 @@ LIKELY = 0.06, 0.015
 
 MIXED = 0.25
 """Fraction of the bound for small blocks of scenes with other shapes or linear growth."""
+
+
+SOLID = 128
+"""Least coverage of a pixel that counts as solid."""
 
 
 class ScreenView(NamedTuple):
@@ -255,6 +259,90 @@ class Layer:
         return contours(self.slab, self.place, float(self.stack.z[self.index]), self.stack, self.exact)
 
 
+@dataclass(eq=False)
+class PlateLayer(Layer):
+    """A layer of a plate, put together of those of its parts."""
+
+    parts: Sequence[tuple[Standing, Layer]] = ()  # parts that reach so high, and their layers
+
+    @cached_property
+    def coverage(self) -> np.ndarray:
+        """As `Layer.coverage`."""
+        if self.mean is not None:
+            return self.mean[0]
+        image = np.zeros(self.stack.shape, np.uint8)
+        for part, layer in self.parts:
+            (row, column), (rows, columns) = part.at, part.shape
+            place = image[row : row + rows, column : column + columns]
+            np.maximum(place, np.rot90(layer.coverage, -part.turns), out=place)
+        self._painted = self._of_parts
+        return image
+
+    def encoded(self, view: ScreenView, encoding: Encoding) -> bytes:
+        """As `Layer.encoded`."""
+        shown: dict[tuple[int, int], tuple[Layer, Standing, list[tuple[int, int]]]] = {}
+        for part, layer in self.parts:
+            _, _, places = shown.setdefault((id(part.stack), part.turns), (layer, part, []))
+            places.append(_place(part, view))
+        pieces = [
+            (layer.slab, layer.place, *_orientation(part, view), places)
+            for layer, part, places in shown.values()
+        ]
+        data, area, cut = plate_picture(pieces, view.shape, view.levels, encoding)
+        self._painted = area, cut
+        return data
+
+    @cached_property
+    def runs(self) -> Runs:
+        """As `Layer.runs`."""
+        from .feature_graph import Runs
+
+        solid = np.pad(self.coverage >= SOLID, ((0, 0), (1, 1)))
+        row, begin = np.nonzero(solid[:, 1:] & ~solid[:, :-1])
+        _, end = np.nonzero(solid[:, :-1] & ~solid[:, 1:])
+        rows = np.searchsorted(row, np.arange(len(solid) + 1)).astype(np.int32)
+        return Runs(rows, begin.astype(np.int32), end.astype(np.int32), self.stack.shape[1])
+
+    @property
+    def _of_parts(self) -> tuple[float, int]:
+        painted = [layer._painted for _, layer in self.parts]
+        return sum(area for area, _ in painted), sum(cut for _, cut in painted)
+
+    @cached_property
+    def _painted(self) -> tuple[float, int]:
+        """As `Layer._painted`."""
+        return self._of_parts
+
+    @cached_property
+    def contours(self) -> Contours:
+        """As `Layer.contours`."""
+        return gathered(
+            [
+                replace(layer.contours, points=part.moved(layer.contours.points, self.stack.shape))
+                for part, layer in self.parts
+            ]
+        )
+
+
+def _orientation(part: Standing, view: ScreenView) -> tuple[bool, bool, tuple[int, int], bool]:
+    """How a screen shows a part: transposed, backwards, rows and columns of its lattice, and upside down.
+
+    Down and across the picture are y and x of the plate, or x and y if the screen is transposed; of the part,
+    a quarter turn exchanges them and changes the direction of one.
+    """
+    down, across = ((1, 2), (2, 3)) if view.transposed else ((2, 3), (1, 2))
+    transposed = view.transposed != bool(part.turns % 2)
+    return transposed, view.backwards != (part.turns in across), part.stack.shape, part.turns in down
+
+
+def _place(part: Standing, view: ScreenView) -> tuple[int, int]:
+    """Row and column of a picture of the first pixel of a part."""
+    down, across = (1, 0) if view.transposed else (0, 1)
+    row = view.shape[0] - view.at[down] - part.at[down] - part.shape[down]
+    column = view.at[across] + part.at[across]
+    return row, view.shape[1] - column - part.shape[across] if view.backwards else column
+
+
 @dataclass(frozen=True, eq=False)
 class Slicer:
     """Slices a planned stack.
@@ -306,15 +394,12 @@ class Slicer:
         Cancelled
             When the work is cancelled.
         """
-        root, shape = self.stack.root, self.stack.shape
-        exact = root.kernel("cpu", "float64")
-        lattice = shape[0] + 1, shape[1] + 1
-        sampler = Sampler(root.kernel(), root, root.bounds, self.stack.frame, lattice)
         chosen = range(len(self.stack.z)) if layers is None else layers
+        sampled = self._plate() if self.stack.parts else self._alone(pictures)
 
         def slab(group: list[int]) -> list[T]:
             made = []
-            for layer in self._sampled(sampler, group, exact, pictures):
+            for layer in sampled(group):
                 made.append(make(layer))
                 if (area := layer.known_area) is not None:
                     self.areas[layer.index] = area
@@ -324,6 +409,31 @@ class Slicer:
         for done, made in enumerate(self.work.ordered(slab, groups), 1):
             yield from made
             self.work.progress("slicing", done / len(groups))
+
+    def _alone(self, pictures: Pictures | None) -> Callable[[list[int]], Iterator[Layer]]:
+        """Function that samples layers of one slab of an object."""
+        root, shape = self.stack.root, self.stack.shape
+        exact = root.kernel("cpu", "float64")
+        lattice = shape[0] + 1, shape[1] + 1
+        sampler = Sampler(root.kernel(), root, root.bounds, self.stack.frame, lattice)
+        return partial(self._sampled, sampler, exact=exact, pictures=pictures)
+
+    def _plate(self) -> Callable[[list[int]], Iterator[Layer]]:
+        """Function that samples layers of one slab of a plate: each part once, however often it stands."""
+        stack = self.stack
+        alone = {id(part.stack): Slicer(part.stack, self.work)._alone(None) for part in stack.parts}
+        layers = {id(part.stack): len(part.stack.z) for part in stack.parts}
+
+        def sampled(group: list[int]) -> Iterator[Layer]:
+            own = {k: make([n for n in group if n < layers[k]]) for k, make in alone.items()}
+            for index in group:
+                made = {k: next(of) for k, of in own.items() if index < layers[k]}
+                parts = [(part, made[id(part.stack)]) for part in stack.parts if id(part.stack) in made]
+                one = parts[0][1]
+                spent = sum(layer.evaluations for layer in made.values())
+                yield PlateLayer(stack, index, spent, one.slab, one.place, one.exact, parts=parts)
+
+        return sampled
 
     def _sampled(
         self, sampler: Sampler, group: list[int], exact: Kernel, pictures: Pictures | None
@@ -385,7 +495,9 @@ def _sections(stack: Stack, n: int) -> Stack:
     bottoms = stack.tops - stack.heights
     within = (bottoms[:, None] + shares * stack.heights[:, None]).ravel()
     z = stack.z[0] + (within - stack.heights[0] / 2) / stack.scale
-    return replace(stack, z=z, tops=np.cumsum(heights))
+    parts = {id(part.stack): _sections(part.stack, n) for part in stack.parts}
+    standing = tuple(replace(part, stack=parts[id(part.stack)]) for part in stack.parts)
+    return replace(stack, z=z, tops=np.cumsum(heights), parts=standing)
 
 
 SLABS = 6

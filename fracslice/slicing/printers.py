@@ -145,13 +145,45 @@ class Resin:
     lift: float = attribute(Number, 5.0, "mm after each layer", above=0, most=100)
     lift_speed: float = attribute(Number, 65.0, "mm/min", above=0, most=10_000)  # speeds up and down, mm/min
     retract_speed: float = attribute(Number, 150.0, "mm/min", above=0, most=10_000)
-    # rest before a layer is exposed, s
+    # second stage of the lift, mm, and its speed, mm/min; none by default
+    lift_2: float = attribute(Number, 0.0, "mm after each layer, behind lift", least=0, most=100)
+    lift_speed_2: float = attribute(Number, 180.0, "mm/min", above=0, most=10_000)
+    # last part of the way back, mm, and its speed, mm/min; none by default
+    retract_2: float = attribute(Number, 0.0, "mm before each layer, the last of them", least=0, most=100)
+    retract_speed_2: float = attribute(Number, 60.0, "mm/min", above=0, most=10_000)
+    # rest before a layer is exposed, s; after it, before the lift; and after the lift
     wait: float = attribute(Number, 0.5, "seconds before each layer", least=0, most=1000)
+    wait_after: float = attribute(Number, 0.0, "seconds after each layer", least=0, most=1000)
+    wait_lifted: float = attribute(Number, 0.0, "seconds after the lift", least=0, most=1000)
     density: float = attribute(Number, 1.1, "g/ml", above=0, most=100)  # g/ml
     price: float = attribute(Number, 0.0, "of a litre", least=0)  # price of a litre
 
     def __post_init__(self) -> None:
         validate(self, ExportError)
+        if self.retract_2 > self.whole_lift:
+            most = f"at most the whole lift, {self.whole_lift:g} mm"
+            raise ExportError(f"retract_2 = {self.retract_2:g}: expected {most}")
+
+    def overexposure(self, layers: int) -> tuple[float, ...]:
+        """Share that the first layers have of what bottom layers are exposed longer than others, 1 to 0."""
+        first = min(self.bottom_layers + self.transition_layers, layers)
+        above = np.arange(first) - self.bottom_layers + 1
+        return tuple((1 - np.clip(above / (self.transition_layers + 1), 0, 1)).tolist())
+
+    @property
+    def retract(self) -> float:
+        """Way back before its last part, mm."""
+        return self.whole_lift - self.retract_2
+
+    @property
+    def whole_lift(self) -> float:
+        """Both stages of the lift, mm."""
+        return self.lift + self.lift_2
+
+    @property
+    def rest(self) -> float:
+        """All rests of a layer, s: what stands before a layer in formats without the others."""
+        return self.wait + self.wait_after + self.wait_lifted
 
     def exposures(self, layers: int) -> NDArray[np.float64]:
         """Exposure of each layer.
@@ -164,8 +196,14 @@ class Resin:
 
     def seconds(self, layers: int) -> float:
         """Duration of a print, without the motion of a vat that tilts by itself."""
-        motion = 60 * self.lift * (1 / self.lift_speed + 1 / self.retract_speed) if self.lift > TILT else 0.0
-        return float(self.exposures(layers).sum() + layers * (motion + self.wait))
+        ways = (
+            (self.lift, self.lift_speed),
+            (self.lift_2, self.lift_speed_2),
+            (self.retract, self.retract_speed),
+            (self.retract_2, self.retract_speed_2),
+        )
+        motion = sum(60 * way / speed for way, speed in ways) if self.lift > TILT else 0.0
+        return float(self.exposures(layers).sum() + layers * (motion + self.rest))
 
 
 def resin(name: str, printer: Printer | None, layer: float) -> Resin:

@@ -23,7 +23,7 @@ from ..errors import SliceError
 from ..records import RasterOptions
 from ..work import Work
 from .layers import Layer, Pictures, ScreenView, Slicer
-from .printers import Printer
+from .printers import START, Printer, Resin
 from .stack import Stack
 
 if TYPE_CHECKING:
@@ -35,11 +35,14 @@ class Screen(RasterOptions):
     """Turns layers into pictures."""
 
     stack: Stack = field(kw_only=False)  # the planned layers
+    # share of the elephant foot that the first layers have, from 1 for a bottom layer
+    foot: tuple[float, ...] = ()
 
     @classmethod
-    def of(cls, stack: Stack, job: RasterOptions) -> Screen:
-        """Screen of a stack with the options of a job."""
-        return cls(stack, **{f.name: getattr(job, f.name) for f in fields(RasterOptions)})
+    def of(cls, stack: Stack, job: RasterOptions, resin: Resin | None = None) -> Screen:
+        """Screen of a stack with the options of a job, for the bottom layers of a resin."""
+        foot = (resin or START).overexposure(len(stack.z)) if job.elephant_foot else ()
+        return cls(stack, **{f.name: getattr(job, f.name) for f in fields(RasterOptions)}, foot=foot)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -65,16 +68,25 @@ class Screen(RasterOptions):
         """
         image = np.zeros(self.shape, np.uint8)
         bed, mine = self._bed(image), self._place
-        bed[mine.on_bed] = self._levels[self._changed(layer)[mine.of_layer]]
+        bed[mine.on_bed] = self._graded(self._changed(layer)[mine.of_layer])
         return image
 
+    def _graded(self, coverage: np.ndarray) -> np.ndarray:
+        """Grey levels of coverages, uint8. A table of bytes is looked up faster in bytes than by an array."""
+        table = self._levels.tobytes()
+        if table == bytes(range(256)):
+            return coverage
+        return np.frombuffer(coverage.tobytes().translate(table), np.uint8).reshape(coverage.shape)
+
     def _changed(self, layer: Layer) -> np.ndarray:
-        """Coverage after compensation and blur, uint8, in the shape of `_grown`."""
+        """Coverage after compensations and blur, uint8, in the shape of `_grown`."""
         coverage = layer.coverage
         if any(self._margin):
             coverage = np.pad(coverage, [(n, n) for n in self._margin])
         if self.compensation:
             coverage = compensate(coverage, self.compensation, self.stack.pixel)
+        if foot := self._foot_of(layer):
+            coverage = shrink(coverage, foot, self.stack.pixel)
         if self.blur:
             coverage = blur(coverage, self.blur)
         return coverage
@@ -87,7 +99,7 @@ class Screen(RasterOptions):
 
         `shown`: uint8 [256], optional.
         """
-        if not self._is_direct or layer.mean is not None:
+        if not self._is_direct or layer.mean is not None or self._foot_of(layer):
             image = self.picture(layer)
             return encoded(image if shown is None else shown[image], encoding)
         view = self._view
@@ -97,7 +109,11 @@ class Screen(RasterOptions):
 
     def pictures(self, encoding: Encoding) -> Pictures | None:
         """Pictures for `Slicer.map` to make; None if they are not made of the samples alone."""
-        return (self._view, encoding) if self._is_direct else None
+        return (self._view, encoding) if self._is_direct and not any(self.foot) else None
+
+    def _foot_of(self, layer: Layer) -> float:
+        """Distance by which the outlines of a bottom layer move inwards, mm."""
+        return self.elephant_foot * self.foot[layer.index] if layer.index < len(self.foot) else 0.0
 
     @property
     def _is_direct(self) -> bool:
@@ -209,6 +225,16 @@ def compensate(image: np.ndarray, by: float, pixel: tuple[float, float]) -> np.n
     cone = 255 * (amount - np.hypot(dy * pixel[1], dx * pixel[0]) / unit)
     grown = dilated(image if by > 0 else 255 - image, cone)
     return grown if by > 0 else 255 - grown
+
+
+def shrink(image: np.ndarray, by: float, pixel: tuple[float, float]) -> np.ndarray:
+    """Move the outlines of a coverage image inwards; what is so thin that nothing would be left stays.
+
+    `image`: uint8 [ny, nx]; `by` in mm; `pixel`: width and height of a pixel, mm. Returns uint8 [ny, nx].
+    """
+    less = compensate(image, -by, pixel)
+    regained = compensate(less, by + 2 * max(pixel), pixel)
+    return np.where(regained < image, image, less)
 
 
 CELLS, CELL, CAPTION, FRAMES, ABREAST = 24, 200, 120, 60, 3

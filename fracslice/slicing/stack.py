@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 
+from ..common.cache import key
 from ..errors import SliceError
 from ..fields.box import Box
 from ..fields.field import Field
@@ -21,6 +22,47 @@ MOST_PIXELS = 65_536
 
 FLOAT_STEPS = 8
 """Minimum number of float32 numbers between two samples."""
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """A part on a plate.
+
+    Attributes
+    ----------
+    stack : Stack
+        The part alone, in layers of the same heights and in the same pixels.
+    turns : int
+        Quarter turns counter-clockwise.
+    at : tuple of int
+        Row and column of the plate of its lattice's first pixel, once turned.
+    """
+
+    stack: Stack
+    turns: int
+    at: tuple[int, int]
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of its lattice, turned."""
+        ny, nx = self.stack.shape
+        return (nx, ny) if self.turns % 2 else (ny, nx)
+
+    def moved(self, points: np.ndarray, plate: tuple[int, int]) -> np.ndarray:
+        """Points of the part on its plate.
+
+        `points`: mm from the middle of the part, float64 [n, 2]; `plate`: rows and columns of the plate.
+        Returns mm from the middle of the plate, float64 [n, 2].
+        """
+        cosine, sine = ((1, 0), (0, 1), (-1, 0), (0, -1))[self.turns]
+        x, y = points.T
+        middle = [
+            (first + own / 2 - whole / 2) * side
+            for first, own, whole, side in zip(
+                self.at[::-1], self.shape[::-1], plate[::-1], self.stack.pixel, strict=True
+            )
+        ]
+        return np.stack([cosine * x - sine * y, sine * x + cosine * y], 1) + middle
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +93,8 @@ class Stack:
         What a pixel or a layer is too large for.
     drains : tuple of Drain
         Drain holes.
+    parts : tuple of Standing
+        Parts of a plate, which are sliced each for itself; empty for one object.
     side : float
         Size of the job: longest side before compensation and print preparation, mm.
     """
@@ -66,7 +110,15 @@ class Stack:
     outer: Box
     notes: tuple[str, ...] = ()
     drains: tuple[Drain, ...] = ()
+    parts: tuple[Standing, ...] = ()
     side: float = field(kw_only=True)
+
+    @property
+    def identity(self) -> list[object]:
+        """Values that determine the layers."""
+        own = [getattr(self, f.name) for f in fields(self) if f.name not in ("root", "parts")]
+        parts = [(part.turns, part.at, key(*part.stack.identity)) for part in self.parts]
+        return [self.root.key, *own, *parts]
 
     @property
     def heights(self) -> np.ndarray:

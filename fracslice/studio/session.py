@@ -94,7 +94,7 @@ class Latest:
 
 
 @dataclass(frozen=True)
-class Section:
+class CutPlane:
     """A plane across an axis that cuts the picture open."""
 
     axis: int
@@ -169,7 +169,7 @@ class Studio:
         self._compile_ahead()
         self.message = ""
         self.job: Job | None = None
-        self.section: Section | None = None
+        self.section: CutPlane | None = None
         self._worker: threading.Thread | None = None
 
     def _compile_ahead(self) -> None:
@@ -266,7 +266,7 @@ class Studio:
             number, camera = "xyz".index(axis), self.live.aim
             towards = camera.eye[number] < camera.target[number]
             same = self.section and self.section.axis == number
-            self.section = Section(number, share, self.section.flipped if self.section and same else towards)
+            self.section = CutPlane(number, share, self.section.flipped if self.section and same else towards)
         self._show()
 
     def set_number(self, place: Place, attribute: str, index: int, value: float) -> None:

@@ -69,18 +69,19 @@ def goo(data: bytes) -> Read:
     layers, columns, rows, mirror_x, mirror_y = file.get("I2H2?")
     file.get("3f")
     thickness, exposure = file.get("2f")
-    file.get("?8fI16f2H")
+    rests, _, motion = file.get("?8f")[2:8], file.get("I"), file.get("16f")
+    file.get("2H")
     (each_layer,) = file.get("?")
     seconds, volume, weight, _ = file.get("I3f")
     file.raw(8)
     begin, grey, _ = file.get("I?H")
     assert each_layer and grey and begin == file.at == 195477
-    read = Read(
-        [], [], [], previews, {"volume": volume, "weight": weight, "texts": texts, "mirror": mirror_x}
-    )
+    about = {"volume": volume, "weight": weight, "texts": texts, "mirror": mirror_x}
+    read = Read([], [], [], previews, about | {"rests": rests, "motion": motion, "layers": []})
     for _ in range(layers):
         _, _, top, seconds = file.get("H3f")
-        file.get("12fH")
+        read.about["layers"].append(file.get("12f"))
+        file.get("H")
         file.expect(b"\r\n")
         (size,) = file.get("I")
         picture = file.raw(size)
@@ -143,6 +144,50 @@ def ctb(data: bytes) -> Read:
     return read
 
 
+def cxdlp(data: bytes) -> Read:
+    """UVtools' description of version 4 of Creality's files."""
+    checksum = 0
+    for byte in data[:-4]:
+        checksum = CRC_TABLE[(checksum ^ byte) & 255] ^ checksum >> 8
+    if struct.pack(">I", checksum) != data[-4:]:
+        raise DamagedError
+    file = Bytes(data, ">")
+    assert file.get("I9sH")[1:] == (b"CXSW3DV2\0", 4)
+    (length,) = file.get("I")
+    about: dict[str, Any] = {"name": file.raw(length).rstrip(b"\0").decode()}
+    file.order = "<"
+    columns, rows, *_, tall, thickness = file.get("2H5f")
+    bottoms, small, table, layers, large, seconds, mirror, motion, motion_size, levels = file.get("10I")
+    light, bottom_light, key, more, more_size = file.get("2H3I")
+    assert (light, bottom_light, key, motion_size, more_size) == (255, 255, 0, 68, 76)
+    previews = []
+    for at in (small, large):
+        file.at = at
+        width, height, begin, size = file.get("4I")
+        file.at = begin
+        previews.append(_rle15(file.raw(size)).reshape(height, width, 3))
+    file.at = motion
+    about["volume"] = file.get("10f")[5]
+    file.at = table
+    read = Read([], [], [], previews, about | {"height": tall})
+    entries = [file.get("3f7I") for _ in range(layers)]
+    assert file.at == entries[0][3]
+    for top, exposure, _, begin, size, *_ in entries:
+        file.at = begin
+        read.about["motion"] = file.get("11f")
+        read.pictures.append(decoders.picture(decoders.rle7(file.raw(size - 44)), (rows, columns)))
+        read.tops.append(top)
+        read.exposures.append(exposure)
+    return read
+
+
+CRC_TABLE = []
+for number in range(256):
+    for _ in range(8):
+        number = number >> 1 ^ (0xEDB88320 if number & 1 else 0)
+    CRC_TABLE.append(number)
+
+
 def _rle15(data: bytes) -> np.ndarray:
     words, pixels = np.frombuffer(data, "<u2").tolist(), []
     at = 0
@@ -161,12 +206,13 @@ def photon(data: bytes) -> Read:
     file = Bytes(data, "<")
     file.expect(b"ANYCUBIC\0\0\0\0")
     version, count = file.get("2I")
-    assert (version, count) in ((1, 4), (515, 4), (516, 8))
-    header, _, preview, _, table = file.get("5I")
-    images = file.get("3I" if version == 516 else "2I")[-1]
+    assert (version, count) in ((1, 4), (515, 4), (516, 8), (517, 9))
+    header, software, preview, _, table = file.get("5I")
+    images = file.get("3I" if version >= 516 else "2I")[-1]
+    model = file.get("I")[0] if version == 517 else 0
     file.at = header
     file.expect(b"HEADER\0\0\0\0\0\0")
-    assert file.get("I") == (80,)
+    assert file.get("I") == (92 if version == 517 else 80,)
     um, thickness, exposure, _, bottom, bottoms, lift, up, down, volume = file.get("10f")
     _, columns, rows, weight, _, currency, each_layer, seconds = file.get("3I2f3I")
     assert each_layer == 1 and currency == ord("$")
@@ -180,12 +226,20 @@ def photon(data: bytes) -> Read:
     size, layers = file.get("2I")
     assert size == 4 + 32 * layers
     entries = [file.get("2I4f2I") for _ in range(layers)]
-    if version == 516:
+    if version >= 516:
         file.expect(b"EXTRA\0\0\0\0\0\0\0")
         file.get("2I6fI6f")
         file.expect(b"MACHINE\0\0\0\0\0")
         assert file.get("I") == (156,)
         file.raw(140)
+    if version == 517:
+        assert file.at == software
+        assert file.get("32sI")[1] == 164
+        file.raw(128)
+        assert file.at == model
+        file.expect(b"MODEL\0\0\0\0\0\0\0")
+        length, *read.about["box"], supports, _ = file.get("I6fIf")
+        assert (length, supports) == (48, 0)
     assert entries[0][0] == images == file.at
     top = 0.0
     for begin, size, _, _, seconds, height, _, _ in entries:

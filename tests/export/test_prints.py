@@ -58,6 +58,7 @@ READERS = {
     "cbddlp": (readers.ctb, lambda image: (image.astype(int) + 32) // 64),
     "pwmx": (readers.photon, quantised(4)),
     "nanodlp": (readers.nanodlp, lambda image: image),
+    "cxdlpv4": (readers.cxdlp, lambda image: image >> 1),
 }
 """Readers of the formats of known printers, and what a format keeps of a grey level."""
 
@@ -80,6 +81,8 @@ CASES = {
     "cbddlp": ("part.cbddlp", readers.ctb, lambda image: (image.astype(int) + 32) // 64),
     "pwmx 1": ("part.pwmx", readers.photon, quantised(4)),
     "pwma 516": ("part.pwma", readers.photon, quantised(4)),
+    "pm5 517": ("part.pm5", readers.photon, quantised(4)),
+    "cxdlpv4": ("part.cxdlpv4", readers.cxdlp, lambda image: image >> 1),
     "nanodlp": ("part.nanodlp", readers.nanodlp, lambda image: image),
 }
 
@@ -170,6 +173,25 @@ def test_one_object_through_every_printer(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("form", LARGEST)
 def test_the_largest_screen_of_every_format(form: str, tmp_path: Path) -> None:
     printed(LARGEST[form], 6.0, tmp_path / f"part.{LARGEST[form].file}")
+
+
+def test_a_lift_in_two_stages_and_all_rests(tmp_path: Path) -> None:
+    """A .goo file has fields for them; others have the whole lift, and all rests before a layer."""
+    slow = replace(
+        RESIN, lift=2, lift_speed=40, lift_2=4, lift_speed_2=180, retract_2=1.5, retract_speed_2=30
+    )
+    slow = replace(slow, wait=1, wait_after=0.5, wait_lifted=0.25)
+    job = replace(run(), resin=slow)
+    about = readers.goo(write_slices(job, tmp_path / "part.goo").read_bytes()).about
+    assert about["rests"] == pytest.approx((0.5, 0.25, 1) * 2)
+    back = (4.5, slow.retract_speed)
+    assert about["motion"] == pytest.approx((2, 40) * 2 + back * 2 + (4, 180) * 2 + (1.5, 30) * 2)
+    for layer in about["layers"]:
+        assert layer == pytest.approx((0, 0.5, 0.25, 1, 2, 40, 4, 180, *back, 1.5, 30)[: len(layer)])
+    motion = 60 * (2 / 40 + 4 / 180 + 4.5 / slow.retract_speed + 1.5 / 30) + 1.75
+    assert slow.seconds(10) == pytest.approx(float(slow.exposures(10).sum()) + 10 * motion)
+    with pytest.raises(ExportError, match="retract_2 = 7: expected at most the whole lift, 6 mm"):
+        replace(slow, retract_2=7)
 
 
 def test_pictures_that_are_compensated(tmp_path: Path) -> None:

@@ -14,8 +14,9 @@ from fracslice._slices import Encoding, encoded
 from fracslice.errors import SliceError
 from fracslice.formulas import Node, box, mandelbulb, menger, sphere, transform, union
 from fracslice.slicing import Layer, SliceJob, Slicer, Stack, plan_stack
-from fracslice.slicing.printers import Printer, printer
-from fracslice.slicing.raster import Screen, blur, compensate
+from fracslice.slicing.printers import Printer, Resin, printer
+from fracslice.slicing.raster import Screen, blur, compensate, shrink
+from tests.export import decoders
 
 pytestmark = pytest.mark.once
 
@@ -188,6 +189,34 @@ def test_compensation_of_a_straight_edge_is_exact() -> None:
     assert compensate(image, -0.13, (0.1, 0.1))[4].tolist() == [255] * 4 + [51] + [0] * 7
 
 
+@pytest.mark.parametrize("compensation", [0.0, 0.1])
+def test_only_the_layers_that_are_exposed_longer_lose_their_foot(compensation: float) -> None:
+    """By the share of the exposure that they have beyond that of others: two bottom layers, one between."""
+    stack = stack_of(box(size=(6, 4, 3)))
+    resin = Resin(2, 20, bottom_layers=2, transition_layers=1)
+    job = SliceJob(size=6, elephant_foot=0.4, compensation=compensation)
+    screen = Screen.of(stack, job, resin)
+    assert screen.foot == pytest.approx([1, 1, 0.5][: len(screen.foot)])
+    areas = [image.sum() / 25500 for image in Slicer(stack).map(screen.picture)]
+    for area, by in zip(areas, [0.4, 0.4, 0.2, 0, 0], strict=False):
+        side = 2 * (compensation - by)
+        assert area == pytest.approx((6 + side) * (4 + side), rel=0.01)
+    files = Slicer(stack).map(lambda layer: screen.encoded(layer, Encoding.GOO))
+    for data, image in zip(files, Slicer(stack).map(screen.picture), strict=True):
+        assert (decoders.picture(decoders.goo(data), image.shape) == image).all()
+
+
+def test_what_is_thinner_than_the_foot_stays() -> None:
+    """Tips of supports on the plate are not lost."""
+    image = np.zeros((40, 40), np.uint8)
+    image[4:8, 4:36] = 255
+    image[16:36, 8:32] = 255
+    made = shrink(image, 0.3, (0.1, 0.1))
+    assert (made[4:8] == image[4:8]).all()
+    assert (made[19:33, 11:29] == 255).all()
+    assert int(made[16:36].sum()) == 255 * 14 * 18
+
+
 def test_gamma_leaves_black_and_white() -> None:
     stack = stack_of(sphere())
     before, after = picture(Screen(stack)), picture(Screen(stack, gamma=2.0))
@@ -225,6 +254,7 @@ def test_blur_is_the_mean_over_a_square() -> None:
         {"gamma": 0.0},
         {"gamma": math.nan},
         {"compensation": 2.0},
+        {"elephant_foot": 1.5},
         {"compensation": math.nan},
         {"levels": 0},
         {"blur": 17},

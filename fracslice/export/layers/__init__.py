@@ -69,7 +69,7 @@ def is_convertible(output: str | Path) -> bool:
 def write_slices(run: SliceRun, path: str | Path, name: str | None = None) -> Path:
     """Slice a planned stack and write the layers to a file or folder."""
     form = slice_format(path, name)
-    if form not in PICTURES and (run.sections > 1 or run.screen.compensation):
+    if form not in PICTURES and (run.sections > 1 or run.screen.compensation or run.screen.elephant_foot):
         raise ExportError(f"{path}: contours are of one section per layer, without compensation")
     FORMATS[form].write(run, Path(path))
     return Path(path)

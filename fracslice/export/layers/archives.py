@@ -232,10 +232,10 @@ def _profile(job: PrintData) -> dict[str, object]:
         "TransitionalLayer": resin.transition_layers,
         "CureTime": resin.exposure,
         "SupportCureTime": resin.bottom_exposure,
-        "WaitHeight": resin.lift,
-        "SupportWaitHeight": resin.lift,
-        "WaitBeforePrint": resin.wait,
-        "SupportWaitBeforePrint": resin.wait,
+        "WaitHeight": resin.whole_lift,
+        "SupportWaitHeight": resin.whole_lift,
+        "WaitBeforePrint": resin.rest,
+        "SupportWaitBeforePrint": resin.rest,
         "ResinPrice": resin.price,
     }
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..._slices import Encoding
 from ...slicing import Layer
-from ..layer_formats import ADDRESSED, PrintData, PrintFormat, pixel_format, rgb565
+from ..layer_formats import ADDRESSED, PrintData, PrintFormat, pixel_format, rgb15_runs
 from ..slice_run import SliceRun
 
 CTB, CBDDLP = 0x12FD0086, 0x12FD0019
@@ -65,7 +65,7 @@ def _write(
     data: Iterable[bytes],
 ) -> None:
     """Write header, previews, settings, layer table and layers. sizes: of the pictures, [levels, layers]."""
-    previews = [_preview(job.preview(*size)) for size in (LARGE, SMALL)]
+    previews = [rgb15_runs(job.preview(*size)) for size in (LARGE, SMALL)]
     name = job.title
     lengths = [
         _HEADER.size,
@@ -98,7 +98,7 @@ def _header(job: PrintData, magic: int, version: int, levels: int, places: tuple
     resin, (rows, columns), (large, small, motion, slicer, table) = job.resin, job.run.screen.shape, places
     return _HEADER.pack(
         *(magic, version, *job.printer.screen, job.printer.height, float(job.tops[-1])),
-        *(float(job.heights.max()), resin.exposure, resin.bottom_exposure, resin.wait, resin.bottom_layers),
+        *(float(job.heights.max()), resin.exposure, resin.bottom_exposure, resin.rest, resin.bottom_layers),
         *(columns, rows, large, table, job.layers, small, round(job.seconds), int(job.mirrored)),
         *(motion, _MOTION.size, levels, 255, 255, 0, slicer, _SLICER.size),
     )
@@ -107,8 +107,8 @@ def _header(job: PrintData, magic: int, version: int, levels: int, places: tuple
 def _motion(job: PrintData) -> bytes:
     resin = job.resin
     return _MOTION.pack(
-        *((resin.lift, resin.lift_speed) * 2 + (resin.retract_speed,)),
-        *(job.volume_ml, job.weight_g, job.cost, resin.wait, resin.wait, resin.bottom_layers),
+        *((resin.whole_lift, resin.lift_speed) * 2 + (resin.retract_speed,)),
+        *(job.volume_ml, job.weight_g, job.cost, resin.rest, resin.rest, resin.bottom_layers),
     )
 
 
@@ -119,24 +119,14 @@ def _slicer(job: PrintData, magic: int, version: int, levels: int, machine: int,
 
 def _timing(job: PrintData, layer: int) -> tuple[float, float, float]:
     """Height of the platform, exposure and time without light."""
-    return float(job.tops[layer]), float(job.exposures[layer]), job.resin.wait
+    return float(job.tops[layer]), float(job.exposures[layer]), job.resin.rest
 
 
 def _layer_motion(job: PrintData, size: int) -> bytes:
     resin = job.resin
-    return _LAYER_MOTION.pack(size, resin.lift, resin.lift_speed, 0, 0, resin.retract_speed, *(0,) * 5, 255)
-
-
-def _preview(picture: NDArray[np.uint8]) -> bytes:
-    """Runs of equal pixels of 15 bits; the bit after green marks a pixel that a run length follows."""
-    pixels = (rgb565(picture) & ~np.uint16(0x20)).ravel()
-    starts = np.flatnonzero(np.diff(pixels, prepend=~pixels[:1]))
-    words: list[int] = []
-    for value, length in zip(pixels[starts], np.diff(starts, append=len(pixels)), strict=True):
-        for begin in range(0, int(length), 0xFFE):
-            more = min(int(length) - begin, 0xFFE) - 1
-            words += [int(value) | 0x20, 0x3000 | more] if more else [int(value)]
-    return np.array(words, "<u2").tobytes()
+    return _LAYER_MOTION.pack(
+        size, resin.whole_lift, resin.lift_speed, 0, 0, resin.retract_speed, *(0,) * 5, 255
+    )
 
 
 FORMATS = (

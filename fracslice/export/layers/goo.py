@@ -9,8 +9,9 @@ import struct
 from typing import BinaryIO
 
 from ..._slices import Encoding
+from ...slicing.printers import Resin
 from ...version import __version__
-from ..layer_formats import PrintData, pixel_format, rgb565
+from ..layer_formats import PrintData, pixel_format, rgb565, second_stages
 
 MAGIC = b"\x07\0\0\0DLP\0"
 DELIMITER = b"\r\n"
@@ -49,14 +50,16 @@ def _header(job: PrintData) -> bytes:
 
 def _settings(job: PrintData) -> bytes:
     resin, (rows, columns) = job.resin, job.run.screen.shape
-    lift, up, down = resin.lift, resin.lift_speed, resin.retract_speed
+    first = (resin.lift, resin.lift_speed) * 2 + (resin.retract, resin.retract_speed) * 2
     return _SETTINGS.pack(
         *(job.layers, columns, rows, job.mirrored, False),
         *(*job.printer.screen, job.printer.height, float(job.heights.max()), resin.exposure),
         True,  # rests instead of a time without light
-        *(0, 0, 0, resin.wait, 0, 0, resin.wait, resin.bottom_exposure),
+        0,  # time without light
+        *(_rests(resin) * 2),
+        resin.bottom_exposure,
         resin.bottom_layers,
-        *((lift, up) * 2 + (lift, down) * 2 + (0,) * 8),
+        *(*first, *(second_stages(resin)[:2] * 2), *(second_stages(resin)[2:] * 2)),
         *(255, 255, True, round(job.seconds)),
         *(1000 * job.volume_ml, job.weight_g, job.cost, b"", HEADER, True, resin.transition_layers),
     )
@@ -65,10 +68,16 @@ def _settings(job: PrintData) -> bytes:
 def _layer(job: PrintData, index: int, size: int) -> bytes:
     resin = job.resin
     return _LAYER.pack(
-        *(0, 0, float(job.tops[index]), float(job.exposures[index]), 0, 0, 0, resin.wait),
-        *(resin.lift, resin.lift_speed, 0, 0, resin.lift, resin.retract_speed, 0, 0),
+        *(0, 0, float(job.tops[index]), float(job.exposures[index]), 0, *_rests(resin)),
+        *(resin.lift, resin.lift_speed, *second_stages(resin)[:2]),
+        *(resin.retract, resin.retract_speed, *second_stages(resin)[2:]),
         *(255, DELIMITER, size),
     )
+
+
+def _rests(resin: Resin) -> tuple[float, float, float]:
+    """Rests after a layer, after the lift and before a layer, s."""
+    return resin.wait_after, resin.wait_lifted, resin.wait
 
 
 FORMATS = (pixel_format("goo", Encoding.GOO, _assemble, endings=(".goo", ".prz"), also={".prz": ".goo"}),)

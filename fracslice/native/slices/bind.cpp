@@ -3,6 +3,7 @@
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
@@ -146,6 +147,21 @@ nb::list bind_pictures(Slab& slab, const std::vector<int>& layers, std::array<in
     return result;
 }
 
+// Slab, layer, transposed, backwards, rows and columns of the layer, upside down, places.
+using GivenPiece = std::tuple<const Slab*, int, bool, bool, std::array<int, 2>, bool, std::vector<std::array<int, 2>>>;
+
+nb::tuple bind_plate(const std::vector<GivenPiece>& given, std::array<int, 2> rows_columns, const nb::bytes& levels,
+                     Encoding encoding) {
+    std::vector<Piece> pieces;
+    for (const auto& [slab, layer, transposed, backwards, shape, upside_down, places] : given) {
+        held(*slab, layer);
+        const std::array<int, 2> own = {shape[transposed], shape[!transposed]};
+        pieces.push_back({slab, view_of(own, transposed, backwards, {0, 0}, shape, levels), upside_down, places});
+    }
+    Picture shown = unlocked([&] { return picture(pieces, rows_columns[0], rows_columns[1], encoding); });
+    return nb::make_tuple(bytes(*shown.data), shown.painted.area, shown.painted.partly);
+}
+
 nb::bytes bind_encoded(const nb::ndarray<const uint8_t, nb::ndim<2>, nb::device::cpu>& image, Encoding encoding) {
     auto* first = const_cast<uint8_t*>(image.data());
     const Canvas canvas{first, int(image.shape(0)), int(image.shape(1)), image.stride(0), image.stride(1)};
@@ -196,6 +212,7 @@ NB_MODULE(_slices, module) {
         .value("RLE4", Encoding::rle4)
         .value("RLE1", Encoding::rle1);
     module.def("encoded", &bind_encoded, "image"_a, "encoding"_a);
+    module.def("plate_picture", &bind_plate, "pieces"_a, "pixels"_a, "levels"_a, "encoding"_a);
     module.def("filtered", &bind_filtered, "rows"_a, "pixel"_a);
     nb::class_<Memory>(module, "Memory").def(nb::init<>());
     nb::class_<Slab>(module, "Slab")

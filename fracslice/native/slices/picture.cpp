@@ -263,6 +263,13 @@ class Shown {
           rows_(slab, view, down_.tiles, across_.tiles) {}
 
     Picture picture() {
+        read_all();
+        if (encoding_ != Encoding::png) return {&run_lengths(runs_, encoding_), painted_};
+        return {&runs_.zlib(band_.checksum((uint64_t(view_.columns) + filter_) * uint64_t(view_.rows))), painted_};
+    }
+
+    // The runs of all rows.
+    Runs& read_all() {
         const uint64_t row = uint64_t(view_.columns) + filter_;
         uint64_t at = row * down_.at + filter_ + across_.at;  // place of a row's first pixel among all bytes
         runs_.clear();
@@ -278,9 +285,9 @@ class Shown {
         }
         runs_.add(0, row * (view_.rows - down_.at - down_.count()));
         painted_.area += coverage_.area();
-        if (encoding_ != Encoding::png) return {&run_lengths(runs_, encoding_), painted_};
-        return {&runs_.zlib(band_.checksum(row * uint64_t(view_.rows))), painted_};
+        return runs_;
     }
+    Painted painted() const { return painted_; }
 
  private:
     int side(bool along_x) const { return along_x ? slab_.columns() : slab_.rows(); }
@@ -342,9 +349,87 @@ class Shown {
     Painted painted_{0, 0};
 };
 
+// Pixels of one level, not 0, in a row of a picture.
+struct Streak {
+    int32_t column, count;
+    uint8_t level;
+};
+
+// The streaks of each row of an object.
+class StreakRows {
+ public:
+    StreakRows(Runs& runs, int rows, int columns) : begin_(size_t(rows) + 1) {
+        int row = 0, column = 0;
+        runs.each([&](uint8_t level, uint64_t n) {
+            while (n > 0) {
+                const int count = int(std::min(n, uint64_t(columns - column)));
+                if (level) streaks_.push_back({column, count, level});
+                column += count, n -= uint64_t(count);
+                if (column == columns) column = 0, begin_[size_t(++row)] = streaks_.size();
+            }
+        });
+    }
+    std::pair<const Streak*, const Streak*> operator[](int row) const {
+        return {streaks_.data() + begin_[size_t(row)], streaks_.data() + begin_[size_t(row) + 1]};
+    }
+
+ private:
+    std::vector<Streak> streaks_;
+    std::vector<size_t> begin_;  // of each row
+};
+
 }  // namespace
 
 Picture picture(const Slab& slab, const View& view, Encoding encoding) { return Shown(slab, view, encoding).picture(); }
+
+Picture picture(const std::vector<Piece>& pieces, int rows, int columns, Encoding encoding) {
+    struct Shows {
+        const StreakRows* streaks;
+        int row, rows, column;
+        bool upside_down;
+    };
+    Painted painted{0, 0};
+    std::vector<StreakRows> streaks;
+    std::vector<Shows> shows;
+    streaks.reserve(pieces.size());
+    for (const Piece& piece : pieces) {
+        Shown alone(*piece.slab, piece.view, Encoding::goo);
+        streaks.emplace_back(alone.read_all(), piece.view.rows, piece.view.columns);
+        for (const auto& [row, column] : piece.places) {
+            painted.area += alone.painted().area, painted.partly += alone.painted().partly;
+            shows.push_back({&streaks.back(), row, piece.view.rows, column, piece.upside_down});
+        }
+    }
+    std::ranges::sort(shows, {}, &Shows::column);
+    Runs& runs = runs_of_thread;
+    runs.clear();
+    Adler sum;
+    const int filter = encoding == Encoding::png;
+    const int64_t stride = columns + filter;
+    std::vector<Streak> line;
+    for (int y = 0; y < rows; ++y) {
+        line.clear();
+        for (const Shows& one : shows) {
+            const int own = y - one.row;
+            if (own < 0 || own >= one.rows) continue;
+            const auto [begin, end] = (*one.streaks)[one.upside_down ? one.rows - 1 - own : own];
+            for (const Streak* s = begin; s != end; ++s) line.push_back({s->column + one.column, s->count, s->level});
+        }
+        if (shows.size() > 1) std::ranges::stable_sort(line, {}, &Streak::column);
+        int at = 0;
+        runs.add(0, uint64_t(filter));
+        for (const Streak& s : line) {
+            const int first = std::max(s.column, at), last = std::min(s.column + s.count, columns);
+            if (first >= last) continue;
+            runs.add(0, uint64_t(first - at)), runs.add(s.level, uint64_t(last - first));
+            sum.add(s.level, uint64_t(y * stride + filter + first), uint64_t(last - first));
+            at = last;
+        }
+        runs.add(0, uint64_t(columns - at));
+    }
+    if (encoding != Encoding::png) return {&run_lengths(runs, encoding), painted};
+    return {&runs.zlib(sum.value(uint64_t(stride) * uint64_t(rows))), painted};
+}
 
 const Rows<uint8_t>& encoded(const Canvas& image, Encoding encoding) {
     Runs& runs = runs_of_thread;

@@ -25,6 +25,17 @@ struct Picture {
 };
 
 Picture picture(const Slab& slab, const View& view, Encoding encoding);
+
+// A layer of an object on a plate of several.
+struct Piece {
+    const Slab* slab;
+    View view;                                // of the object alone
+    bool upside_down;                         // its rows come in the other order
+    std::vector<std::array<int, 2>> places;  // row and column of its first pixel in the picture, for each time it is shown
+};
+
+// All of them in one picture, from rows of equal pixels of each object. What they cover is painted once for each piece.
+Picture picture(const std::vector<Piece>& pieces, int rows, int columns, Encoding encoding);
 // Until this thread makes another.
 const Rows<uint8_t>& encoded(const Canvas& image, Encoding encoding);
 

@@ -1,0 +1,244 @@
+"""Plates of many parts: layers of all in one file, and meshes of all in one file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common.cache import key
+from ..errors import SliceError
+from ..export.slice_run import Encode, SliceRun
+from ..formulas import transform, union
+from ..slicing import Stack
+from ..slicing.packing import (
+    SPACING,
+    Spot,
+    cell_for,
+    outline_of_layers,
+    outline_of_mesh,
+    packed,
+    plate_of,
+    taken,
+    turns_for,
+)
+from ..slicing.raster import Screen, check_fits
+from ..volume import with_depths
+from ..work import Work
+from .slices import SliceRecipe, StackModel, rendered
+
+if TYPE_CHECKING:
+    from ..mesh import Mesh
+    from ..slicing.stack import Standing
+
+
+@dataclass(frozen=True)
+class PlateRecipe:
+    """Parts of a plate, and how far apart they stand: enough for any process to plan the same layers.
+
+    Printer, format, resin and date are those of the first part.
+    """
+
+    parts: tuple[SliceRecipe, ...]  # the parts, each as often as it stands on the plate
+    spacing: float = SPACING  # distance between parts, mm
+    bed: tuple[float, float] | None = None  # width and depth, mm, if there is no printer; None for no limits
+
+    @property
+    def form(self) -> str:
+        """Format of the file."""
+        return self.parts[0].form
+
+    def encoder(self, run: SliceRun) -> Encode:
+        """Return the function that encodes the layers of a run in this format; see `Recipe.encoder`."""
+        return self.parts[0].encoder(run)
+
+    def run(self, work: Work) -> SliceRun:
+        """Plan and place all parts; see `Recipe.run`. Equal parts are planned and sliced once.
+
+        Raises `SliceError` if they do not fit.
+        """
+        first, job = self.parts[0], self.parts[0].job
+        if job.layer[1] is not None:
+            raise SliceError("layer: parts of a plate have layers of one height: expected no range")
+        scenes = {part: part.read() for part in dict.fromkeys(self.parts)}
+        stacks = {part: part.plan(scene, work) for part, scene in scenes.items()}
+        plate = self._plate(stacks, work)
+        models = [StackModel(scene, part.job, replace(work, cluster=None)) for part, scene in scenes.items()]
+        places = [list(scenes).index(part) for part in self.parts]
+        whole = PlateModel(plate, models, places)
+        names = ", ".join(part.name for part in scenes)
+        about = {"Title": names, "scene_hash": key(*(scenes[part].hash for part in self.parts))}
+        files = about, whole.mesh, whole.picture, first.created
+        return SliceRun(
+            plate, Screen.of(plate, job, first.resin), work, first.resin, *files, job.sections, self
+        )
+
+    def _plate(self, stacks: dict[SliceRecipe, Stack], work: Work) -> Stack:
+        """Place the parts."""
+        job = self.parts[0].job
+        printer, pixel = job.printer, job.pixels
+        bed, where = self.bed, "the bed"
+        if printer:
+            for part, stack in stacks.items():
+                with named(part.name):
+                    check_fits(stack, printer, max(job.compensation, 0.0))
+            bed, where = (printer.screen[0] - pixel[0], printer.screen[1] - pixel[1]), f"the {printer.title}"
+        cell = cell_for(bed, [max(stacks[part].size[:2]) for part in self.parts])
+        masks = {part: outline_of_layers(stack, cell, work) for part, stack in stacks.items()}
+        spots = packed(
+            [masks[part] for part in self.parts],
+            [part.name for part in self.parts],
+            cell,
+            bed,
+            self.spacing + 2 * max(job.compensation, 0.0),
+            where,
+            turns_for(pixel),
+        )
+        return plate_of([stacks[part] for part in self.parts], spots)
+
+
+@contextmanager
+def named(name: str) -> Iterator[None]:
+    """Put the name of a part before its errors."""
+    try:
+        yield
+    except SliceError as error:
+        raise SliceError(f"{name}: {error}") from None
+
+
+@dataclass(frozen=True)
+class PlateModel:
+    """The objects of a plate."""
+
+    plate: Stack  # the plate
+    models: Sequence[StackModel]  # the parts, each once
+    places: Sequence[int]  # part at each place of the plate
+
+    def mesh(self) -> Mesh:
+        """Meshes of all parts at their places; see `StackModel.mesh`."""
+        from ..common.arrays import concatenate
+
+        meshes = [model.mesh() for model in self.models]
+        standing = zip(self.plate.parts, self.places, strict=True)
+        return concatenate([_moved(meshes[k], part, self.plate.shape) for part, k in standing])
+
+    def picture(self) -> NDArray[np.uint8]:
+        """Render all parts at their places; see `StackModel.picture`."""
+        made = []
+        for part, k in zip(self.plate.parts, self.places, strict=True):
+            stack, node = part.stack, with_depths(self.models[k].upright)
+            (middle,) = part.moved(np.zeros((1, 2)), self.plate.shape)
+            lying = transform(node, translate=tuple(-at for at in stack.origin))
+            turned = transform(lying, rotate=(0, 0, 1, 90 * part.turns), scale=stack.scale)
+            made.append(transform(turned, translate=(*middle.tolist(), 0.0)))
+        return rendered(union(*made), self.models[0].work)
+
+
+def _moved(mesh: Mesh, part: Standing, plate: tuple[int, int]) -> Mesh:
+    """Mesh of a part at its place on a plate.
+
+    `mesh` in mm; `plate`: rows and columns of the plate.
+    """
+    flat = part.moved(mesh.vertices[:, :2], plate)
+    return replace(mesh, vertices=np.column_stack([flat, mesh.vertices[:, 2]]))
+
+
+def write_meshes(
+    meshes: Sequence[Mesh],
+    places: Sequence[int],
+    names: Sequence[str],
+    path: str | Path,
+    about: Mapping[str, str],
+    work: Work,
+    *,
+    spacing: float = SPACING,
+    bed: tuple[float, float, float] | None = None,
+    where: str = "the bed",
+) -> list[Spot]:
+    """Place meshes, each standing on z = 0 and centred, and write them to one file.
+
+    A .3mf file holds each mesh once, and an item of the build for each place; other files hold triangles.
+
+    Parameters
+    ----------
+    meshes : sequence of Mesh
+        The meshes, each once, mm.
+    places : sequence of int
+        Number of the mesh of each part.
+    names : sequence of str
+        Name of each part, for errors.
+    path : str or Path
+        The file to write; its extension selects the format.
+    about : mapping of str to str
+        Metadata of the file.
+    work : Work
+        Threads and cancellation.
+    spacing : float
+        Distance between parts, mm.
+    bed : tuple of float, optional
+        Width, depth and height that are free, mm; no limits without it.
+    where : str
+        What the bed is called in errors.
+
+    Returns
+    -------
+    list of Spot
+        Where each part stands.
+
+    Raises
+    ------
+    SliceError
+        If the parts do not fit on the bed.
+    """
+    from ..common.files import replacing
+    from ..formats import write
+    from ..formats._3mf import Built, write_build
+    from ..version import APPLICATION
+
+    sides = [mesh.vertices.max(0) - mesh.vertices.min(0) for mesh in meshes]
+    for k, name in zip(places, names, strict=True):
+        if bed and sides[k][2] > bed[2] * (1 + 1e-6):
+            raise SliceError(f"{name}: {sides[k][2]:.6g} mm high, {where} has {bed[2]:.6g} mm")
+    flat = bed and (bed[0], bed[1])
+    cell = cell_for(flat, [float(sides[k][:2].max()) for k in places])
+    masks = [outline_of_mesh(mesh, cell) for mesh in meshes]
+    spots = packed([masks[k] for k in places], names, cell, flat, spacing, where)
+    corner = (
+        np.array(flat) / 2 if flat else taken(zip([masks[k] for k in places], spots, strict=True), cell)[1]
+    )
+    items = [(k, _transform(spot, corner)) for k, spot in zip(places, spots, strict=True)]
+    if Path(path).suffix.lower() == ".3mf":
+        with replacing(path) as file:
+            whole = _laid_out(meshes, items)
+            built = [
+                Built(mesh, [place for number, place in items if number == k])
+                for k, mesh in enumerate(meshes)
+            ]
+            write_build(built, file, {"Application": APPLICATION, **about}, work, whole.thumbnail())
+    else:
+        write(_laid_out(meshes, items), path, about, work)
+    return spots
+
+
+def _transform(spot: Spot, corner: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Four rows by which points, as rows, are moved to a spot; as 3MF has them, from the corner of the bed.
+
+    `corner`: the middle of the plate from there, mm.
+    """
+    cosine, sine = ((1, 0), (0, 1), (-1, 0), (0, -1))[spot.turns]
+    return np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1], [*(corner + spot.middle), 0]], float)
+
+
+def _laid_out(meshes: Sequence[Mesh], items: Sequence[tuple[int, NDArray[np.float64]]]) -> Mesh:
+    """All parts as one mesh."""
+    from ..common.arrays import concatenate, product
+    from ..mesh import Mesh
+
+    return concatenate(
+        [Mesh(product(meshes[k].vertices, m[:3]) + m[3], meshes[k].triangles) for k, m in items]
+    )

@@ -1,0 +1,112 @@
+"""Holes by which resin leaves: at a place, along a direction, or wherever it could not get out."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.ndimage import label
+
+from fracslice.errors import SceneError, VolumeError
+from fracslice.formulas import Node, box, cylinder, difference, gyroid, infill, sphere, transform
+from fracslice.records import Print
+from fracslice.slicing import SliceJob, Slicer, Stack, plan_layers
+from fracslice.work import Work
+
+SIDE, WALL = 20.0, 3.0
+CASE = difference(box(size=(SIDE,) * 3), box(size=(SIDE - 2 * WALL,) * 3))
+"""A box around a sealed cavity."""
+
+CUP = difference(
+    cylinder(radius=10, height=20), transform(cylinder(radius=8, height=20), translate=(0, 0, 3))
+)
+"""Open upwards: a suction cup, as it hangs from the plate."""
+
+BELL = transform(CUP, rotate=(1, 0, 0, 180))
+"""Open to the plate, which closes it: a resin trap."""
+
+
+def planned(node: Node, layer: float = 0.25, **how: Any) -> Stack:
+    job = SliceJob(size=SIDE, layer=layer, pixel=0.25, printing=Print(**how))
+    return plan_layers(node, job, Work(1))
+
+
+def held(node: Node, **how: Any) -> float:
+    """Volume without a way out through the layers up to its own, from either end, by flooding all of them."""
+    stack = planned(node, layer=0.5, **how)
+    solid = np.array(list(Slicer(stack, Work(1)).map(lambda layer: layer.coverage >= 128)))
+    shut = [_shut(part, top) for part, top in ((solid, False), (solid[::-1], True))]
+    return float((shut[0] | shut[1][::-1]).sum()) * stack.pixel[0] * stack.pixel[1] * float(stack.heights[0])
+
+
+def _shut(solid: np.ndarray, begins_open: bool) -> np.ndarray:
+    shut = np.zeros_like(solid)
+    for k in range(len(solid)):
+        number, _ = label(~solid[: k + 1])
+        rim = {*number[:, 0].flat, *number[:, -1].flat, *number[:, :, 0].flat, *number[:, :, -1].flat}
+        free = rim | ({*number[0].flat} if begins_open else set())
+        shut[k] = ~solid[k] & ~np.isin(number[k], list(free - {0}))
+    return shut
+
+
+def volume(stack: Stack) -> float:
+    return float(sum(Slicer(stack, Work(1)).map(lambda layer: layer.area * layer.height)))
+
+
+@pytest.mark.parametrize(
+    ("place", "length"),
+    [
+        ("8.5,2,6", WALL),  # in a wall
+        ("6,2,6", WALL),  # in the cavity, near to it
+        ("9.99,2,6", WALL),  # at its outside
+        ("0,0,6,1,0,0", WALL),  # from the middle, as it is told
+        ("0,0,6,1,1,0", WALL * math.sqrt(2)),  # into the edge, which is as thick everywhere along it
+    ],
+)
+def test_a_hole_removes_its_cylinder_from_the_wall(place: str, length: float) -> None:
+    """The volume that a hole of 2 mm removes from a wall of a known thickness."""
+    made = planned(CASE, drain=2, drain_at=place)
+    removed = volume(planned(CASE)) - volume(made)
+    assert removed == pytest.approx(math.pi * length, rel=0.02)
+    assert len(made.drains) == 1
+
+
+@pytest.mark.parametrize(("node", "volume"), [(CASE, 14**3), (CUP, np.pi * 64 * 17), (BELL, np.pi * 64 * 17)])
+def test_holes_are_drilled_until_everything_drains(node: Node, volume: float) -> None:
+    assert held(node) == pytest.approx(volume, rel=0.04)
+    assert held(node, drain_at="auto") < 2
+
+
+def test_a_hollow_with_a_lattice_drains() -> None:
+    filled = infill(sphere(radius=10), gyroid(period=8, volume_fraction=0.15), shell=1)
+    assert held(filled, drain=2, drain_at="auto") < 0.02 * held(filled)
+
+
+def test_what_cannot_drain_is_noted() -> None:
+    """Two holes in the roof leave what is below them; nothing is said of a hollow that drains."""
+    notes = planned(CASE, drain=2, drain_at="0,0,18 3,0,18").notes
+    assert len(notes) == 1
+    assert notes[0].startswith("1 space of 2.")
+    assert "--drain-at auto" in notes[0]
+    assert not planned(box(size=(SIDE,) * 3), hollow=2).notes
+
+
+@pytest.mark.parametrize(
+    ("place", "reported"),
+    [
+        ("0,0,30", "drain-at 0,0,30: outside of the object"),
+        ("0,0,10,0,0,-1", "drain-at 0,0,10: no wall with a way out behind it in that direction"),
+    ],
+)
+def test_a_place_without_a_wall_is_refused(place: str, reported: str) -> None:
+    """Downwards the plate closes the hole."""
+    with pytest.raises(VolumeError, match=reported):
+        planned(CASE, drain_at=place)
+
+
+@pytest.mark.parametrize("text", ["1,2", "1,2,3,0,0,0", "1,2,3,0,0,1,-2", "here", "1,2,nan"])
+def test_what_is_no_place_is_refused(text: str) -> None:
+    with pytest.raises(SceneError, match="places x,y,z"):
+        Print(drain_at=text)
