@@ -17,6 +17,8 @@ from fracslice.printing.thin_features import OffsetField
 from fracslice.printing.walls import Samples
 from fracslice.volume import Bricks, Lattice, sample
 
+pytestmark = pytest.mark.once
+
 Values = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
 BALL, ASIDE = sphere(radius=0.8), transform(sphere(radius=0.4), translate=(0.6, 0.1, 0))

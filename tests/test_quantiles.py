@@ -7,6 +7,8 @@ import pytest
 
 from fracslice.common.arrays import quantile, weighted_quantiles
 
+pytestmark = pytest.mark.once
+
 
 @pytest.mark.parametrize("count", [1, 2, 3, 1000])
 @pytest.mark.parametrize("share", [0.0, 0.5, 0.9, 0.99, 1.0])

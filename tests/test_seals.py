@@ -10,6 +10,8 @@ import pytest
 from fracslice.common import cache
 from fracslice.errors import FracsliceWarning
 
+pytestmark = pytest.mark.once
+
 
 @pytest.fixture(autouse=True)
 def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:

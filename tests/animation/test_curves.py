@@ -10,6 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from fracslice.animation.timeline import CURVES, ease_time
 
+pytestmark = pytest.mark.once
+
 TIMES = np.array([0.0, 1.0, 1.5, 4.0])
 FINE = np.linspace(0, 4, 2001)
 

@@ -9,6 +9,8 @@ import pytest
 from fracslice.cli.main import run
 from fracslice.cli.sweeps import members
 
+pytestmark = pytest.mark.once
+
 BALL = """<scene version="1"><solid size="20mm"><sphere radius="0.5"/></solid>
 <animation duration="1s"/><track of="sphere.radius" keys="0s: 0.5; 1s: 1" curve="linear"/></scene>"""
 

@@ -14,6 +14,8 @@ from scipy.ndimage import label
 from fracslice.mesh.models import read_mesh
 from tests.export import readers
 
+pytestmark = pytest.mark.once
+
 MARS = ["--printer", "mars-5", "--layer", "4mm", "--threads", "1"]
 
 

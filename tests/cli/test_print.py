@@ -17,6 +17,8 @@ from fracslice.export.sending import Figures, read_figures
 from fracslice.export.slicer_profiles import shipped
 from fracslice.mesh.models import read_mesh
 
+pytestmark = pytest.mark.once
+
 PROGRAM = """#!{python}
 import json, os, shutil, sys
 out = sys.argv[sys.argv.index({flag!r}) + 1]

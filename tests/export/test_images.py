@@ -13,6 +13,8 @@ from fracslice.errors import ExportError
 from fracslice.export.images import BANDED, write_bands, write_image
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 RNG = np.random.default_rng(0)
 SHOWN = RNG.uniform(0, 1, (13, 21, 3)).astype(np.float32)
 SMOOTH = np.linspace(0, 1, 64 * 48 * 3, dtype=np.float32).reshape(48, 64, 3)

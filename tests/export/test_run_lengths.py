@@ -18,6 +18,8 @@ from fracslice.slicing.raster import Screen
 from fracslice.work import Work
 from tests.export import decoders
 
+pytestmark = pytest.mark.once
+
 RNG = np.random.default_rng(0)
 KINDS = {
     Encoding.GOO: (decoders.goo, lambda image: image),

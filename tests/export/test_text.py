@@ -14,6 +14,8 @@ from fracslice.formats import write
 from fracslice.work import Work
 from tests.mesh.shapes import sphere
 
+pytestmark = pytest.mark.once
+
 
 def test_numbers_are_as_short_as_reads_back() -> None:
     bits = np.random.default_rng(3).integers(0, 1 << 32, 30_000, dtype=np.uint32)

@@ -6,6 +6,8 @@ import pytest
 from fracslice.fields.cpu import compile_scene
 from fracslice.formulas import bend, box
 
+pytestmark = pytest.mark.once
+
 
 @pytest.mark.parametrize("degrees", [1e-12, 1e-6, 1e-3, 0.1, -0.1])
 @pytest.mark.parametrize("axis", ["x", "y", "z"])

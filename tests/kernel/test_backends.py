@@ -11,6 +11,8 @@ from fracslice.fields.linker import FIELD, link
 from fracslice.formulas import mandelbulb, sphere
 from tests.examples import DEFINED, EXAMPLES, stamped
 
+pytestmark = pytest.mark.once
+
 ALL = EXAMPLES | DEFINED
 
 # Largest error in units of the last place of the largest coordinate, times the conditioning of the longest

@@ -20,6 +20,8 @@ from fracslice.formulas import (
     union,
 )
 
+pytestmark = pytest.mark.once
+
 RNG = np.random.default_rng(5)
 
 

@@ -33,6 +33,8 @@ from fracslice.rendering.linking import link_frame
 from fracslice.rendering.setup import optics
 from fracslice.scene.view import Camera, Light, View
 
+pytestmark = pytest.mark.once
+
 P = np.random.default_rng(2).uniform(-1.5, 1.5, (3, 500))
 
 

@@ -18,6 +18,8 @@ from fracslice.mesh.models import read_coloured
 from fracslice.rendering.materials import paint
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 RED, BLUE = (0.9, 0.1, 0.2), (0.1, 0.2, 0.8)
 TWO = union(
     material(sphere(radius=1), colour=RED),

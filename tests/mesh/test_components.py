@@ -20,6 +20,8 @@ from fracslice.volume import SignBricks
 
 from .shapes import cube, inverted, sphere
 
+pytestmark = pytest.mark.once
+
 
 def hollow_and_dust() -> Mesh:
     """A hollow cube of 1000 - 8 mm3, a hollow one of 125 - 1 mm3 in the way of its rays, and two grains."""

@@ -12,6 +12,8 @@ from fracslice.mesh.model import Nearest
 from fracslice.mesh.models import MeshField
 from fracslice.volume import plan
 
+pytestmark = pytest.mark.once
+
 
 def field_of(*parts: trimesh.Trimesh) -> MeshField:
     whole = trimesh.util.concatenate(parts)

@@ -31,6 +31,8 @@ from fracslice.records import MeshJob, Palette
 from fracslice.work import Work
 from tests.mesh import shapes
 
+pytestmark = pytest.mark.once
+
 RED, BLUE = (0.9, 0.1, 0.2), (0.1, 0.2, 0.8)
 TWO = union(
     material(box(size=(2, 2, 2)), colour=RED),

@@ -7,6 +7,8 @@ import pytest
 
 from fracslice.mesh.shells import gather_rows
 
+pytestmark = pytest.mark.once
+
 
 @pytest.mark.parametrize("size", [1, 5, 1 << 17])
 @pytest.mark.parametrize("shape", [(0,), (23,), (7, 6)])

@@ -10,6 +10,8 @@ from fracslice.errors import MeshError
 from fracslice.mesh import Mesh
 from fracslice.mesh.cleaning import place_and_round
 
+pytestmark = pytest.mark.once
+
 RNG = np.random.default_rng(5)
 SOUP = Mesh(RNG.normal(size=(9000, 3)), RNG.integers(0, 9000, (40000, 3)).astype(np.int32))
 """More than two blocks of triangles, some of them without area."""

@@ -18,6 +18,8 @@ from fracslice.mesh.checks import HANGS, IS_THIN, marked, overhanging
 from fracslice.records import MeshJob
 from tests.mesh import shapes
 
+pytestmark = pytest.mark.once
+
 TABLE = union(box(size=(8, 8, 20)), transform(box(size=(30, 30, 4)), translate=(0, 0, 12)))
 """A foot of 20 mm below a plate of 4 mm."""
 

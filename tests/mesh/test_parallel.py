@@ -29,6 +29,8 @@ from fracslice.mesh.shells import nesting
 
 from .shapes import cube, inverted
 
+pytestmark = pytest.mark.once
+
 THREADS = 1, 2, 5
 RNG = np.random.default_rng(11)
 N, M = 200_000, 50_000

@@ -11,6 +11,8 @@ from fracslice.formulas import Node, box, mandelbulb, sphere, transform, union
 from fracslice.mesh.contouring import project
 from fracslice.mesh.fit import surface_error
 
+pytestmark = pytest.mark.once
+
 
 def projected(
     root: Node,

@@ -13,6 +13,8 @@ from fracslice.mesh.model import to_manifold
 
 from .shapes import GOOD, cube, sphere, with_flipped, without
 
+pytestmark = pytest.mark.once
+
 
 @pytest.mark.parametrize("name", GOOD)
 def test_manifold3d_takes_good_meshes_as_they_are(name: str) -> None:

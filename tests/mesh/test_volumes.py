@@ -10,6 +10,8 @@ from fracslice.formulas import Node, sphere, torus, transform
 from fracslice.mesh.contouring import contour, extract
 from fracslice.volume import plan, sample_scene
 
+pytestmark = pytest.mark.once
+
 BALL = 4 / 3 * math.pi
 
 

@@ -15,6 +15,8 @@ from fracslice.records import Print
 from fracslice.slicing import SliceJob, Slicer, Stack, plan_layers
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 SIDE, WALL = 20.0, 3.0
 CASE = difference(box(size=(SIDE,) * 3), box(size=(SIDE - 2 * WALL,) * 3))
 """A box around a sealed cavity."""

@@ -24,6 +24,8 @@ from fracslice.rendering.units.camera import squared_error
 from fracslice.scene.view import View
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 WIDTH, HEIGHT = 37, 23
 
 

@@ -12,6 +12,8 @@ from fracslice.rendering import Renderer
 from fracslice.scene import library, read
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 PICTURES = Path(__file__).parents[2] / "examples/gallery"
 SIZE = (48, 30)
 

@@ -14,6 +14,8 @@ from fracslice.rendering.accumulator import tile_order
 from tests.benchmarks.gpu import frame as gpu
 from tests.benchmarks.gpu.cpp import translated
 
+pytestmark = pytest.mark.once
+
 COMPILER = shutil.which("g++") or shutil.which("clang++")
 
 

@@ -19,6 +19,8 @@ from fracslice.scene import library, read
 from fracslice.scene.view import Camera, Film, Light, View
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 ROOT = union(menger(level=2), material(sphere(radius=1.2), reflect=0.4))
 VIEW = View(
     camera=Camera(eye=(2.5, -3, 1.6), aperture=0.05),

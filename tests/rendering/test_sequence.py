@@ -11,6 +11,8 @@ from fracslice.rendering.accumulator import DIMENSIONS
 from fracslice.rendering.accumulator import points as sequence
 from fracslice.rendering.units.camera import centred, sample
 
+pytestmark = pytest.mark.once
+
 
 def points(pixel: int, count: int, dimensions: int = 2, first: object = sample) -> np.ndarray:
     draw = [first, first, *[sample] * dimensions][:dimensions]

@@ -17,6 +17,8 @@ from fracslice.slicing import SliceJob, Slicer, plan_layers
 from fracslice.volume.amount import sizing
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 
 def layer_at(kind: str, z: float, pixel: float, *sizes: float) -> np.ndarray:
     """Share of each pixel of a layer that is solid."""

@@ -25,6 +25,8 @@ from fracslice.slicing.raster import Screen
 from fracslice.work import Work
 from tests.export import decoders
 
+pytestmark = pytest.mark.once
+
 L_SHAPE = union(box(size=(8, 2, 2)), transform(box(size=(2, 6, 4)), translate=(-3, 2, 0)))
 """No turn of it is like another."""
 

@@ -13,6 +13,8 @@ from fracslice.formulas import box, transform, union
 from fracslice.slicing import SliceJob, Slicer, plan_stack
 from fracslice.slicing.raster import animation, contact_sheet, thumbnail, worst_layers
 
+pytestmark = pytest.mark.once
+
 PLATE = union(box(size=(4, 2, 0.5)), transform(box(size=(1, 1, 1)), translate=(1.5, 0.5, 0.5)))
 """Its tower is at the right, at the back."""
 

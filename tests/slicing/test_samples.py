@@ -6,6 +6,10 @@ import os
 import subprocess
 import sys
 
+import pytest
+
+pytestmark = pytest.mark.once
+
 SCRIPT = """
 import zlib
 from fracslice._slices import Encoding

@@ -10,6 +10,8 @@ from fracslice.formulas import Box, Node, box, difference, julia, menger, sphere
 from fracslice.volume import extent
 from fracslice.volume.amount import VolumeEstimate, amount, finer
 
+pytestmark = pytest.mark.once
+
 BALL = 4 / 3 * math.pi
 PLATE = transform(box(size=(2, 2, 0.02)), translate=(0, 0, 0.0123), rotate=(1, 0.3, 0, 10))
 

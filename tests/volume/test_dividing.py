@@ -26,6 +26,8 @@ from fracslice.volume.dividing import (
 )
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 BLOCK = difference(box(size=(120, 60, 40)), cylinder(radius=15, height=100))
 
 

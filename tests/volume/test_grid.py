@@ -15,6 +15,8 @@ from fracslice.mesh.contouring import extract
 from fracslice.volume.bricks import INSIDE, NAME, Bricks, from_grid, read_vdb, to_grid, write_vdb
 from tests.fields import blobs, bricks_of, grid_points
 
+pytestmark = pytest.mark.once
+
 
 def ball(side: int = 48, scale: float = 1.0) -> Bricks:
     x, y, z, origin, voxel = grid_points(side, 1.3)

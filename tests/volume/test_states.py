@@ -8,6 +8,8 @@ import pytest
 from fracslice.volume.pruning import BORDER, States, distinct
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 SHAPE = (3, 4, 5)
 
 
