@@ -62,6 +62,9 @@ OF_SCENES = {*OF_MESHES, *SHARED, "settings"}
 AXES = (0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0)
 """Directions up that --fix tries."""
 
+HOLES = "drain_at"
+"""Print setting that --fix tries last."""
+
 THINNEST = SliceJob().layer[0]
 """Least height of a layer, if --layer is not given, mm."""
 
@@ -366,8 +369,9 @@ def views(mesh: Mesh, given: CheckOptions) -> list[bytes]:
 def mended_object(first: Attempt, given: CheckOptions, work: Work) -> tuple[Attempt, list[str]]:
     """The best of the object and its mended variants, and a line on each that was left out.
 
-    All settings that the problems name are tried at once, then one by one; then other directions up. They
-    are compared in coarse layers while there is time; the best is examined in those that were asked for.
+    All settings that the problems name are tried at once, then one by one; then other directions up; then
+    holes for the resin, which an object should not have if it can do without. They are compared in coarse
+    layers while there is time; the best is examined in those that were asked for.
     """
     from fracslice.checks.problems import mend_settings
     from fracslice.errors import Cancelled
@@ -393,6 +397,8 @@ def mended_object(first: Attempt, given: CheckOptions, work: Work) -> tuple[Atte
             return None
 
     settings = mend_settings(first.problems)
+    holes = {name: text for name, text in settings.items() if name == HOLES}
+    settings.pop(HOLES, None)
     base = best = tried(first.variant) if coarse else first
     if not best:
         return first, lines
@@ -411,6 +417,12 @@ def mended_object(first: Attempt, given: CheckOptions, work: Work) -> tuple[Atte
         helpful = [turned for turned in turns if turned and turned.mends(best)]
         lines += ["with other directions up: no better, left out"] * (any(turns) and not helpful)
         best = min([best, *helpful], key=lambda attempt: attempt.severity)
+    if holes and HOLES in mend_settings(best.problems):
+        now = tried(best.variant.changed(holes))
+        lines += [f"with {' '.join(options_of(holes))}: no better, left out"] * bool(
+            now and not now.mends(best)
+        )
+        best = now if now and now.mends(best) else best
     if best is base:
         return first, lines
     found = examine_layers(best.variant, given, work) if coarse else best

@@ -101,8 +101,8 @@ class Drainage:
         pairs = np.unique(below.astype(np.int64) * (count + 1) + above)
         edges = np.stack(np.divmod(pairs, count + 1), 1) - 1
         layer = np.zeros(count, np.int64)
-        for k, row in enumerate(nodes):
-            layer[np.unique(row[row > 0]) - 1] = k
+        level, *_ = np.nonzero(nodes)
+        layer[nodes[nodes > 0] - 1] = level
         free = np.zeros(count, bool)
         rim = np.concatenate(
             [nodes[:, 0].ravel(), nodes[:, -1].ravel(), nodes[:, :, 0].ravel(), nodes[:, :, -1].ravel()]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,9 @@ from scipy.ndimage import label
 from fracslice.errors import SceneError, VolumeError
 from fracslice.formulas import Node, box, cylinder, difference, gyroid, infill, sphere, transform
 from fracslice.records import Print
+from fracslice.scene import read
 from fracslice.slicing import SliceJob, Slicer, Stack, plan_layers
+from fracslice.volume.amount import sizing
 from fracslice.work import Work
 
 pytestmark = pytest.mark.once
@@ -84,6 +87,14 @@ def test_holes_are_drilled_until_everything_drains(node: Node, volume: float) ->
 def test_a_hollow_with_a_lattice_drains() -> None:
     filled = infill(sphere(radius=10), gyroid(period=8, volume_fraction=0.15), shell=1)
     assert held(filled, drain=2, drain_at="auto") < 0.02 * held(filled)
+
+
+def test_the_example_with_struts_in_it_drains() -> None:
+    scene = read(Path(__file__).parents[2] / "examples" / "light-ball.xml")
+    job = SliceJob(layer=0.5, pixel=0.5, printing=scene.printing)
+    stack = plan_layers(scene.root, job, Work(1), sizing(scene))
+    assert len(stack.drains) == 2
+    assert not stack.notes
 
 
 def test_what_cannot_drain_is_noted() -> None:
