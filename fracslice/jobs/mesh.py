@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..common.memory import peak_rss_mb
+from ..common.messages import lacking
 from ..errors import SceneError, SharedError, TooLargeError, keeping
 from ..fields.box import Box
 from ..formulas import Node
@@ -146,6 +147,8 @@ class _Job:
     def refuse(self) -> None:
         """Raise the errors of invalid arguments before any work is done."""
         self.what.voxels(self.size.longest)
+        if self.what.bodies and (reason := lacking("manifold3d", "bodies of filaments need")):
+            raise SceneError(reason)
         if self.path is not None:
             from ..common.files import check_target
             from ..formats import ENDINGS, check_format, mesh_format

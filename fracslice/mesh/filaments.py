@@ -19,8 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import NO_TRIANGLES, Filaments, Triangles, from_linear, inverse, product, to_linear
-from ..common.messages import lacking
-from ..errors import MeshError
 from ..records import MOST_FILAMENTS
 from ..work import Work
 from .model import Mesh, to_manifold
@@ -301,8 +299,6 @@ def cut_bodies(mesh: Mesh, count: int, numbers_at: NumbersAt, work: Work) -> tup
 
     A body is cut off from what the others left, so that they meet exactly and their volumes add up.
     """
-    if reason := lacking("manifold3d", "bodies of filaments need"):
-        raise MeshError(reason)
     cells = _cells(mesh, numbers_at, work)
     rest, bodies = to_manifold(mesh), list["Manifold"]()
     for number in range(1, count):
