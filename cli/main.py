@@ -47,6 +47,7 @@ NAMES = (
     "fly",
     "formulas",
     "mesh",
+    "orient",
     "print",
     "render",
     "repair",

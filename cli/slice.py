@@ -112,7 +112,7 @@ class SliceOptions(ClusterOptions, LayerOptions):
 def slice_(given: SliceOptions) -> int:
     """Cut SCENE into the layers of a print, straight from its field.
 
-    No supports are added: fracslice check says whether the object needs them. An interrupted job
+    fracslice check says whether the object needs --supports. An interrupted job
     resumes when it is started again. Exit status: 1 if layers and pixels are too coarse for the object;
     the file is written.
 
@@ -138,6 +138,7 @@ def slice_(given: SliceOptions) -> int:
     scene = load_scene(given.source, given.settings)
     last: list[str] = []
     with given.working(KEPT) as work:
+        given = given.oriented(scene, work)
         run = recipe(given, scene, kind, resin).run(work, scene)
         write_slices(run, output, given.form)
         with keeping(f"{output} is written"):
@@ -177,7 +178,16 @@ def describe_layers(run: SliceRun, output: str, complete: Completeness) -> list[
     other = printers_file(screen.printer, output) if screen.printer else ""
     lost = [f"would not print: {', '.join(complete.problems)}"] if complete.problems else []
     start = [calibration(run.resin)] if run.resin and slice_format(output) in PRINTS else []
-    return [first, *lost, *stack.notes, *complete.notes, *filter(None, start), *([other] if other else [])]
+    held = [str(stack.supports)] if stack.supports else []
+    return [
+        first,
+        *lost,
+        *held,
+        *stack.notes,
+        *complete.notes,
+        *filter(None, start),
+        *([other] if other else []),
+    ]
 
 
 def calibration(resin: Resin) -> str:

@@ -163,6 +163,12 @@ class Print(Part):
     raft: Given[AnyLength, float] = attribute(
         Length, 0.0, "the object stands on a plate of this height", zero=True
     )
+    supports: Literal["none", "light", "medium", "heavy"] = attribute(
+        Choice,
+        "none",
+        "the object is lifted, and pillars with tips that break off carry its islands and overhangs",
+        ("none", "light", "medium", "heavy"),
+    )
 
     def validate(self) -> None:
         """Raise `SceneError` for `keep` combined with `bridge`."""
@@ -184,7 +190,8 @@ class Print(Part):
     @property
     def whole(self) -> bool:
         """True if connected components and cavities are only kept or removed as a whole."""
-        return not any((self.bridge, self.gap, self.thickness, self.hollow, self.base, self.raft))
+        added = self.bridge, self.gap, self.thickness, self.hollow, self.base, self.raft
+        return self.supports == "none" and not any(added)
 
 
 @record

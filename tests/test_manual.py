@@ -135,6 +135,7 @@ def test_commands_are_understood(line: str, folder: Path, monkeypatch, capfd) ->
         "jobs.mesh.make_mesh",
         "mesh.checks.repair",
         "jobs.mesh.make_implicit",
+        "slicing.orientation.orientations",
         "slicing.plan_stack",
         "jobs.slices.plan_layers",
         "jobs.pictures.make_picture",

@@ -55,6 +55,7 @@ class PrintKeywords(TypedDict, total=False):
     drain: AnyLength | None
     base: AnyLength | None
     raft: AnyLength | None
+    supports: Literal["none", "light", "medium", "heavy"] | None
 
 
 class PlacedKeywords(PrintKeywords, WorkKeywords, total=False):

@@ -189,7 +189,9 @@ class SliceRun:
 
     def key(self, form: str) -> str:
         """Key of everything that determines the bytes of encoded layers."""
-        stack = [getattr(self.stack, f.name) for f in fields(self.stack) if f.name != "root"]
+        stack = [
+            getattr(self.stack, f.name) for f in fields(self.stack) if f.name not in ("root", "supports")
+        ]
         screen = [getattr(self.screen, f.name) for f in fields(self.screen) if f.name != "stack"]
         field = self.stack.root.key
         return key(
