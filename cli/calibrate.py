@@ -40,6 +40,8 @@ def known_object(_: click.Context, __: click.Parameter, name: str) -> str:
 class CalibrateOptions(LayerFileOptions):
     """Options of `calibrate`."""
 
+    without = LayerFileOptions.without | {"orient"}
+
     kind: str = argument("OBJECT", callback=known_object)
     output: str = option(
         Name("OUT"),

@@ -166,6 +166,8 @@ def check(given: CheckOptions) -> int:
         refuse_options(SHARED, "only with --layer")
         checked = of_mesh
     with given.working() as work:
+        if given.orient:
+            given = given.oriented(load_scene(given.source, given.settings), work)
         numbers, lines, problems = checked(given, work)
     import json
 
@@ -494,7 +496,12 @@ def draw(stack: Stack, report: PrintReport, path: str, work: Work) -> None:
 
 def describe_report(report: PrintReport) -> str:
     """Summary of a print report: figures, its problems, thin features that layers may miss, narrow holes."""
-    lines = f"{figures_of(report)}, {verdict(report.problems)}", report.solid.unseen, report.solid.holes
+    lines = (
+        f"{figures_of(report)}, {verdict(report.problems)}",
+        report.supports,
+        report.solid.unseen,
+        report.solid.holes,
+    )
     return os.linesep.join(filter(None, lines))
 
 

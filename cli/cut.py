@@ -29,6 +29,8 @@ def parse_plane(text: str) -> tuple[int, float]:
 class CutOptions(MeshFileOptions):
     """Options of `cut`."""
 
+    without = frozenset({"orient"})
+
     plane: tuple[int, float] = option(
         Parsed(parse_plane, "AXIS=LENGTH"), "The plane, such as z=10mm.", required=True
     )

@@ -48,6 +48,7 @@ NAMES = (
     "fly",
     "formulas",
     "mesh",
+    "orient",
     "plate",
     "print",
     "render",

@@ -189,6 +189,7 @@ def make_files(given: MeshFileOptions, parts: Callable[[Scene, Work], Parts] = w
     scenes = moments(scene, given.seconds, given.every)
     problems = False
     with given.working(store=store_in(given.cache), device=choose_device(given.device)) as work:
+        given = given.oriented(scene, work)
         for suffix, scene in [(s + end, part) for s, whole in scenes for end, part in parts(whole, work)]:
             files = {name: vars(given)[name] for name in ("output", "report", "picture")}
             own = given.but(**{name: file and with_suffix(file, suffix) for name, file in files.items()})

@@ -37,11 +37,12 @@ from fracslice.common.parameters import (
 from fracslice.errors import ClusterError, SceneError, VolumeError
 from fracslice.records import MeshJob, Part, Print, RasterOptions, SliceJob
 
-from .execution import NOTHING, BadInput, working
+from .execution import NOTHING, BadInput, refuse_options, working
 
 if TYPE_CHECKING:
     from fracslice.checks.layer_checks import PrintReport
     from fracslice.cluster import Pool
+    from fracslice.fields.box import Triple
     from fracslice.scene import Scene
     from fracslice.slicing import Stack
     from fracslice.slicing.printers import Printer
@@ -286,7 +287,7 @@ class CommandOptions:
         declared: dict[str, Any] = {}
         for owner in cls.__mro__:
             for name, value in vars(owner).items():
-                if isinstance(value, partial):
+                if isinstance(value, partial) and name not in cls.without:
                     declared.setdefault(name, value)
             for record in vars(owner).get("records", ()):
                 for name, kind in record.kinds().items():
@@ -357,10 +358,35 @@ class SceneOptions(RunOptions):
     allow_files_outside: bool = flag("Read models that lie outside of the scene's folder, too.")
 
 
+def up_text(up: Triple) -> str:
+    """A direction up as the values of its option."""
+    return " ".join(f"{c:g}" for c in up)
+
+
 class PreparationOptions(SceneOptions):
     """Print preparation; each option overrides the scene's."""
 
     records: ClassVar[Records] = (Print,)
+    size: float | None
+    scale: Triple
+    orient: str | None = option(
+        click.Choice(["auto"]),
+        "auto: the best direction up that fracslice orient finds, instead of --up.",
+    )
+
+    def oriented(self: R, scene: Scene, work: Work) -> R:
+        """These options with the direction up of --orient."""
+        if vars(self).get("orient") is None:
+            return self
+        from fracslice.slicing.orientation import orientations
+        from fracslice.volume.amount import sizing
+
+        given = vars(self)
+        refuse_options({"up"}, "--orient finds it; expected one of them")
+        best = orientations(scene.root, sizing(scene, given["size"], given["scale"], work), work)[0]
+        if not given["quiet"]:
+            click.echo(f"--up {up_text(best.up)}", err=True)
+        return self.but(up=best.up, orient=None)
 
     def printing(self, given: Print) -> Print:
         """Print settings, overridden by those of the options."""
@@ -438,13 +464,27 @@ def write_page(
 
     from fracslice.checks.problems import verdict
     from fracslice.common.files import replacing
-    from fracslice.slicing.raster import page, worst_layers
+    from fracslice.slicing.raster import elevations, page, worst_layers
 
-    with io.BytesIO() as picture, replacing(path) as file:
+    with io.BytesIO() as picture, io.BytesIO() as sides, replacing(path) as file:
         worst_layers(stack, report.worst, picture, work)
+        if stack.supports:
+            elevations(stack, sides, work)
+            lines = [*lines, report.supports]
         problems = [str(problem) for problem in report.problems]
         areas, worst = np.array(report.areas), picture.getvalue()
-        file.write(page(title, lines, verdict(report.problems), problems, stack.tops, areas, worst, views))
+        made = page(
+            title,
+            lines,
+            verdict(report.problems),
+            problems,
+            stack.tops,
+            areas,
+            worst,
+            views,
+            sides.getvalue(),
+        )
+        file.write(made)
 
 
 class ClusterOptions(RunOptions):

@@ -97,9 +97,13 @@ def plate(given: PlateOptions) -> int:
         from fracslice.jobs.plates import PlateRecipe
 
         scenes = {source: load_scene(source, given.settings) for source in dict.fromkeys(given.sources)}
-        made = {source: recipe(given, scene, kind, resin) for source, scene in scenes.items()}
         bed = (given.bed[0], given.bed[1]) if given.bed else None
-        return PlateRecipe(tuple(made[source] for source in given.parts), given.spacing, bed).run
+
+        def run(work: Work) -> SliceRun:
+            made = {s: recipe(given.oriented(scene, work), scene, kind, resin) for s, scene in scenes.items()}
+            return PlateRecipe(tuple(made[source] for source in given.parts), given.spacing, bed).run(work)
+
+        return run
 
     return write_layers(given, given.sources, planned)
 
@@ -118,7 +122,7 @@ def write_meshes(given: PlateOptions) -> int:
     with given.working() as work:
         results: dict[str, Result] = {}
         for source, scene in scenes.items():
-            results[source] = make_mesh(scene, given.mesh_job(scene), work)
+            results[source] = make_mesh(scene, given.oriented(scene, work).mesh_job(scene), work)
         write_meshes(
             list(results.values()),
             [list(results).index(source) for source in given.parts],

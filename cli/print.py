@@ -98,7 +98,8 @@ def print_(given: SlicerOptions) -> int:
         with temporary_folder() as folder:
             chosen.shipped().write(given.machine, folder)
     scene = load_scene(given.source, given.settings)
-    job = given.mesh_job(scene)
+    with given.working() as work:
+        job = given.oriented(scene, work).mesh_job(scene)
     if job.simplify is None and job.faces is None:
         job = replace(job, simplify=TOLERANCE)
     with temporary_folder() as folder, given.working() as work:

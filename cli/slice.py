@@ -6,7 +6,6 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
-from functools import partial
 from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -127,7 +126,7 @@ class SliceOptions(LayerFileOptions):
 def slice_(given: SliceOptions) -> int:
     """Cut SCENE into the layers of a print, straight from its field.
 
-    No supports are added: fracslice check says whether the object needs them. An interrupted job
+    fracslice check says whether the object needs --supports. An interrupted job
     resumes when it is started again. Exit status: 1 if layers and pixels are too coarse for the object;
     the file is written.
 
@@ -141,12 +140,16 @@ def slice_(given: SliceOptions) -> int:
 
     def planned(kind: str, resin: Resin | None) -> Callable[[Work], SliceRun]:
         scene = load_scene(given.source, given.settings)
-        made = recipe(given, scene, kind, resin)
-        if given.copies == 1:
-            return partial(made.run, scene=scene)
-        from fracslice.jobs.plates import PlateRecipe
 
-        return PlateRecipe((made,) * given.copies, given.spacing).run
+        def run(work: Work) -> SliceRun:
+            made = recipe(given.oriented(scene, work), scene, kind, resin)
+            if given.copies == 1:
+                return made.run(work, scene)
+            from fracslice.jobs.plates import PlateRecipe
+
+            return PlateRecipe((made,) * given.copies, given.spacing).run(work)
+
+        return run
 
     if given.copies == 1:
         refuse_options({"spacing"}, "only for several parts: --copies, or fracslice plate")
@@ -219,7 +222,16 @@ def describe_layers(run: SliceRun, output: str, complete: Completeness) -> list[
     other = printers_file(screen.printer, output) if screen.printer else ""
     lost = [f"would not print: {', '.join(complete.problems)}"] if complete.problems else []
     start = [calibration(run.resin)] if run.resin and slice_format(output) in PRINTS else []
-    return [first, *lost, *stack.notes, *complete.notes, *filter(None, start), *([other] if other else [])]
+    held = [str(stack.supports)] if stack.supports else []
+    return [
+        first,
+        *lost,
+        *held,
+        *stack.notes,
+        *complete.notes,
+        *filter(None, start),
+        *([other] if other else []),
+    ]
 
 
 def calibration(resin: Resin) -> str:

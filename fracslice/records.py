@@ -180,6 +180,12 @@ class Print(Part):
     raft: Given[AnyLength, float] = attribute(
         Length, 0.0, "the object stands on a plate of this height", zero=True
     )
+    supports: Literal["none", "light", "medium", "heavy"] = attribute(
+        Choice,
+        "none",
+        "the object is lifted, and pillars with tips that break off carry its islands and overhangs",
+        ("none", "light", "medium", "heavy"),
+    )
 
     def validate(self) -> None:
         """Raise `SceneError` for `keep` combined with `bridge`."""
@@ -202,7 +208,7 @@ class Print(Part):
     def whole(self) -> bool:
         """True if connected components and cavities are only kept or removed as a whole."""
         made = self.bridge, self.gap, self.thickness, self.hollow, self.base, self.raft, self.drain_at
-        return not any(made)
+        return self.supports == "none" and not any(made)
 
 
 @record

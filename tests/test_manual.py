@@ -136,6 +136,7 @@ def test_commands_are_understood(line: str, folder: Path, monkeypatch, capfd) ->
         "jobs.divided.make_parts",
         "mesh.checks.repair",
         "jobs.mesh.make_implicit",
+        "slicing.orientation.orientations",
         "slicing.plan_stack",
         "jobs.slices.plan_layers",
         "jobs.pictures.make_picture",

@@ -56,6 +56,7 @@ class PrintKeywords(TypedDict, total=False):
     drain_at: str | Sequence[Sequence[float]] | None
     base: AnyLength | None
     raft: AnyLength | None
+    supports: Literal["none", "light", "medium", "heavy"] | None
 
 
 class PlacedKeywords(PrintKeywords, WorkKeywords, total=False):

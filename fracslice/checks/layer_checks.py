@@ -65,6 +65,7 @@ class PrintReport:
     worst: list[int]  # layers with the most overhang or the largest islands
     solid: SolidReport  # report on the solid, measured in space instead of in layers
     problems: list[Problem] = field(default_factory=list)  # the problems
+    supports: str = ""  # a line on the supports, if there are any
 
     def as_dict(self) -> dict[str, Any]:
         """The report as plain JSON types."""
@@ -199,6 +200,7 @@ class _Collector:
             neck=weakest(solid, stack.pixel, stack.shape, limits.heavy, speck),
             worst=_worst(overhang, real, far),
             solid=self.solid,
+            supports=str(stack.supports or ""),
         )
         evidence = LayersEvidence(stack, report, self.printer, self.limits, self.work, measured)
         problems = [*problems_of("layers", evidence), *self.solid.problems]

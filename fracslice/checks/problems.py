@@ -12,7 +12,7 @@ from ..common.parameters import Length, Number, attribute, validate
 from ..errors import SceneError
 from . import checks
 
-SUPPORTS = "supports in the slicer"
+SUPPORTS = "--supports medium"
 
 Place = tuple[float, float, float]
 """Point, mm from the middle of the object along x and y, and above its lowest point."""
@@ -52,7 +52,7 @@ def verdict(problems: Sequence[Problem]) -> str:
     """Say whether an object with some problems would print: as it is, with supports, or not."""
     if not problems:
         return "would print"
-    held = all(SUPPORTS in problem.advice for problem in problems)
+    held = all(SUPPORTS in str(problem) for problem in problems)
     return "would print with supports" if held else "would not print"
 
 

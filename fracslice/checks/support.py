@@ -19,6 +19,9 @@ from .problems import SUPPORTS, Problem, flat_base
 BRIDGE = (("bridge", "1mm"),)
 """Print setting that joins bodies."""
 
+SUPPORTED = (("supports", "medium"),)
+"""Print setting that adds supports."""
+
 
 def _bodies(of: LayersEvidence) -> Iterator[Problem]:
     bodies = of.report.bodies
@@ -35,14 +38,14 @@ def _islands(of: LayersEvidence) -> Iterator[Problem]:
         first = min(i.layers[0] for i in islands)
         text = f"{format_count(len(islands), 'island')} in the air, the first from layer {first} on"
         text += f", the largest of {significant(largest.area)} mm2"
-        yield Problem("islands", text, advice=SUPPORTS, count=len(islands), **of.where(largest))
+        yield Problem("islands", text, mend=SUPPORTED, count=len(islands), **of.where(largest))
 
 
 def _overhangs(of: LayersEvidence) -> Iterator[Problem]:
     if far := of.report.overhang:
         text = f"a flat overhang reaches {far.reach:.3g} mm, {significant(far.area)} mm2 of it too far"
         at = (*far.at, of.bottom(far.layer))
-        yield Problem("overhangs", text, far.layer, at, advice=f"--up, or {SUPPORTS}")
+        yield Problem("overhangs", text, far.layer, at, SUPPORTED, advice="--up")
 
 
 def _necks(of: LayersEvidence) -> Iterator[Problem]:

@@ -252,8 +252,9 @@ def burning_ship(power: float = 8.0, iterations: Union[int, Literal['auto']] = '
     Node
     """
 
-def capsule(from_: Sequence[float] = (0.0, 0.0, -0.5), to: Sequence[float] = (0.0, 0.0, 0.5), radius: float = 0.25) -> Node:
-    """A capsule: all points within the radius of a segment. L = 1: an exact distance.
+def capsule(from_: Sequence[float] = (0.0, 0.0, -0.5), to: Sequence[float] = (0.0, 0.0, 0.5), radius: float = 0.25, end: float | None = None) -> Node:
+    """A capsule: all points within the radius of a segment; with `end`, a round cone between two balls
+    (Quilez 2008, "Distance functions"). L = 1: an exact distance.
 
     Parameters
     ----------
@@ -263,6 +264,8 @@ def capsule(from_: Sequence[float] = (0.0, 0.0, -0.5), to: Sequence[float] = (0.
         centre of the other end
     radius : a number > 0, default 0.25
         the radius
+    end : a number > 0
+        the radius at the other end; without it, the same
 
     Returns
     -------

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..common.parameters import Count, Number, Vector
 from ..expr.vocabulary import absolute, atan2, cos, exp, floor, log, maximum, minimum, sin, sqrt, where
-from ..fields.box import Box
+from ..fields.box import Box, Triple
 from ..fields.registry import Node, shape
 
 
@@ -99,12 +99,15 @@ _CAPSULE: dict[str, Any] = {
     "from": Vector((0.0, 0.0, -0.5), "centre of one end"),
     "to": Vector((0.0, 0.0, 0.5), "centre of the other end"),
     "radius": Number(0.25, "the radius", above=0),
+    "end": Number(None, "the radius at the other end; without it, the same", above=0),
 }
 
 
 @shape(**_CAPSULE)
 def capsule(x, y, z, start, along, scale, radius):  # type: ignore[no-untyped-def]
-    """A capsule: all points within the radius of a segment. L = 1: an exact distance."""
+    """A capsule: all points within the radius of a segment; with `end`, a round cone between two balls
+    (Quilez 2008, "Distance functions"). L = 1: an exact distance.
+    """
     sx, sy, sz = start
     ax, ay, az = along
     px = x - sx
@@ -117,10 +120,36 @@ def capsule(x, y, z, start, along, scale, radius):  # type: ignore[no-untyped-de
     return sqrt(qx * qx + qy * qy + qz * qz) - radius
 
 
+def round_cone(x, y, z, start, axis, length, radius, slope, apart):  # type: ignore[no-untyped-def]
+    # The distance from a ball of the cone is a convex function of the ball's place on the axis.
+    sx, sy, sz = start
+    ax, ay, az = axis
+    px = x - sx
+    py = y - sy
+    pz = z - sz
+    t = px * ax + py * ay + pz * az
+    qx = px - t * ax
+    qy = py - t * ay
+    qz = pz - t * az
+    across = qx * qx + qy * qy + qz * qz
+    place = minimum(maximum(t - apart * sqrt(across), 0.0), length)
+    beside = t - place
+    return sqrt(across + beside * beside) - (radius - slope * place)
+
+
+@capsule.select
+def capsule_select(node: Node) -> Any:
+    return capsule.function if node["end"] in (None, node["radius"]) else round_cone
+
+
 @capsule.arguments
 def capsule_arguments(node: Node) -> dict[str, object]:
     along = tuple(b - a for a, b in zip(node["from"], node["to"], strict=True))
     length2 = sum(a * a for a in along)
+    if node.function is round_cone:
+        return _cone_arguments(
+            node["from"], node["to"], along, math.sqrt(length2), node["radius"], node["end"]
+        )
     return {
         "start": node["from"],
         "along": along,
@@ -129,9 +158,23 @@ def capsule_arguments(node: Node) -> dict[str, object]:
     }
 
 
+def _cone_arguments(
+    start: Triple, end: Triple, along: tuple[float, ...], length: float, first: float, last: float
+) -> dict[str, object]:
+    if abs(first - last) >= length:  # the larger ball holds the other one
+        centre = start if first > last else end
+        given: tuple[Any, ...] = centre, (0.0, 0.0, 0.0), 0.0, max(first, last), 0.0, 0.0
+    else:
+        slope = (first - last) / length
+        apart = slope / math.sqrt(1 - slope * slope)
+        given = start, tuple(a / length for a in along), length, first, slope, apart
+    return dict(zip(("start", "axis", "length", "radius", "slope", "apart"), given, strict=True))
+
+
 @capsule.bounds
 def capsule_bounds(node: Node) -> Box:
-    return Box.around([node["from"], node["to"]]).grown(node["radius"])
+    start, end = (Box.around([node[name]]) for name in ("from", "to"))
+    return start.grown(node["radius"]) | end.grown(node["radius"] if node["end"] is None else node["end"])
 
 
 @shape(

@@ -319,6 +319,7 @@ class _Job:
             notes=(
                 *planned.notes,
                 *([OWN] if surface.own else ()),
+                *([str(planned.supports)] if planned.supports else ()),
                 *thickness_note(made.checks.thin, how, planned.voxel * scale),
                 *shorter,
                 *([fell] if thin and not near else ()),
@@ -382,6 +383,7 @@ def _refuse(how: Print) -> None:
     names = ["bridge", "gap", "thickness", "hollow"]
     changes = [name for name in names if getattr(how, name)]
     changes += [name for name in ("keep", "cavities") if getattr(how, name) not in ("all", "keep")]
+    changes += ["supports"] if how.supports != "none" else []
     if changes:
         raise SceneError(f"{changes[0]}: needs samples of the field; expected a mesh, or formulas alone")
 

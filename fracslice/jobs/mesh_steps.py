@@ -103,6 +103,10 @@ def apply_edits(made: Plan, scene: Scene, what: MeshJob, size: Sizing, clock: Cl
     how = what.edits(scene)
     with clock("changing"):
         changed, scale = printable(made, size, how, clock.work, measured=False)
+        if how.supports != "none":
+            from ..slicing.supports import supported_plan
+
+            changed = supported_plan(changed, scale, how, size, clock.work)
     # Walls thinner than a voxel are crumbs in the mesh: choose bodies in the field where it can tell.
     keep = how.keep if made.root.bounds.exterior_only else "all"
     # Keep cavities: the hollow is one.
@@ -114,6 +118,9 @@ BYTES_A_CROSSING = 140
 """Peak memory by grid edges that the surface crosses, bytes: 125 to 150 measured, on meshes of 66 and 375
 million triangles.
 """
+
+SEAM = 2.0
+"""Distance from supports from which on sharp edges are looked for, voxels."""
 
 COUNTED = 1 << 12
 """Bricks whose crossings are counted."""
@@ -210,7 +217,10 @@ def surface_of(
         pointed = Pointed(planned.voxel, work.threads)
         pointed.join(found.pointed, np.inf)
         changed, tips = with_tips(planned, pieces, pointed.points, work)
-        changed, tips = with_ridges(planned, changed, found.blunt, tips, work)
+        blunt = found.blunt
+        if planned.supports:  # pillars keep their blunt seams, of which there are thousands
+            blunt = blunt[planned.supports.distances(blunt) > SEAM * planned.voxel]
+        changed, tips = with_ridges(planned, changed, blunt, tips, work)
         if changed is pieces:
             shells = found.components.shells()
         else:

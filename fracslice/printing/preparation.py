@@ -137,7 +137,7 @@ def large_bodies(components: SolidComponents) -> np.ndarray:
 
 
 def standing(made: Plan, how: Print, scale: float, work: Work) -> Plan:
-    """Cut off the base and add the raft.
+    """Cut off the base and add the raft, unless it is under supports.
 
     The raft extends a tenth of the longest side beyond the object, and half its height into it.
 
@@ -145,7 +145,7 @@ def standing(made: Plan, how: Print, scale: float, work: Work) -> Plan:
     """
     root, extents, outer = made.root, made.box, made.outer
     (x0, y0, z0), (x1, y1, z1) = extents.lo, extents.hi
-    base, raft = how.base / scale, how.raft / scale
+    base, raft = how.base / scale, how.raft / scale if how.supports == "none" else 0.0
     if 0 < raft < made.voxel:
         raise VolumeError(
             f"a raft of {how.raft:g} mm: expected at least a voxel, {made.voxel * scale:.4g} mm"

@@ -2,7 +2,8 @@
 
 from ..records import SliceJob
 from .contours import Contours
-from .layers import SLAB, Layer, Slicer, adapted, plan_layers
-from .stack import Stack, plan_stack
+from .layers import SLAB, Layer, Slicer
+from .planning import adapted, plan_layers, plan_stack
+from .stack import Stack
 
 __all__ = ["SLAB", "Contours", "Layer", "SliceJob", "Slicer", "Stack", "adapted", "plan_layers", "plan_stack"]

@@ -46,6 +46,23 @@ class Runs:
         """No pixels, in the same window."""
         return Runs(np.zeros_like(self.rows), self.begin[:0], self.end[:0], self.width)
 
+    def __or__(self, other: Runs) -> Runs:
+        """Pixels of either of two layers."""
+        if not len(self.begin) or not len(other.begin):
+            return other if not len(self.begin) else self
+        step, rows = self.width + 1, np.arange(self.height)  # no run of a row touches one of the next row
+        starts = [step * np.repeat(rows, np.diff(runs.rows)) for runs in (self, other)]
+        first = np.concatenate([starts[0] + self.begin, starts[1] + other.begin])
+        last = np.concatenate([starts[0] + self.end, starts[1] + other.end])
+        order = np.argsort(first, kind="stable")
+        first, last = first[order], np.maximum.accumulate(last[order])
+        begins = np.flatnonzero(np.r_[True, first[1:] > last[:-1]])
+        row, begin = np.divmod(first[begins], step)
+        end = last[np.r_[begins[1:], len(first)] - 1] - step * row
+        limits = np.searchsorted(row, np.arange(self.height + 1))
+        kind = self.rows.dtype
+        return Runs(limits.astype(kind), begin.astype(kind), end.astype(kind), self.width)
+
     @property
     def gaps(self) -> Runs:
         """Runs of the empty pixels."""

@@ -1,4 +1,4 @@
-"""Layers in order, computed in parallel, slab by slab, and released once read; adaptive heights of layers.
+"""Layers in order, computed in parallel, slab by slab, and released once read.
 
 `fracslice._slices` does the work; this module provides the bounds that it needs of a field. Blocks are
 subdivided top down: of 64, 32 and 16 pixels over all layers of the slab, of 8 over a few of them, of 4 over
@@ -34,16 +34,14 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 import numpy as np
 
 from .._slices import BorderError, Encoding, Memory, ProbeBounds, Slab, plate_picture
-from ..common.arrays import dot, quantile
-from ..common.parameters import Length, validate_value
+from ..common.arrays import dot
 from ..errors import SliceError
 from ..fields.box import Box
 from ..fields.field import Bounds, Field, Kernel
-from ..records import SliceJob
-from ..volume.amount import Completeness, Sizing, compare_volumes
+from ..volume.amount import Completeness, compare_volumes
 from ..work import Work
 from .contours import Contours, contours, gathered
-from .stack import Stack, Standing, plan_stack
+from .stack import Stack, Standing
 
 if TYPE_CHECKING:
     from .feature_graph import Runs
@@ -234,6 +232,11 @@ class Layer:
         return self.slab.paint(self.place, np.zeros(self.stack.shape, np.uint8))
 
     @property
+    def is_tiled(self) -> bool:
+        """True if pictures can be made of its tiles."""
+        return self.mean is None
+
+    @property
     def known_area(self) -> float | None:
         """Area in mm^2, of the coverage or else of the contours; None if neither was made."""
         made = vars(self)
@@ -305,13 +308,19 @@ class PlateLayer(Layer):
 
     @property
     def _of_parts(self) -> tuple[float, int]:
-        painted = [layer._painted for _, layer in self.parts]
-        return sum(area for area, _ in painted), sum(cut for _, cut in painted)
+        pixel = self.stack.pixel[0] * self.stack.pixel[1]
+        areas, cuts = zip(*((layer.area, layer.boundary) for _, layer in self.parts), strict=True)
+        return sum(areas) / pixel, sum(cuts)
 
     @cached_property
     def _painted(self) -> tuple[float, int]:
         """As `Layer._painted`."""
         return self._of_parts
+
+    @property
+    def is_tiled(self) -> bool:
+        """As `Layer.is_tiled`."""
+        return self.mean is None and all(layer.is_tiled for _, layer in self.parts)
 
     @cached_property
     def contours(self) -> Contours:
@@ -341,6 +350,59 @@ def _place(part: Standing, view: ScreenView) -> tuple[int, int]:
     row = view.shape[0] - view.at[down] - part.at[down] - part.shape[down]
     column = view.at[across] + part.at[across]
     return row, view.shape[1] - column - part.shape[across] if view.backwards else column
+
+
+@dataclass(eq=False)
+class SupportedLayer(Layer):
+    """A layer of a fractal and of its supports, each sampled by itself: between supports, the fractal shows
+    the same specks as alone. Contours are those of both together.
+    """
+
+    own: Layer = field(kw_only=True)
+    supports: Layer = field(kw_only=True)
+
+    @cached_property
+    def coverage(self) -> np.ndarray:
+        """See `Layer.coverage`."""
+        both: np.ndarray = np.maximum(self.own.coverage, self.supports.coverage)
+        return both
+
+    @cached_property
+    def runs(self) -> Runs:
+        """See `Layer.runs`."""
+        return self.own.runs | self.supports.runs
+
+    @property
+    def is_tiled(self) -> bool:
+        """See `Layer.is_tiled`."""
+        return False
+
+    @property
+    def area(self) -> float:
+        """See `Layer.area`; what is in both is found by whole pixels."""
+        if self.mean is not None:
+            return self.mean[1]
+        pixels = [int((r.end - r.begin).sum()) for r in (self.own.runs, self.supports.runs, self.runs)]
+        shared = (pixels[0] + pixels[1] - pixels[2]) * self.stack.pixel[0] * self.stack.pixel[1]
+        return self.own.area + self.supports.area - shared
+
+    @property
+    def known_area(self) -> float | None:
+        """See `Layer.known_area`."""
+        return self.area
+
+    @property
+    def boundary(self) -> int:
+        """See `Layer.boundary`."""
+        return self.own.boundary + self.supports.boundary
+
+    @cached_property
+    def contours(self) -> Contours:
+        """See `Layer.contours`."""
+        sampler = _sampler(self.stack, self.stack.root)
+        slab = sampler.slab(self.stack.z[self.index : self.index + 1])
+        sampler.sample(slab, 0)
+        return contours(slab, 0, float(self.stack.z[self.index]), self.stack, self.exact)
 
 
 @dataclass(frozen=True, eq=False)
@@ -412,11 +474,9 @@ class Slicer:
 
     def _alone(self, pictures: Pictures | None) -> Callable[[list[int]], Iterator[Layer]]:
         """Function that samples layers of one slab of an object."""
-        root, shape = self.stack.root, self.stack.shape
-        exact = root.kernel("cpu", "float64")
-        lattice = shape[0] + 1, shape[1] + 1
-        sampler = Sampler(root.kernel(), root, root.bounds, self.stack.frame, lattice)
-        return partial(self._sampled, sampler, exact=exact, pictures=pictures)
+        exact = self.stack.root.kernel("cpu", "float64")
+        samplers = [_sampler(self.stack, field) for field in _fields(self.stack)]
+        return partial(self._sampled, samplers, exact=exact, pictures=pictures)
 
     def _plate(self) -> Callable[[list[int]], Iterator[Layer]]:
         """Function that samples layers of one slab of a plate: each part once, however often it stands."""
@@ -436,9 +496,17 @@ class Slicer:
         return sampled
 
     def _sampled(
-        self, sampler: Sampler, group: list[int], exact: Kernel, pictures: Pictures | None
+        self, samplers: list[Sampler], group: list[int], exact: Kernel, pictures: Pictures | None
     ) -> Iterator[Layer]:
         """Layers of one slab; each is to be read before the next."""
+        if len(samplers) > 1:
+            own, others = (self._sampled([sampler], group, exact, None) for sampler in samplers)
+            for layer, supports in zip(own, others, strict=True):
+                known = {name: getattr(layer, name) for name in ("index", "evaluations", "slab", "place")}
+                known["evaluations"] += supports.evaluations
+                yield SupportedLayer(self.stack, **known, exact=exact, own=layer, supports=supports)
+            return
+        (sampler,) = samplers
         first = group[0] // SLAB * SLAB
         slab = sampler.slab(self.stack.z[first : first + SLAB])
         while group:
@@ -452,6 +520,22 @@ class Slicer:
             for index, (spent, picture) in zip(group, sampled, strict=False):
                 yield Layer(self.stack, index, spent, slab, index - first, exact, picture=picture)
             group = group[len(sampled) :]
+
+
+def _fields(stack: Stack) -> list[Field]:
+    """Fields that are sampled: a fractal and its supports each by itself."""
+    supports = stack.supports
+    return (
+        [supports.carried, supports.node]
+        if supports and supports.carried.bounds.exterior_only
+        else [stack.root]
+    )
+
+
+def _sampler(stack: Stack, root: Field) -> Sampler:
+    """Sampler of a field on the pixels of a stack."""
+    shape = stack.shape[0] + 1, stack.shape[1] + 1
+    return Sampler(root.kernel(), root, root.bounds, stack.frame, shape)
 
 
 @dataclass(frozen=True, eq=False)
@@ -528,99 +612,3 @@ def layers_amount(slicer: Slicer, work: Work) -> Completeness:
     grid = (x0, y0, float(stack.z[0])), (dx, dy, least / stack.scale), sampling
     made = dot(areas, stack.heights[layers])
     return compare_volumes(stack.root, boxes, made, stack.scale, grid, len(chosen) == len(starts), work)
-
-
-ACROSS = 128
-"""Pixels along the longer side of the coarse layers on which slopes are measured."""
-
-SHARE = 0.9
-"""Quantile of the slope along an outline that limits the layer; the rest of a rough outline is ignored."""
-
-
-def plan_layers(root: Field, job: SliceJob, work: Work | None = None, size: Sizing | None = None) -> Stack:
-    """Plan the layers of a job, of one height or adaptive; see `plan_stack`."""
-    stack, most = plan_stack(root, job, work, size), job.layer[1]
-    return stack if most is None else adapted(stack, most, work)
-
-
-def adapted(stack: Stack, most: float, work: Work | None = None) -> Stack:
-    """Merge planned layers where the surface is steep.
-
-    A layer of height t leaves cusps of height t |n|, n the vertical component of the surface's unit normal
-    (Dolenc and Maekelae 1994, "Slicing procedures for layered manufacturing techniques"). Layers grow while
-    that is at most the height of one planned layer. The result does not depend on the number of threads.
-
-    Parameters
-    ----------
-    stack : Stack
-        Layers of one height.
-    most : float or str
-        Maximum height of a layer, mm, or text such as "0.2mm".
-    work : Work, optional
-        Threads, progress and cancellation.
-
-    Returns
-    -------
-    Stack
-        The stack with merged layers.
-
-    Raises
-    ------
-    SliceError
-        For an invalid `most`, or one below the planned height.
-    Cancelled
-        When the work is cancelled.
-    """
-    least, most = float(stack.heights[0]), validate_value("layer", most, Length(None, ""), SliceError)
-    if most < least:
-        raise SliceError(
-            f"layers of {least:g} to {most:g} mm: expected a range from the lowest to the highest"
-        )
-    slopes = list(Slicer(_coarse(stack), work or Work()).map(_slope))
-    ends = _ends(np.array(slopes), int(most / least * (1 + 1e-9)))
-    tops = stack.tops[ends]
-    bottoms = np.concatenate([[0.0], tops[:-1]])
-    z = stack.z[0] + ((tops + bottoms) / 2 - least / 2) / stack.scale
-    return replace(stack, tops=tops, z=z)
-
-
-def _ends(slopes: np.ndarray, most: int) -> list[int]:
-    """Last planned layer of each merged layer; at most `most` planned layers are merged into one."""
-    ends, count, steepest = [], 0, 0.0
-    for index, slope in enumerate(slopes.tolist()):
-        if count and (count == most or (count + 1) * max(steepest, slope) > 1):
-            ends.append(index - 1)
-            count, steepest = 0, 0.0
-        count, steepest = count + 1, max(steepest, slope)
-    return [*ends, len(slopes) - 1]
-
-
-def _coarse(stack: Stack) -> Stack:
-    """The same layers on a coarser lattice."""
-    ny, nx = stack.shape
-    times = max(max(ny, nx) // ACROSS, 1)
-    pixel = stack.pixel[0] * times, stack.pixel[1] * times
-    return replace(stack, pixel=pixel, shape=(-(-ny // times), -(-nx // times)))
-
-
-def _slope(layer: Layer) -> float:
-    """Vertical component of the normal along an outline, 0 to 1, by differences over the layer's height."""
-    edges, ends = layer.slab.crossings(layer.place)
-    if not len(edges):
-        return 0.0
-    stack = layer.stack
-    share = (ends[:, 0] / (ends[:, 0] - ends[:, 1]))[:, None]
-    x, y = (stack.frame[:2] + stack.frame[2:] * (edges[:, :2] + share * np.eye(2)[edges[:, 2]])).T
-    z = np.full(len(x), stack.z[layer.index])
-    half = layer.height / stack.scale / 2
-    at = layer.exact.points
-    gradient = np.array(
-        [
-            at(x + half, y, z) - at(x - half, y, z),
-            at(x, y + half, z) - at(x, y - half, z),
-            at(x, y, z + half) - at(x, y, z - half),
-        ]
-    )
-    length = np.linalg.norm(gradient, axis=0)
-    vertical = np.abs(gradient[2]) / np.where(length > 0, length, 1.0)
-    return quantile(vertical, SHARE)

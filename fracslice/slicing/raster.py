@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from base64 import b64encode
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from html import escape
 from typing import TYPE_CHECKING, BinaryIO
@@ -99,7 +99,7 @@ class Screen(RasterOptions):
 
         `shown`: uint8 [256], optional.
         """
-        if not self._is_direct or layer.mean is not None or self._foot_of(layer):
+        if not self._is_direct or not layer.is_tiled or self._foot_of(layer):
             image = self.picture(layer)
             return encoded(image if shown is None else shown[image], encoding)
         view = self._view
@@ -316,6 +316,35 @@ def worst_layers(stack: Stack, layers: Sequence[int], file: BinaryIO, work: Work
     _sheet(stack, layers, pictures, min(len(layers), ABREAST)).save(file, "PNG")
 
 
+ROWS = 480
+"""Layers of an elevation, at most."""
+
+SIDES = np.array([(255, 255, 255), (120, 120, 120), (60, 130, 200)], np.uint8)
+"""Colours of an elevation: of nothing, the object and its supports."""
+
+
+def elevations(stack: Stack, file: BinaryIO, work: Work | None = None) -> None:
+    """Write a PNG of an object and its supports, in another colour, from the front and from the right."""
+    from PIL import Image
+
+    assert stack.supports is not None
+    work, chosen = work or Work(), _spread_layers(range(len(stack.z)), ROWS)
+    seen = []
+    for root in (stack.supports.carried, stack.supports.node):
+        slicer = Slicer(replace(stack, root=root, supports=None), work)
+        sides = slicer.map(lambda layer: (_solid(layer).any(0), _solid(layer).any(1)), chosen)
+        seen.append([np.array(rows) for rows in zip(*sides, strict=True)])
+    high, pictures = len(chosen), []
+    for own, held, pixel in zip(*seen, stack.pixel, strict=True):
+        shown = SIDES[np.where(held & ~own, 2, own)][::-1]
+        across = own.shape[1] * pixel * high / float(stack.tops[-1])
+        pictures.append(Image.fromarray(shown).resize((max(round(across), 1), high), Image.Resampling.BOX))
+    both = Image.new("RGB", (sum(p.width for p in pictures) + 8, high), "white")
+    both.paste(pictures[0], (0, 0))
+    both.paste(pictures[1], (pictures[0].width + 8, 0))
+    both.save(file, "PNG")
+
+
 def _solid(layer: Layer) -> np.ndarray:
     """Pixels of a layer that are at least half covered."""
     return layer.coverage >= 128
@@ -336,12 +365,19 @@ def page(
     areas: NDArray[np.float64],
     picture: bytes,
     views: Sequence[bytes] = (),
+    sides: bytes = b"",
 ) -> bytes:
     """Compose a summary page.
 
-    `tops`, `areas`: float64 [n], mm, mm2; `views`: pictures of the object, PNG.
+    `tops`, `areas`: float64 [n], mm, mm2; `views`: pictures of the object, PNG; `sides`: see `elevations`,
+    empty if there are no supports.
     """
     shown = [f'<img alt="The object" width="48%" src="{_source(view)}">' for view in views]
+    held = [
+        "<h2>Supports</h2>",
+        "<p>From the front and from the right.</p>",
+        f'<img alt="Supports" src="{_source(sides)}">',
+    ]
     text = [
         "<!DOCTYPE html>",
         f'<html lang="en"><meta charset="utf-8"><title>{escape(title)}</title><style>{_STYLE}</style>',
@@ -350,6 +386,7 @@ def page(
         f"<h2>{escape(verdict.capitalize())}</h2>",
         *(["<ul>", *(f"<li>{escape(problem)}</li>" for problem in problems), "</ul>"] if problems else []),
         *(["<h2>The object</h2>", "<p>Red hangs in the air, orange is thin.</p>", *shown] if shown else []),
+        *(held if sides else []),
         "<h2>Cross-section over height</h2>",
         "<p>The force that peels a layer from the film grows with its area.</p>",
         plot(tops, areas),

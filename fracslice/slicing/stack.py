@@ -13,12 +13,15 @@ from ..fields.box import Box
 from ..fields.field import Field
 from ..printing import printable
 from ..records import SliceJob
-from ..volume import Drain, plan
+from ..volume import Drain, Plan, Supports, plan
 from ..volume.amount import Sizing, orient_field
 from ..work import Work
 
 MOST_LAYERS = 100_000
 MOST_PIXELS = 65_536
+
+BLOCK = 64
+"""Pixels along the largest blocks that are dropped together; see `fracslice.slicing.layers`."""
 
 FLOAT_STEPS = 8
 """Minimum number of float32 numbers between two samples."""
@@ -95,6 +98,8 @@ class Stack:
         Drain holes.
     parts : tuple of Standing
         Parts of a plate, which are sliced each for itself; empty for one object.
+    supports : Supports or None
+        Supports, if there are any.
     side : float
         Size of the job: longest side before compensation and print preparation, mm.
     """
@@ -111,12 +116,13 @@ class Stack:
     notes: tuple[str, ...] = ()
     drains: tuple[Drain, ...] = ()
     parts: tuple[Standing, ...] = ()
+    supports: Supports | None = None
     side: float = field(kw_only=True)
 
     @property
     def identity(self) -> list[object]:
         """Values that determine the layers."""
-        own = [getattr(self, f.name) for f in fields(self) if f.name not in ("root", "parts")]
+        own = [getattr(self, f.name) for f in fields(self) if f.name not in ("root", "parts", "supports")]
         parts = [(part.turns, part.at, key(*part.stack.identity)) for part in self.parts]
         return [self.root.key, *own, *parts]
 
@@ -139,36 +145,8 @@ class Stack:
         return np.array([*self.corner, self.pixel[0] / self.scale, self.pixel[1] / self.scale])
 
 
-def plan_stack(root: Field, job: SliceJob, work: Work | None = None, size: Sizing | None = None) -> Stack:
-    """Find the object's size and depths, make it printable, and place layers of one height and pixels.
-
-    Parameters
-    ----------
-    root : Field
-        The object.
-    job : SliceJob
-        The job.
-    work : Work, optional
-        Threads, progress and cancellation.
-    size : Sizing, optional
-        Size of the object; by default that of the job.
-
-    Returns
-    -------
-    Stack
-        The planned layers.
-
-    Raises
-    ------
-    SliceError
-        For too many layers or pixels, or an object too far from the origin.
-    VolumeError
-        For a scene without a solid, or if it cannot be made printable.
-    Cancelled
-        When the work is cancelled.
-    """
-    if size is None:
-        size = Sizing.of(job.size, job.scale)
+def plan_object(root: Field, job: SliceJob, size: Sizing, work: Work | None = None) -> tuple[Plan, float]:
+    """The printable object of a job, and mm per scene unit; see `fracslice.slicing.plan_stack`."""
     layer, pixel = job.layer[0], job.pixels
     _refuse_coarse(layer, max(pixel), size.side)
     planned = plan(orient_field(root, job.up, size.stretch, work), size.longest / min(pixel), work)
@@ -176,13 +154,24 @@ def plan_stack(root: Field, job: SliceJob, work: Work | None = None, size: Sizin
         from ..printing.edits import frame_bodies
 
         planned = frame_bodies(planned, size, job.printing.bodies, work or Work())
-    planned, scale = printable(planned, size, job.printing, work)
+    return printable(planned, size, job.printing, work)
+
+
+def stack_of(planned: Plan, scale: float, job: SliceJob, size: Sizing, within: Stack | None = None) -> Stack:
+    """Place layers of one height and pixels.
+
+    `scale`: mm per scene unit; `within`: layers of a part of the object, whose blocks of pixels are kept.
+    """
+    layer, pixel = job.layer[0], job.pixels
     box, outer = planned.box, planned.outer
     mm = tuple(s * scale for s in box.size)
     shape, corner = [0, 0], [0.0, 0.0]
     for axis in range(2):
         step = pixel[axis] / scale
-        shape[1 - axis] = 2 * math.ceil(outer.size[axis] / step / 2 + 1)
+        pixels = 2 * math.ceil(outer.size[axis] / step / 2 + 1)
+        if within:
+            pixels += (within.shape[1 - axis] - pixels) % (2 * BLOCK)
+        shape[1 - axis] = pixels
         corner[axis] = box.centre[axis] - step * shape[1 - axis] / 2
     tops = _tops(mm[2], layer)
     if max(shape) > MOST_PIXELS:
@@ -191,9 +180,10 @@ def plan_stack(root: Field, job: SliceJob, work: Work | None = None, size: Sizin
     _check_precision(outer, scale, min(*pixel, layer))
     z = box.lo[2] + (tops - np.diff(tops, prepend=0.0) / 2) / scale
     sides, at = (mm[0], mm[1], mm[2]), (corner[0], corner[1])
-    pixels, notes = (shape[0], shape[1]), (*planned.notes, *_rounding_note(mm[2], float(tops[-1])))
-    where = at, pixel, pixels, z, tops
-    return Stack(planned.root, scale, *where, sides, outer, notes, planned.drains, side=size.side)
+    rows, notes = (shape[0], shape[1]), (*planned.notes, *_rounding_note(mm[2], float(tops[-1])))
+    where, rest = (at, pixel, rows, z, tops), (notes, planned.drains)
+    supports = planned.supports
+    return Stack(planned.root, scale, *where, sides, outer, *rest, supports=supports, side=size.side)
 
 
 def _refuse_coarse(layer: float, pixel: float, size: float) -> None:

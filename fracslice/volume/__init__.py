@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..common.messages import format_count, significant
 from ..errors import VolumeError
 from ..fields.box import Box, Triple
 from ..fields.depth import depth_notes, resolve_depths, visible, with_depth_advice
@@ -29,6 +30,7 @@ __all__ = [
     "Lattice",
     "Plan",
     "SignBricks",
+    "Supports",
     "extent",
     "plan",
     "reached",
@@ -76,6 +78,63 @@ class Drain:
 
 
 @dataclass(frozen=True, eq=False)
+class Supports:
+    """Supports of an object. Volumes and areas in mm3 and mm2.
+
+    Attributes
+    ----------
+    carried
+        The object without them.
+    node
+        The supports, scene units.
+    tip
+        Diameter of a contact, mm.
+    tips
+        Number of tips.
+    inner
+        Number of those whose branch ends on the object.
+    caught
+        Number of these in a hole from which none can be taken.
+    volume
+        Volume, with the feet and the raft.
+    scars
+        Area of all contacts.
+    """
+
+    carried: Field
+    node: Node
+    tip: float
+    tips: int
+    inner: int
+    caught: int
+    volume: float
+    scars: float
+
+    def distances(self, points: np.ndarray) -> np.ndarray:
+        """Distances of points from the supports.
+
+        Parameters
+        ----------
+        points
+            Points, float64 [n, 3], scene units.
+
+        Returns
+        -------
+        float32 [n]
+            Distances, scene units; negative inside.
+        """
+        return self.node.kernel().points(*points.T.astype(np.float32))
+
+    def __str__(self) -> str:
+        """A line on them."""
+        inner = f", {self.inner} of them from the object itself" if self.inner else ""
+        caught = f", {self.caught} in holes without exit (--cavities fill, or --up)" if self.caught else ""
+        tips = f"{format_count(self.tips, 'tip')} of {self.tip:g} mm{inner}{caught}"
+        volume, scars = significant(self.volume), significant(self.scars)
+        return f"supports: {tips}; {volume} mm3, scars of {scars} mm2"
+
+
+@dataclass(frozen=True, eq=False)
 class Plan:
     """Scene with resolved depths, its bounds and its voxel size.
 
@@ -97,6 +156,8 @@ class Plan:
         Automatic depths, such as "mandelbulb 5".
     drains
         Drain holes.
+    supports
+        Supports, if there are any.
     proved
         True if nothing is skipped without a proof.
     """
@@ -109,6 +170,7 @@ class Plan:
     notes: tuple[str, ...] = ()
     depths: tuple[str, ...] = ()
     drains: tuple[Drain, ...] = ()
+    supports: Supports | None = None
     proved: bool = False
 
     @property

@@ -1,0 +1,594 @@
+"""Supports in the field: tips, and the tree of pillars that carries them, routed through the free space of a
+grid.
+
+From the highest tip down, a branch is led to the one or the trunk with which it takes the least way, within
+45 degrees of vertical (Vanek, Galicia and Benes 2014, "Clever Support"), else by the shortest way to the
+plate. Ways of all cells are found at once, cell by cell upwards from the plate: a way down is never longer
+than it is steep.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..fields.field import Field, Kernel
+from ..formulas import Node, box, capsule, intersection, plane, transform, union
+from ..volume import Supports
+from ..volume.bricks import values_at
+from ..work import Work
+from .walls import slopes
+
+Points = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Strength:
+    """Measures of supports, mm."""
+
+    tip: float  # diameter of a contact
+    pillar: float  # least diameter of a branch
+    reach: float  # how far from what carries it a layer may grow into the air
+
+
+STRENGTHS = {
+    "light": Strength(0.3, 0.8, 3.5),
+    "medium": Strength(0.4, 1.0, 3.0),
+    "heavy": Strength(0.6, 1.4, 3.0),
+}
+"""Contacts of 0.3 to 0.6 mm are those that makers of printers advise (Formlabs, "Touchpoint size";
+PrusaSlicer's default is 0.4 mm); the reach is ours.
+"""
+
+LIFT = 5.0
+"""Least height of the object above the plate, mm."""
+
+CLEARANCE = 0.4
+"""Least distance of pillars from the object, mm, but for its narrow places."""
+
+NARROW = 2
+"""Cells between a way through a narrow place and the object, at least one of them free."""
+
+DETOUR = 4.0
+"""What a way through a narrow place costs, lengths of a free one."""
+
+FOOT = 8.0
+"""What another foot on the plate costs, mm of a pillar."""
+
+LOWEST = 2.0
+"""Least height above the plate at which branches meet, mm."""
+
+FARTHEST = 12.0
+"""Longest branch to another one, mm."""
+
+TRIES = 12
+"""Branches and trunks that are tried, those first that save most."""
+
+LENGTHS = 2.0, 1.4, 1.0, 0.7
+"""Lengths of the cones of tips, mm."""
+
+SLENDER = 50.0
+"""Largest height of a pillar without braces, diameters: thinner ones bend under the peeling of a layer
+(Euler).
+"""
+
+CARRIED = 42.0
+"""Cross-section of the object that an area of 1 of all trunks carries; see `fracslice.checks.support`."""
+
+WIDEST = 2.5
+"""Largest factor by which contacts and pillars are wider for that."""
+
+CONE = 1.7
+"""Largest factor by which the lower ends of the cones of tips are wider for that."""
+
+TALL, NEAR, APART = 15.0, 10.0, 12.0
+"""Height of pillars that are braced, greatest distance of those that are braced with each other, and the
+height between two braces, mm.
+"""
+
+RIM, RISE = 0.6, 1.0
+"""Width of the rim of a foot, and height up to which it narrows to the pillar, mm."""
+
+
+@dataclass(frozen=True, eq=False)
+class Room:
+    """Grid of cells around an object and below it, down to the plate; lengths in mm of the scene's axes."""
+
+    origin: Points  # corner of the first cell, [3]: x, y, z
+    floor: float  # height of the plate, or of the raft, in the first cells
+    cell: Points  # sides of a cell, [3]
+    away: NDArray[np.uint8]  # steps from the nearest cell with a part of the object, at most 255; [z, y, x]
+    wide: int  # steps from which on a way is free
+
+    @classmethod
+    def around(
+        cls, full: NDArray[np.bool_], origin: Points, floor: float, cell: Points, clear: float
+    ) -> Room:
+        """Room around cells with parts of an object, which holds a pillar's axis `clear` mm from it."""
+        wide = max(math.ceil(clear / float(cell.min())), NARROW + 1)
+        return cls(origin, floor, cell, steps_from(full, wide), wide)
+
+    @cached_property
+    def cost(self) -> NDArray[np.float32]:
+        """Length of the shortest way down to the plate from each cell, mm; infinite where there is none."""
+        x, y, z = self.cell.tolist()
+        result = np.full(self.away.shape, np.inf, np.float32)
+        result[0][self.away[0] >= self.wide] = 0
+        for k in range(1, len(result)):
+            below, away = result[k - 1], self.away[k]
+            times = np.where(away >= self.wide, 1, np.where(away >= NARROW, DETOUR, np.inf)).astype(
+                np.float32
+            )
+            least = below + z * times
+            for axis, side in ((0, y), (1, x)):
+                way = math.hypot(side, z) * times
+                low, high = (slice(None, -1), slice(1, None)) if axis == 0 else (np.s_[:, :-1], np.s_[:, 1:])
+                for here, there in ((low, high), (high, low)):
+                    np.minimum(least[here], below[there] + way[here], out=least[here])
+            result[k] = least
+        return result
+
+    @cached_property
+    def outside(self) -> NDArray[np.bool_]:
+        """Cells from which a piece as wide as a cell finds a way out."""
+        from scipy.ndimage import label
+
+        free = self.away > 0
+        labels, _ = label(free)
+        return np.asarray(free & (labels == labels[0, 0, 0]))
+
+    def at(self, points: Points) -> tuple[NDArray[np.int64], ...]:
+        """Cells (z, y, x) of points [..., 3], of those outside of the room the nearest ones."""
+        cells = np.floor((points - self.origin) / self.cell).astype(np.int64)
+        last = np.array(self.away.shape[::-1]) - 1
+        x, y, z = np.moveaxis(np.clip(cells, 0, last), -1, 0)
+        return z, y, x
+
+    def middle(self, cell: tuple[int, int, int]) -> Points:
+        """Middle of a cell (z, y, x)."""
+        return self.origin + (np.array(cell[::-1]) + 0.5) * self.cell
+
+    def is_free(self, start: Points, end: Points, least: int) -> bool:
+        """True if all cells along a segment are as many steps away from the object."""
+        count = int(2 * np.linalg.norm(end - start) / float(self.cell.min())) + 2
+        along = start + np.linspace(0, 1, count)[:, None] * (end - start)
+        return bool((self.away[self.at(along)] >= least).all())
+
+    def way(self, start: Points) -> list[Points]:
+        """Corners of the shortest way from a point down to the plate."""
+        cell = tuple(int(axis) for axis in self.at(start))
+        points, (_, ny, nx) = [start], self.away.shape
+        z, y, x = cell
+        sides = [(0, 0), (0, -1), (0, 1), (-1, 0), (1, 0)]
+        ways = [math.hypot(self.cell[0] * dx, self.cell[1] * dy, self.cell[2]) for dy, dx in sides]
+        while z:
+            near = [(y + dy, x + dx) for dy, dx in sides]
+            costs = [
+                way + float(self.cost[z - 1, j, i]) if 0 <= j < ny and 0 <= i < nx else math.inf
+                for way, (j, i) in zip(ways, near, strict=True)
+            ]
+            y, x = near[costs.index(min(costs))]
+            z -= 1
+            middle = self.middle((z, y, x))
+            # straight down, the way keeps its place
+            points.append(np.array([*points[-1][:2], middle[2]]) if (y, x) == cell[1:] else middle)
+            cell = (z, y, x)
+        points[-1][2] = self.floor
+        return self._straight(points)
+
+    def _straight(self, points: list[Points]) -> list[Points]:
+        """Way with as few corners as its free cells permit."""
+        result, first = [points[0]], 0
+        while first < len(points) - 1:
+            step, last = len(points) - 1 - first, first + 1
+            while step:
+                if first + step < len(points) and self._steep(points[first], points[first + step]):
+                    least = self.wide if self.away[self.at(points[first])] >= self.wide else NARROW
+                    if self.is_free(points[first], points[first + step], least):
+                        last = first + step
+                        break
+                step //= 2
+            first = last
+            result.append(points[first])
+        return result
+
+    def _steep(self, start: Points, end: Points) -> bool:
+        return bool(math.dist(start[:2], end[:2]) <= (start[2] - end[2]) * 1.001)
+
+
+def steps_from(full: NDArray[np.bool_], most: int) -> NDArray[np.uint8]:
+    """Steps from the nearest full cell, at most `most`: a ball of as many cells is free around cells that are
+    more steps away. Every other step goes to the cells that share a corner, which together are nearly round.
+    """
+    near, away = full.copy(), np.where(full, 0, most).astype(np.uint8)
+    for step in range(1, most):
+        before = near
+        near = near.copy()
+        for axis in range(3):
+            # across corners: what was reached along one axis is taken along the next one
+            grown = before if step % 2 else near.copy()
+            here = np.moveaxis(near, axis, 0)
+            there = np.moveaxis(grown, axis, 0)
+            here[1:] |= there[:-1]
+            here[:-1] |= there[1:]
+        away[near & (away == most)] = step
+    return away
+
+
+class Meeting(NamedTuple):
+    """A place where a branch may end."""
+
+    is_trunk: bool  # whether it ends at a trunk, not at another branch
+    number: int  # of the trunk, or of the other branch's node
+    point: Points
+
+
+class Forest:
+    """Branches that grow from tips down to the plate.
+
+    Attributes
+    ----------
+    place : list of float64 [3]
+        Nodes, those of the tips first.
+    down : list of int
+        The next node on the way down from each; -1 if it is straight down to the plate, or on a trunk.
+    trunks : list of int
+        Nodes from which it is straight down to the plate.
+    joins : list of list of int
+        Nodes on each trunk at which branches end.
+    """
+
+    def __init__(self, room: Room, strength: Strength, ends: Points, radii: NDArray[np.float64]) -> None:
+        self.room, self.strength, self.tips, self.radii = room, strength, len(ends), radii
+        self.place, self.down = list[Points](), list[int]()
+        self.trunks, self.joins = list[int](), list[list[int]]()
+        # nodes that are not led on yet: the arrays have room for more
+        self._open, self._points = np.zeros(64, bool), np.full((64, 3), np.inf)
+        heap = list[tuple[float, int]]()
+        for point in ends:
+            self._add(point, heap)
+        while heap:
+            _, k = heapq.heappop(heap)
+            if self._open[k]:
+                self._open[k] = False
+                self._lead(k, heap)
+
+    def _add(self, point: Points, heap: list[tuple[float, int]] | None = None) -> int:
+        """Add a node, which is to be led on if there is a heap of those."""
+        k = len(self.place)
+        if k == len(self._open):
+            self._open = np.append(self._open, np.zeros(k, bool))
+            self._points = np.append(self._points, np.full((k, 3), np.inf), axis=0)
+        self.place.append(point)
+        self.down.append(-1)
+        self._points[k] = point
+        if heap is not None:
+            self._open[k] = True
+            heapq.heappush(heap, (-float(point[2]), k))
+        return k
+
+    def _lead(self, k: int, heap: list[tuple[float, int]]) -> None:
+        """Lead a node to another branch, to a trunk or down."""
+        point, room = self.place[k], self.room
+        for is_trunk, number, meeting in self._meetings(point):
+            if not room.is_free(point, meeting, room.wide):
+                continue
+            if is_trunk:
+                self.down[k] = self._add(meeting)
+                self.joins[number].append(self.down[k])
+                return
+            if room.is_free(self.place[number], meeting, room.wide):
+                self._open[number] = False
+                self.down[k] = self.down[number] = self._add(meeting, heap)
+                return
+        corners = room.way(point)
+        if len(corners) > 2 or math.dist(corners[0][:2], corners[-1][:2]) > 0:
+            self.down[k] = self._add(corners[1], heap)
+            return
+        self.trunks.append(k)
+        self.joins.append([])
+
+    def _meetings(self, point: Points) -> list[Meeting]:
+        """What a node may be led to, first what saves most of the length of pillars."""
+        own = float(self.room.cost[self.room.at(point)]) + FOOT
+        others = np.flatnonzero(self._open[: len(self.place)])
+        others = others[np.abs(self._points[others, :2] - point[:2]).max(1, initial=0) < FARTHEST]
+        branches, of_branches = self._with_branches(point, own, self._points[others])
+        trunks, of_trunks = self._with_trunks(point, own)
+        found = [(-s, False, k, m) for s, k, m in zip(of_branches, others.tolist(), branches, strict=True)]
+        found += [(-s, True, k, m) for k, (s, m) in enumerate(zip(of_trunks, trunks, strict=True))]
+        found = sorted((one for one in found if one[0] < 0), key=lambda one: one[:3])
+        return [Meeting(*one[1:]) for one in found[:TRIES]]
+
+    def _with_branches(self, point: Points, own: float, others: Points) -> tuple[Points, list[float]]:
+        """Highest places [n, 3] below 45 degrees from a node and from others, and what they save."""
+        away = np.linalg.norm((others - point)[:, :2], axis=1)
+        low = np.minimum((point[2] + others[:, 2] - away) / 2, others[:, 2])
+        share = np.divide(point[2] - low, away, out=np.ones_like(away), where=away > 0)
+        meeting = point + np.minimum(share, 1)[:, None] * (others - point)
+        meeting[:, 2] = low
+        mine, theirs = (np.linalg.norm(meeting - ends, axis=1) for ends in (point, others))
+        cost = self.room.cost
+        saved = own + cost[self.room.at(others)] - mine - theirs - cost[self.room.at(meeting)]
+        saved[(np.maximum(mine, theirs) > FARTHEST) | (low < self.room.floor + LOWEST)] = -np.inf
+        return meeting, saved.tolist()
+
+    def _with_trunks(self, point: Points, own: float) -> tuple[Points, list[float]]:
+        """Highest places [t, 3] of trunks below 45 degrees from a node, and what they save."""
+        top = np.array([self.place[k] for k in self.trunks]).reshape(-1, 3)
+        away = np.linalg.norm((top - point)[:, :2], axis=1)
+        meeting = np.column_stack([top[:, :2], np.minimum(point[2] - away, top[:, 2])])
+        mine = np.linalg.norm(meeting - point, axis=1)
+        saved = own - mine
+        saved[(mine > FARTHEST) | (meeting[:, 2] < self.room.floor + LOWEST)] = -np.inf
+        return meeting, saved.tolist()
+
+    def beams(self, largest: float, lowest: float) -> tuple[Points, Points, Points]:
+        """Beams [m, 2, 4] of all branches, the feet of trunks [t, 4], and the radii of all nodes [n].
+
+        `largest`: largest cross-section of the object, mm2; `lowest`: height of the lowest contact.
+        """
+        load, floor, least = self._loads(), self.room.floor, self.strength.pillar / 2
+        radii = np.maximum(least, np.sqrt(np.array(load)))
+        beams, feet = list[tuple[int, int]](), list[int]()  # pairs of balls (x, y, z, radius)
+        balls = [[*point.tolist(), r] for point, r in zip(self.place, radii.tolist(), strict=True)]
+        for k, nxt in enumerate(self.down):
+            if nxt >= 0:
+                beams.append((k, nxt))
+        for number, k in enumerate(self.trunks):
+            joins = sorted(self.joins[number], key=lambda j: -self.place[j][2])
+            carried, top = load[k], k
+            slender = (self.place[k][2] - floor) / SLENDER / 2
+            balls[k][3] = max(balls[k][3], 0.7 * slender)
+            for j in joins:
+                carried += load[j]
+                balls[j][3] = max(least, slender, math.sqrt(carried))
+                beams.append((top, j))
+                top = j
+            balls.append([*self.place[k][:2].tolist(), floor, max(balls[top][3], slender)])
+            beams.append((top, len(balls) - 1))
+            feet.append(len(balls) - 1)
+        made, pairs = np.array(balls).reshape(-1, 4), np.array(beams, np.int64).reshape(-1, 2)
+        low = made[:, 2] < lowest
+        ends = min((float(point[2]) for point in self.place[: self.tips]), default=floor)
+        wider = _widening(made[pairs], floor, min(ends, lowest), largest)
+        made[low, 3] *= wider
+        made[: self.tips][low[: self.tips], 3] *= min(wider, CONE) / wider
+        return made[pairs], made[feet], made[: len(self.place), 3]
+
+    def _loads(self) -> list[float]:
+        """Contacts that each node carries, squares of their radii."""
+        load = [*(self.radii**2).tolist(), *([0.0] * (len(self.place) - self.tips))]
+        for k in sorted(range(len(self.place)), key=lambda k: (-self.place[k][2], k)):
+            if self.down[k] >= 0:
+                load[self.down[k]] += load[k]
+        return load
+
+    def braces(self) -> Points:
+        """Beams [m, 2, 4] across between tall trunks that are near each other."""
+        floor, result, held = self.room.floor, [], dict[int, int]()
+        tops = np.array([self.place[k] for k in self.trunks]).reshape(-1, 3)
+        tall = np.flatnonzero(tops[:, 2] - floor > TALL).tolist()
+        pairs = sorted(
+            (math.dist(tops[a, :2], tops[b, :2]), a, b) for n, a in enumerate(tall) for b in tall[n + 1 :]
+        )
+        for far, a, b in pairs:
+            if far > NEAR or max(held.get(a, 0), held.get(b, 0)) >= 2 or far < 1.5:
+                continue
+            radius, low, made = self.strength.pillar * 0.35, floor + 3.0, 0
+            while low + far < min(tops[a, 2], tops[b, 2]) - 2:
+                start, end = np.array([*tops[a, :2], low]), np.array([*tops[b, :2], low + far])
+                if self.room.is_free(start, end, self.room.wide):
+                    result.append([[*start, radius], [*end, radius]])
+                    made += 1
+                low, a, b = low + max(far, APART), b, a
+            if made:
+                held[a], held[b] = held.get(a, 0) + 1, held.get(b, 0) + 1
+        return np.array(result).reshape(-1, 2, 4)
+
+
+@dataclass(frozen=True, eq=False)
+class Object:
+    """The object that is supported, in mm of the scene's axes."""
+
+    root: Field
+    scale: float  # mm per scene unit
+    areas: NDArray[np.float64]  # cross-sections, from the lowest one upwards, mm2
+    step: float  # distance between them
+    work: Work
+
+    @cached_property
+    def kernel(self) -> Kernel:
+        """Kernel of double precision."""
+        return self.root.kernel("cpu", "float64")
+
+    def values(self, points: Points) -> NDArray[np.float64]:
+        """Field at points [..., 3] in mm."""
+        flat = points.reshape(-1, 3).T / self.scale
+        return values_at(self.kernel, flat, self.work).reshape(points.shape[:-1])
+
+    def under(self, inside: Points, depth: NDArray[np.float64]) -> Points:
+        """Lowest points of the solid beneath points [n, 3] inside it that are outside at a depth below."""
+        low, high = inside[:, 2] - depth, inside[:, 2].copy()
+        for _ in range(24):
+            middle = (low + high) / 2
+            full = self.values(np.column_stack([inside[:, :2], middle])) < 0
+            high, low = np.where(full, middle, high), np.where(full, low, middle)
+        return np.column_stack([inside[:, :2], high])
+
+    def carried(self, beams: Points, lowest: float) -> float:
+        """Smallest share that the object and beams together, near the lowest contact, have of the
+        cross-section that is to carry the largest one.
+        """
+        steps = np.arange(-math.ceil(0.1 / self.step), math.ceil(LENGTHS[0] / self.step))
+        heights = np.asarray(lowest + self.step * (steps + 0.5), np.float64)
+        own = np.where(steps < 0, 0.0, self.areas[np.clip(steps, 0, len(self.areas) - 1)])
+        return float(((own + sections(beams, heights)) / (self.areas.max() / CARRIED)).min())
+
+    def first_below(self, points: Points, floor: float, step: float) -> NDArray[np.float64]:
+        """Heights of the first solid below points [n, 3], to a step; the floor where there is none."""
+        result = np.full(len(points), floor)
+        left, z = np.arange(len(points)), points[:, 2] - step
+        while len(left := left[z[left] > floor]):
+            full = self.values(np.column_stack([points[left, :2], z[left]])) < 0
+            result[left[full]] = z[left[full]]
+            left = left[~full]
+            z[left] -= step
+        return result
+
+    def slopes(self, points: Points, step: float) -> Points:
+        """Unit normals [n, 3]."""
+        _, normals = slopes(self.kernel, points.T / self.scale, step / self.scale, self.work)
+        return normals.T
+
+
+class Contacts(NamedTuple):
+    """Places where supports touch the surface."""
+
+    points: Points  # mm, [n, 3]
+    radii: NDArray[np.float64]  # mm, [n]
+    enclosed: NDArray[np.bool_]  # whether it is in a hole without exit, [n]
+
+
+def directions(normals: Points) -> Points:
+    """Directions [n, 18, 3] in which tips may leave: against the normal if that is within 45 degrees of
+    vertical, straight down, and leaning by 22 and by 45 degrees to eight sides.
+    """
+    turns = np.arange(8) * math.pi / 4
+    fixed = [(0.0, 0.0, -1.0)]
+    for lean in (math.pi / 8, math.pi / 4):
+        fixed += [
+            (math.sin(lean) * math.cos(t), math.sin(lean) * math.sin(t), -math.cos(lean)) for t in turns
+        ]
+    flat = normals[:, :2]
+    across = np.linalg.norm(flat, axis=1)
+    lean = np.minimum(np.arctan2(across, np.maximum(-normals[:, 2], 0)), math.pi / 4)
+    side = flat / np.maximum(across, 1e-12)[:, None]
+    own = np.column_stack([side * np.sin(lean)[:, None], -np.cos(lean)])
+    return np.concatenate([own[:, None], np.broadcast_to(fixed, (len(normals), len(fixed), 3))], 1)
+
+
+def tip_ends(room: Room, contacts: Points, normals: Points) -> Points:
+    """Lower ends of the cones of tips [n, 3], NaN where none has room and a way down.
+
+    The direction nearest to the normal is taken, and the longest cone; leaning to a way that is shorter pays.
+    """
+    where = directions(normals)
+    best, result = np.full(len(contacts), np.inf), np.full_like(contacts, np.nan)
+    for length in LENGTHS:
+        ends = contacts[:, None] + length * where
+        cost = room.cost[room.at(ends)] + 3 * np.linalg.norm(where - where[:, :1], axis=2) - 4 * length
+        for share, least in ((0.5, 1), (0.75, NARROW)):
+            cost[room.away[room.at(contacts[:, None] + share * length * where)] < least] = np.inf
+        cost[ends[..., 2] < room.floor + 1] = np.inf
+        first = cost.argmin(1)
+        least = cost[np.arange(len(cost)), first]
+        better = least < best
+        best[better], result[better] = least[better], ends[better, first[better]]
+    return result
+
+
+def support(
+    of: Object, room: Room, where: Contacts, strength: Strength, raft: float
+) -> tuple[Supports, float]:
+    """Supports of points of the surface, and the share of the cross-section that they have to have next to
+    it; `raft`: height of the raft, mm.
+    """
+    points, tips, enclosed = where
+    lowest = float(points[:, 2].min())
+    ends = tip_ends(room, points, of.slopes(points, strength.tip / 4))
+    led = np.isfinite(ends[:, 0])
+    forest = Forest(room, strength, ends[led], tips[led])
+    branches, feet, radii = forest.beams(float(of.areas.max()), lowest)
+    cones = np.stack(
+        [np.column_stack([points, tips])[led], np.column_stack([ends[led], radii[: forest.tips]])], 1
+    )
+    ground = of.first_below(points[~led], room.floor, float(room.cell.min()) / 2)
+    struts = _struts(np.column_stack([points, tips])[~led], ground, strength.pillar / 2)
+    inner = ground > room.floor
+    feet = np.concatenate([feet, struts[len(ground) :, 1][~inner]])
+    beams = np.concatenate([cones, branches, struts, forest.braces()])
+    node, volume = _node(beams, feet, room.floor, raft, of.scale)
+    counts = len(points), int(inner.sum()), int((enclosed[~led] & inner).sum())
+    scars = math.pi * float((tips**2).sum() + (tips[~led][inner] ** 2).sum())
+    return Supports(of.root, node, strength.tip, *counts, volume, scars), of.carried(beams, lowest)
+
+
+def _widening(beams: Points, floor: float, high: float, largest: float) -> float:
+    """By how much wider beams have to be, between two heights, to carry the largest cross-section, at most
+    `WIDEST`.
+    """
+    least = float(sections(beams, np.linspace(floor, high, 16)[1:-1]).min())
+    return min(max(math.sqrt(largest / CARRIED / least), 1.0), WIDEST) if least else 1.0
+
+
+def sections(beams: Points, heights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Area of beams [m, 2, 4] at heights [k], across the beams."""
+    low, high = np.sort(beams[:, :, 2], 1).T
+    order = np.argsort(beams[:, :, 2], 1)
+    first, last = np.take_along_axis(beams[:, :, 3], order, 1).T
+    share = (heights[:, None] - low) / np.maximum(high - low, 1e-9)
+    radii = first + np.clip(share, 0, 1) * (last - first)
+    return np.asarray(np.where((share >= 0) & (share <= 1), math.pi * radii**2, 0).sum(1))
+
+
+def _struts(tops: Points, ground: NDArray[np.float64], pillar: float) -> Points:
+    """Beams straight down from balls [n, 4] to what is below, as thin at both ends, and thicker between if
+    they are long.
+    """
+    low, middle = tops.copy(), tops.copy()
+    low[:, 2] = ground
+    middle[:, 2] = (tops[:, 2] + ground) / 2
+    middle[:, 3] = np.clip((tops[:, 2] - ground) / 8, tops[:, 3], np.maximum(tops[:, 3], pillar))
+    return np.concatenate([np.stack([tops, middle], 1), np.stack([middle, low], 1)])
+
+
+def _volume(beams: Points) -> float:
+    """Volume of cones between balls, mm3, where they overlap counted twice."""
+    length = np.linalg.norm(beams[:, 1, :3] - beams[:, 0, :3], axis=1)
+    a, b = beams[:, 0, 3], beams[:, 1, 3]
+    return float((math.pi / 3 * length * (a * a + a * b + b * b)).sum())
+
+
+def _node(beams: Points, feet: Points, floor: float, raft: float, scale: float) -> tuple[Node, float]:
+    """Element of beams, feet and the raft, in scene units, and its volume, mm3."""
+    parts = [_beam(one, scale) for one in beams]
+    discs = np.stack([feet + [0, 0, 0, RIM], feet + [0, 0, RISE, 0]], 1)
+    whole = intersection(
+        union(*parts, *(_beam(one, scale) for one in discs)), plane(normal=(0, 0, -1), offset=-floor / scale)
+    )
+    volume = _volume(beams) + _volume(discs)
+    if not raft:
+        return whole, volume
+    plate, area = _raft(feet, floor - raft, raft, scale)
+    return union(whole, plate), volume + area * raft
+
+
+def _beam(ends: object, scale: float) -> Node:
+    (ax, ay, az, a), (bx, by, bz, b) = (np.asarray(ends) / scale).tolist()
+    return capsule((ax, ay, az), (bx, by, bz), a, b)
+
+
+def _raft(feet: Points, floor: float, height: float, scale: float) -> tuple[Node, float]:
+    """A plate under feet, of twelve sides whose rim is wider at its top, so that a scraper gets under it; and
+    the area of its top, mm2.
+    """
+    turns = np.arange(12) * math.pi / 6
+    sides = np.column_stack([np.cos(turns), np.sin(turns)])
+    reach = (feet[:, :2] @ sides.T + feet[:, 3:]).max(0) + 2 * RIM
+    top, share = floor + height, math.sqrt(0.5)
+    planes = [plane(normal=(0, 0, 1), offset=top / scale)]
+    for (x, y), far in zip(sides.tolist(), reach.tolist(), strict=True):
+        planes.append(plane(normal=(x, y, -1), offset=(far - top) * share / scale))
+    low, high = (-reach[6], -reach[9], floor), (reach[0], reach[3], top)
+    size, middle = (np.subtract(high, low) / scale).tolist(), (np.add(low, high) / 2 / scale).tolist()
+    corners = [np.linalg.solve(sides[[k, k - 1]], reach[[k, k - 1]]) for k in range(12)]
+    x, y = np.array(corners).T
+    area = abs(float(x @ np.roll(y, 1) - y @ np.roll(x, 1))) / 2
+    return intersection(transform(box(size=size), translate=middle), *planes), area

@@ -1,0 +1,224 @@
+"""Supports and directions up: known objects, oracles of islands, distances and ways."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.ndimage import distance_transform_edt, label
+
+from fracslice import MeshJob, make_mesh
+from fracslice.checks.layer_checks import check_layers
+from fracslice.errors import SceneError
+from fracslice.formulas import Node, box, capsule, cylinder, difference, mandelbulb, sphere, transform, union
+from fracslice.jobs.mesh import make_implicit
+from fracslice.printing.pillars import Room, steps_from
+from fracslice.scene import Print, scene
+from fracslice.slicing import SliceJob, Slicer, Stack, plan_stack
+from fracslice.slicing.orientation import _runs, orientations
+from fracslice.volume.amount import Sizing
+from fracslice.work import Work
+
+pytestmark = pytest.mark.once
+
+STEP = 0.2
+
+
+def at(node: Node, x: float, y: float, z: float) -> Node:
+    return transform(node, translate=(x, y, z))
+
+
+LEGS = [at(box(size=(2, 2, 10)), x, y, -5.5) for x in (-9, 9) for y in (-6, 6)]
+TABLE = union(box(size=(20, 14, 1.5)), *LEGS)
+MUSHROOM = union(cylinder(radius=2, height=10), at(cylinder(radius=7, height=2), 0, 0, 5))
+BRIDGE = difference(box(size=(20, 6, 8)), at(box(size=(16, 8, 8)), 0, 0, -2))
+BALL = union(box(size=(14, 14, 2)), at(sphere(radius=3), 0, 0, 8))
+CAVITY = union(
+    difference(box(size=(14, 14, 14)), sphere(radius=5)), at(cylinder(radius=0.6, height=4), 0, 0, 3.5)
+)
+
+
+def supported(root: Node, supports: str = "medium", size: float | None = None, **how: float) -> Stack:
+    side = size or max(root.bounds.box.size)
+    printing = Print(supports=supports, **how)  # type: ignore[arg-type]
+    return plan_stack(root, SliceJob(size=side, layer=STEP, pixel=STEP, printing=printing), Work(threads=1))
+
+
+def pictures(stack: Stack) -> list[np.ndarray]:
+    return list(Slicer(stack, Work(threads=1)).map(lambda layer: layer.coverage >= 128))
+
+
+def islands(layers: list[np.ndarray]) -> int:
+    """Components of layers with nothing below them, but on the plate and of less than 8 pixels."""
+    found = 0
+    for below, now in pairwise(layers):
+        labels, count = label(now, np.ones((3, 3)))
+        sizes = np.bincount(labels.ravel(), minlength=count + 1)
+        held = np.isin(np.arange(1, count + 1), labels[below & now])
+        found += int((~held & (sizes[1:] >= 8)).sum())
+    return found
+
+
+@pytest.mark.parametrize("root", [TABLE, MUSHROOM, BRIDGE, BALL, sphere(radius=8)], ids=str)
+def test_nothing_begins_or_hangs_in_the_air(root: Node) -> None:
+    stack = supported(root)
+    report = check_layers(stack, None, None, Work(threads=1))
+    assert islands(pictures(stack)) == 0
+    assert {problem.kind for problem in report.problems} <= {"thin"}
+    assert report.overhang is None and len(report.bodies) <= 1
+    assert stack.supports is not None and stack.supports.caught == 0
+    assert str(stack.supports) == report.supports
+
+
+def test_every_point_under_a_ceiling_is_near_a_tip() -> None:
+    stack = supported(TABLE)
+    assert stack.supports is not None
+    touched = next(
+        iter(pictures_at(stack, 9.9))
+    )  # just below the table's top, which begins 10 mm above its feet
+    bare = np.zeros_like(touched)
+    top = next(iter(pictures_at(stack, 10.3)))
+    bare[top] = True
+    away = distance_transform_edt(~touched, sampling=STEP)
+    assert float(away[bare].max()) < 3.0 + 2 * STEP
+
+
+def pictures_at(stack: Stack, height: float) -> list[np.ndarray]:
+    """The layer at a height in mm above the lowest point of the object, which is lifted."""
+    lift = float(stack.tops[-1]) - 11.25
+    index = int(np.searchsorted(stack.tops, height + lift))
+    return list(Slicer(stack, Work(threads=1)).map(lambda layer: layer.coverage >= 128, [index]))
+
+
+def test_a_tip_without_a_way_stands_on_the_object() -> None:
+    held = supported(BALL).supports
+    assert held is not None and held.tips > 4
+
+
+def test_what_hangs_in_a_cavity_is_caught() -> None:
+    held = supported(CAVITY).supports
+    assert held is not None and held.caught == held.inner == 1
+    assert "1 in holes without exit (--cavities fill" in str(held)
+    filled = supported(CAVITY, cavities="fill").supports  # type: ignore[arg-type]
+    assert filled is not None and filled.caught == 0
+
+
+def test_more_carries_more() -> None:
+    light, heavy = (supported(sphere(radius=8), strength).supports for strength in ("light", "heavy"))
+    assert light is not None and heavy is not None
+    assert light.tip < heavy.tip and light.scars < heavy.scars and light.tips > heavy.tips
+
+
+def test_contacts_carry_the_largest_layer() -> None:
+    stack = supported(box(size=(20, 20, 4)))
+    assert stack.supports is not None
+    assert stack.supports.scars > 400 / 60  # cones are wider just below
+
+
+def test_a_raft_is_narrower_below() -> None:
+    stack = supported(MUSHROOM, raft=1.0)
+    layers = [int(picture.sum()) * STEP**2 for picture in pictures(stack)[:7]]
+    assert layers == sorted(layers[:5]) + layers[5:]  # up to its top, 1 mm above the plate
+    assert layers[4] - layers[0] > 10
+    assert layers[5] < layers[4] / 2
+
+
+def test_mesh_is_one_solid() -> None:
+    job = MeshJob(voxel=0.2, printing=Print(supports="medium"))
+    bare, made = (make_mesh(scene(MUSHROOM, unit=1), j, Work(threads=1)) for j in (MeshJob(voxel=0.2), job))
+    report = made.report.mesh
+    assert report.watertight and report.manifold and report.components == 1
+    (line,) = (note for note in made.report.notes if note.startswith("supports: "))
+    stated = float(line.partition("; ")[2].split()[0])
+    assert stated == pytest.approx(report.volume_mm3 - bare.report.mesh.volume_mm3, rel=0.15)
+    coarse = make_mesh(scene(MUSHROOM, unit=1), MeshJob(voxel=0.4, printing=job.printing), Work(threads=1))
+    assert any("tips of 0.8 mm" in note for note in coarse.report.notes)  # two voxels
+    assert coarse.report.mesh.components == 1
+
+
+def test_the_same_with_any_number_of_threads() -> None:
+    job = SliceJob(size=20, layer=STEP, pixel=STEP, printing=Print(supports="medium"))
+    one, two = (plan_stack(mandelbulb(), job, Work(threads=n)) for n in (1, 2))
+    assert one.root.key == two.root.key
+
+
+def test_layers_of_a_fractal_show_the_same_specks_as_without() -> None:
+    job = SliceJob(size=20, layer=STEP, pixel=STEP)
+    bare, stack = plan_stack(mandelbulb(), job), supported(mandelbulb(), size=20)
+    assert stack.supports is not None
+    own, held = pictures(bare), pictures(stack)
+    lift = len(held) - len(own)
+    aside = [(len(held[0]) - len(own[0])) // 2, (held[0].shape[1] - own[0].shape[1]) // 2]
+    for picture, other in zip(own, held[lift:], strict=True):
+        part = other[aside[0] : aside[0] + len(picture), aside[1] : aside[1] + picture.shape[1]]
+        assert (part >= picture).all()
+    assert islands(held) == 0 < islands(own)
+    layers = Slicer(stack, Work(threads=1)).map(
+        lambda layer: (layer.area, int(layer.runs.end.sum() - layer.runs.begin.sum()))
+    )
+    for area, pixels in layers:
+        assert area == pytest.approx(pixels * STEP**2, rel=0.2, abs=1)
+
+
+def test_runs_of_either_layer() -> None:
+    rng = np.random.default_rng(0)
+    for shares in ((0.1, 0.8), (0, 0.5), (1, 0.3), (0.5, 0)):
+        one, other = ((rng.random((20, 31)) < share).astype(np.uint8) for share in shares)
+        both, expected = _runs(one) | _runs(other), _runs(one | other)
+        for name in ("rows", "begin", "end"):
+            assert (getattr(both, name) == getattr(expected, name)).all()
+
+
+def test_steps_are_at_most_distances() -> None:
+    rng = np.random.default_rng(1)
+    full = rng.random((30, 31, 32)) < 0.001
+    away, distance = steps_from(full, 6), distance_transform_edt(~full)
+    for steps in range(1, 6):
+        assert (distance[away > steps] > steps).all()
+        assert (away[distance > 2 * steps] > steps).all()
+
+
+def test_ways_go_around() -> None:
+    full = np.zeros((40, 40, 40), bool)
+    full[20, 8:32, 8:32] = True  # a plate
+    room = Room.around(full, np.zeros(3), 0.0, np.ones(3), 3.0)
+    start = np.array([20.5, 20.5, 36.5])
+    assert math.isinf(room.cost[room.at(start - [0, 0, 15])])  # inside the plate's surroundings
+    assert room.cost[room.at(np.array([2.5, 2.5, 36.5]))] == pytest.approx(36)
+    way = room.way(np.array([11.5, 20.5, 39.5]))
+    for one, other in pairwise(way):
+        assert room.is_free(one, other, room.wide)
+        assert math.dist(one[:2], other[:2]) <= 1.001 * (one[2] - other[2])
+    assert way[-1][2] == 0
+    assert way[-1][0] < 8
+
+
+@pytest.mark.parametrize(("first", "last"), [(0.4, 0.1), (0.1, 0.5), (0.3, 0.3), (0.1, 2.0)])
+def test_round_cones_are_exact(first: float, last: float) -> None:
+    points = np.random.default_rng(2).uniform(-2, 2, (3, 2000))
+    start, end, share = np.zeros(3), np.array([1.0, 1.0, 0.3]), np.linspace(0, 1, 2001)[:, None, None]
+    axis = start + share[..., 0] * (end - start)
+    balls = [
+        np.linalg.norm(points.T - c, axis=1) - (first + t * (last - first))
+        for c, t in zip(axis, share[:, 0, 0], strict=True)
+    ]
+    field = capsule(tuple(start), tuple(end), first, last)
+    assert field.kernel("cpu", "float64").points(*points) == pytest.approx(np.min(balls, 0), abs=1e-5)
+
+
+def test_best_direction_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fracslice.slicing.orientation.SAMPLES", 24)
+    best = orientations(MUSHROOM, Sizing(20.0), Work(threads=1))
+    assert best[0].up == (0, 0, -1) and best[0].supports == 0  # on its hat
+    assert len(best) == 5
+    for k, one in enumerate(best):
+        assert all(np.dot(one.up, other.up) < math.cos(math.radians(14.9)) for other in best[:k])
+    turned = orientations(transform(MUSHROOM, rotate=(1, 0, 0, 30)), Sizing(20.0), Work(threads=1))[0]
+    assert turned.supports < 5  # the side of its hat is one of the hull
+
+
+def test_formulas_refuse_them() -> None:
+    with pytest.raises(SceneError, match="supports: needs samples of the field"):
+        make_implicit(scene(MUSHROOM, unit=1), MeshJob(printing=Print(supports="light")), "x.3mf")
