@@ -70,6 +70,10 @@ FARTHEST = 12.0
 TRIES = 12
 """Branches and trunks that are tried, those first that save most."""
 
+SUNK = 1.2
+"""Least depth of what a strut stands on, radii: its end must not look out below, where it would be an island.
+"""
+
 LENGTHS = 2.0, 1.4, 1.0, 0.7
 """Lengths of the cones of tips, mm."""
 
@@ -431,12 +435,18 @@ class Object:
         own = np.where(steps < 0, 0.0, self.areas[np.clip(steps, 0, len(self.areas) - 1)])
         return float(((own + sections(beams, heights)) / (self.areas.max() / CARRIED)).min())
 
-    def first_below(self, points: Points, floor: float, step: float) -> NDArray[np.float64]:
-        """Heights of the first solid below points [n, 3], to a step; the floor where there is none."""
+    def first_below(
+        self, points: Points, floor: float, step: float, depths: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Heights of the first solid as deep as given below points [n, 3], to a step; the floor where there
+        is none.
+        """
         result = np.full(len(points), floor)
         left, z = np.arange(len(points)), points[:, 2] - step
         while len(left := left[z[left] > floor]):
-            full = self.values(np.column_stack([points[left, :2], z[left]])) < 0
+            ends = np.stack([z[left], z[left] - depths[left]])
+            sides = np.broadcast_to(points[left, :2], (2, len(left), 2))
+            full = (self.values(np.concatenate([sides, ends[..., None]], 2)) < 0).all(0)
             result[left[full]] = z[left[full]]
             left = left[~full]
             z[left] -= step
@@ -509,9 +519,9 @@ def support(
     cones = np.stack(
         [np.column_stack([points, tips])[led], np.column_stack([ends[led], radii[: forest.tips]])], 1
     )
-    ground = of.first_below(points[~led], room.floor, float(room.cell.min()) / 2)
-    struts = _struts(np.column_stack([points, tips])[~led], ground, strength.pillar / 2)
+    ground = of.first_below(points[~led], room.floor, float(room.cell.min()) / 2, SUNK * tips[~led])
     inner = ground > room.floor
+    struts = _struts(np.column_stack([points, tips])[~led], ground, strength.pillar / 2)
     feet = np.concatenate([feet, struts[len(ground) :, 1][~inner]])
     beams = np.concatenate([cones, branches, struts, forest.braces()])
     node, volume = _node(beams, feet, room.floor, raft, of.scale)
