@@ -19,7 +19,7 @@ from fracslice.scene.view import View
 from fracslice.slicing import SliceJob
 
 how = Print(cavities="fill", keep="largest", bridge=0, gap="0.1mm", thickness="1mm",
-            hollow=2, drain="3mm", drain_at="0,0,1", base="1mm", raft=1.5)
+            hollow=2, drain="3mm", drain_at="0,0,1", base="1mm", raft=1.5, supports="light")
 ball = Scene(sphere(), size_mm="40mm", name="ball", view=View(), printing=how, animation=None,
              tracks=(), unit_mm=None)
 unit = Scene(sphere(), None, unit_mm="1cm")
