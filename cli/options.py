@@ -287,7 +287,7 @@ class CommandOptions:
         declared: dict[str, Any] = {}
         for owner in cls.__mro__:
             for name, value in vars(owner).items():
-                if isinstance(value, partial) and name not in cls.without:
+                if isinstance(value, partial) and (owner is cls or name not in cls.without):
                     declared.setdefault(name, value)
             for record in vars(owner).get("records", ()):
                 for name, kind in record.kinds().items():

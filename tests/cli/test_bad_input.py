@@ -115,7 +115,10 @@ def test_scenes(text, message, folder, capfd):
             "mesh ball.xml -o out/x.stl --simplify 1m",
             "simplify 1000mm: expected at most 5mm for an object of",
         ),
-        ("mesh ball.xml -o out/x.stl --drain 2mm", "--drain: expected --hollow, or a hollow in the scene's"),
+        (
+            "mesh ball.xml -o out/x.stl --drain 2mm",
+            "--drain: expected --hollow, --drain-at, or a hollow",
+        ),
         ("mesh ball.xml -o out/x.stl --resolution 16384", "bricks: expected at most 8"),
         ("animate ball.xml -o out/x.gif", "ball: expected an <animation> in the scene; animate --fly"),
         ("slice ball.xml -o - --layer 1mm", "-: expected the name of a file; standard input and output"),
