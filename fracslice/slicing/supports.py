@@ -55,6 +55,11 @@ ACROSS = 2
 ROUNDS, CLOSER = 6, 0.85
 """How often the reach is shortened until enough tips carry the object, and by what at least."""
 
+LATER, WIDER = 1, 2.0
+"""Round after which tips are put beside the lowest one, too, and up to which cross-section, relative to the
+least that carries the object.
+"""
+
 SPECK, PIXELS = 0.02, 8
 """Least area of an island with a tip, mm2, and pixels, as `fracslice.checks` reports them."""
 
@@ -88,14 +93,18 @@ def supported(planned: Plan, stack: Stack, how: Print, work: Work, thinnest: flo
     survey = _Survey.of(stack, work)
     of = Object(stack.root, stack.scale, np.array(survey.areas), float(stack.heights[0]), work)
     room = survey.room(strength, how.raft)
-    for _ in range(ROUNDS):
-        contacts = survey.contacts(of, room, strength)
+    around = 0
+    for turn in range(ROUNDS):
+        contacts = survey.contacts(of, room, strength, around)
         if not len(contacts.points):
             return planned
         made, carried = support(of, room, contacts, strength, how.raft)
         if carried >= 1:
             break
         strength = replace(strength, reach=strength.reach * min(max(0.5, math.sqrt(carried)), CLOSER))
+        if turn >= LATER:
+            missing = (1 - carried) * survey.least_area
+            around += math.ceil(missing / (math.pi / 4 * strength.pillar**2))
     return _joined(planned, made, stack.scale, room, how.raft)
 
 
@@ -206,15 +215,36 @@ class _Survey:
         largest = [birth.largest for birth in held]
         return np.column_stack([self.low + (cells + 0.5) * [*pixel, height], largest])
 
-    def contacts(self, of: Object, room: Room, strength: Strength) -> Contacts:
+    @property
+    def least_area(self) -> float:
+        """Cross-section that carries the object, mm2."""
+        return max(self.areas) / CARRIED
+
+    def around(self, count: int) -> NDArray[np.int64]:
+        """Cells (z, y, x) where the object gets wider above its lowest point, spread evenly, up to where it
+        carries itself.
+        """
+        wide = np.array(self.areas[:: self.cell[2]]) > WIDER * self.least_area
+        full = np.array(self.full)[: int(wide.argmax()) + 2]
+        cells: NDArray[np.int64] = np.argwhere(full[1:] & ~full[:-1]) + np.array([1, 0, 0])
+        if not count or not len(cells):
+            return cells[:0]
+        at, chosen = cells * self.sides[::-1], [int(np.argmax(cells[:, 0]))]
+        away = np.linalg.norm(at - at[chosen[0]], axis=1)
+        while len(chosen) < count and away.max() > 0:
+            chosen.append(int(away.argmax()))
+            away = np.minimum(away, np.linalg.norm(at - at[chosen[-1]], axis=1))
+        return cells[chosen]
+
+    def contacts(self, of: Object, room: Room, strength: Strength, around: int = 0) -> Contacts:
         """Contacts of supports. What grows into the air in holes without exit has none: it is no island.
 
-        What is wide before it joins anything older has a wide one.
+        What is wide before it joins anything older has a wide one. `around`: further ones beside the lowest.
         """
         tip, begun = strength.tip / 2, self.begun
         islands = of.under(begun[:, :3], np.full(len(begun), float(self.stack.heights[0])))
         cells = _Growth(np.array(self.full), self.sides, strength.reach).tips(islands, self.low)
-        grown = self.on_surface(of, cells)
+        grown = self.on_surface(of, np.concatenate([cells, self.around(around)]))
         points = np.concatenate([islands, grown])
         wide = np.clip(np.sqrt(begun[:, 3] / CARRIED / math.pi), tip, WIDEST * tip)
         radii = np.concatenate([wide, np.full(len(grown), tip)])

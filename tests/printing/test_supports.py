@@ -12,7 +12,18 @@ from scipy.ndimage import distance_transform_edt, label
 from fracslice import MeshJob, make_mesh
 from fracslice.checks.layer_checks import check_layers
 from fracslice.errors import SceneError
-from fracslice.formulas import Node, box, capsule, cylinder, difference, mandelbulb, sphere, transform, union
+from fracslice.formulas import (
+    Node,
+    box,
+    capsule,
+    cone,
+    cylinder,
+    difference,
+    mandelbulb,
+    sphere,
+    transform,
+    union,
+)
 from fracslice.jobs.mesh import make_implicit
 from fracslice.printing.pillars import Room, steps_from
 from fracslice.scene import Print, scene
@@ -95,6 +106,13 @@ def pictures_at(stack: Stack, height: float) -> list[np.ndarray]:
 def test_a_tip_without_a_way_stands_on_the_object() -> None:
     held = supported(BALL).supports
     assert held is not None and held.tips > 4
+
+
+def test_a_cone_on_its_tip_is_held_beside_it() -> None:
+    stack = supported(transform(cone(radius=10, height=20), rotate=(1, 0, 0, 180)))
+    report = check_layers(stack, None, None, Work(threads=1))
+    assert not [problem for problem in report.problems if problem.kind == "necks"]
+    assert stack.supports is not None and 4 <= stack.supports.tips <= 60
 
 
 def test_what_hangs_in_a_cavity_is_caught() -> None:
