@@ -293,7 +293,8 @@ class _Job:
         fell = f"{thin}; expected a smaller voxel, or a thickness of {3 * scale * planned.voxel:.2g} mm"
         mesh = finish.report(made.checks.tally, chosen.misplaced)
         low, high = mesh.bbox_mm
-        sides = [scale * side for side in planned.box.size], np.subtract(high, low).tolist(), chosen.size
+        whole_box = (planned.supports and planned.supports.box) or planned.box
+        sides = [scale * side for side in whole_box.size], np.subtract(high, low).tolist(), chosen.size
         lost, shorter = lost_size("the mesh is", *sides, spacing=[scale * planned.voxel] * 3)
         near = made.checks.near_bodies
         settings = shallower(planned.root.tree, planned.voxel) if near and planned.root.tree else ()

@@ -113,6 +113,7 @@ def _joined(planned: Plan, made: Supports, scale: float, room: Room, raft: float
     low = (room.floor - raft) / scale
     box = planned.box | made.node.bounds.box
     box = replace(box, lo=(*box.lo[:2], low)) & replace(box, hi=(*box.hi[:2], planned.box.hi[2]))
+    made = replace(made, box=box)
     x, y, _ = planned.box.centre
     box = box.about((x, y, box.centre[2]))
     outer = (planned.outer | box).about(planned.outer.centre)

@@ -99,6 +99,8 @@ class Supports:
         Volume, with the feet and the raft.
     scars
         Area of all contacts.
+    box
+        Bounds of both together, scene units; None before they are joined.
     """
 
     carried: Field
@@ -109,6 +111,7 @@ class Supports:
     caught: int
     volume: float
     scars: float
+    box: Box | None = None
 
     def distances(self, points: np.ndarray) -> np.ndarray:
         """Distances of points from the supports.

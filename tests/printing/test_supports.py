@@ -115,6 +115,11 @@ def test_a_cone_on_its_tip_is_held_beside_it() -> None:
     assert stack.supports is not None and 4 <= stack.supports.tips <= 60
 
 
+def test_a_mesh_has_the_size_of_object_and_supports() -> None:
+    report = make_mesh(MUSHROOM, resolution=96, supports="medium", threads=1).report
+    assert not [note for note in report.notes if "finer than the samples" in note] and report.problems == ()
+
+
 def test_what_hangs_in_a_cavity_is_caught() -> None:
     held = supported(CAVITY).supports
     assert held is not None and held.caught == held.inner == 1
