@@ -228,6 +228,10 @@ def _run_command(command: list[str], text: str, work: Work) -> tuple[str, dict[s
         return out.read().decode(errors="replace"), used
 
 
+LAG = 64.0
+"""By how much the kernel's counters of a process with many threads may differ, MiB."""
+
+
 def _wait_for_child(child: subprocess.Popen[bytes], work: Work) -> tuple[int, Any, float]:
     """Wait for a child process; stop it if the work is cancelled. Returns its status, usage and peak memory,
     MiB.
@@ -241,7 +245,8 @@ def _wait_for_child(child: subprocess.Popen[bytes], work: Work) -> tuple[int, An
         if pid:
             child.returncode = os.waitstatus_to_exitcode(status)
             most = usage.ru_maxrss / MAXRSS
-            return child.returncode, usage, seen if seen and most <= peak_rss_mb() else most
+            inherited = most <= peak_rss_mb() + LAG
+            return child.returncode, usage, seen if seen and inherited else most
         if work.cancel.wait(min(0.02, 0.001 + (time.perf_counter() - start) / 20)):
             child.kill()
             child.wait()
