@@ -15,7 +15,8 @@ from xml.parsers import expat
 
 from ..common.parameters import REQUIRED, Choice, File, Parameter, printable
 from ..errors import SceneError
-from ..scene.layout import SCENE, SECTIONS, SOLID, registered_formulas
+from ..fields.node import FORMULAS
+from ..scene.layout import SCENE, SECTIONS, SOLID, Element
 from ..scene.model import Scene
 from ..scene.reader import reads
 
@@ -337,7 +338,7 @@ class Document:
 
     def _takes_more(self, tag: Tag) -> bool:
         """True if an element may have one more child."""
-        most = element_children(tag.name)[1]
+        most = _most_children(tag.name)
         return most is None or len(tag.children) < most
 
     def _indent(self, tag: Tag) -> str:
@@ -354,10 +355,17 @@ class Document:
         return (first, last) if alone else (tag.start, tag.end)
 
 
-def element_children(name: str) -> tuple[int, int | None]:
-    """Least and greatest number of children of an element of a name; of an unknown one, none."""
-    known = SECTIONS.get(name) or registered_formulas().get(name)
-    return (1, None) if name == SCENE.name else known.children if known else (0, 0)
+def element_of(name: str) -> Element | None:
+    """Element of a name under `<scene>`; None for one that is not known."""
+    return SECTIONS.get(name) or FORMULAS.get(name)
+
+
+def _most_children(name: str) -> int | None:
+    """Greatest number of children of an element of a name, None for any; of one that is not known, 0."""
+    if name == SCENE.name:
+        return None
+    known = element_of(name)
+    return known.children[1] if known else 0
 
 
 def _moved_place(place: Place, to: Place) -> Place:
@@ -384,7 +392,8 @@ def with_attribute(start: str, name: str, value: str | None) -> str:
 
 def required(name: str) -> dict[str, str]:
     """Values of what a new element of a name requires."""
-    element = SECTIONS.get(name) or registered_formulas()[name]
+    element = element_of(name)
+    assert element is not None
     return {a: _starting(kind) for a, kind in element.parameters.items() if kind.default is REQUIRED}
 
 

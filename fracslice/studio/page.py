@@ -17,10 +17,11 @@ from trame.widgets import html, rca
 from trame.widgets import vuetify3 as v
 
 from ..errors import FracsliceError
+from ..export.images import IMAGES
 from ..formulas import Node
 from ..viewer.viewer import MOVES, PACES, Controls
 from . import panels
-from .session import PICTURES, Studio, command, jpeg
+from .session import Studio, command, jpeg
 
 TICK = 1 / 60
 """Interval between two looks at the picture, seconds."""
@@ -318,7 +319,7 @@ class Page:
     @property
     def options(self) -> dict[str, Any]:
         """Options of the file that the page names."""
-        picture = str(self.state.file_name).lower().endswith(PICTURES)
+        picture = str(self.state.file_name).lower().endswith(IMAGES)
         return (
             {"samples": int(self.state.samples)} if picture else {"resolution": float(self.state.resolution)}
         )

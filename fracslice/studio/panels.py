@@ -9,8 +9,8 @@ from typing import Any
 from ..common.parameters import REQUIRED, Choice, Count, File, Flag, Length, Number, Parameter, Vector
 from ..fields.registry import Formula
 from ..fields.varying import Variable
-from ..scene.layout import SECTIONS, Element, formulas
-from .document import Document, Tag
+from ..scene.layout import SECTIONS, formulas
+from .document import Document, Tag, element_of
 
 Control = dict[str, Any]
 """Of an attribute, as JSON: its name, kind, text, limits, help."""
@@ -31,11 +31,6 @@ def controls(tag: Tag) -> list[Control]:
     if element is None:
         return []
     return [_control(name, kind, tag.attributes.get(name)) for name, kind in element.parameters.items()]
-
-
-def element_of(name: str) -> Element | None:
-    """Element of a name."""
-    return SECTIONS.get(name) or next((formula for formula in formulas() if formula.name == name), None)
 
 
 def _control(name: str, kind: Parameter, text: str | None) -> Control:

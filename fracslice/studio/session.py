@@ -18,18 +18,20 @@ from numpy.typing import NDArray
 from ..common.files import replacing
 from ..common.parameters import AUTO, Number
 from ..errors import Cancelled, FracsliceError, SceneError
+from ..export.images import IMAGES
 from ..fields.box import Box, Triple
 from ..fields.registry import Fixed
-from ..formats import SOLIDS
+from ..formats import ENDINGS, SOLIDS
 from ..formulas import Node, intersection, plane
 from ..rendering import Renderer
 from ..rendering.live import CameraInput, Live, Shown
 from ..scene import library
 from ..scene.layout import SOLID, varied
-from ..scene.model import Scene
+from ..scene.model import Scene, part_to_xml
 from ..scene.view import Camera
 from ..work import Work
 from .document import Document, Place, Tag, with_attribute
+from .panels import controls
 
 NEARER = 1.1
 """Factor of a step of the wheel on the distance from the target."""
@@ -39,10 +41,6 @@ DEGREES = 0.35
 
 THUMBNAIL, SAMPLES = (200, 150), 4
 """Pixels of the picture of a variation, and samples of each."""
-
-PICTURES, MESHES = (".png", ".jpg", ".webp", ".exr"), (".stl", ".3mf", ".ply", ".obj", ".glb")
-"""Files that are made, by their extensions."""
-
 
 NUDGE = 2.0**-30
 """By what a number is off, relative to it, that would otherwise be a constant of the code."""
@@ -211,9 +209,8 @@ class Studio:
         for _ in range(count):
             self._drawn += 1
             other = varied(scene, (self._seed, self._drawn), spread)
-            *_, done = Renderer(loosened(other.root), view, THUMBNAIL, self._work, self._device).passes(
-                SAMPLES
-            )
+            renderer = Renderer(loosened(other.root), view, THUMBNAIL, self._work, self._device)
+            *_, done = renderer.passes(SAMPLES)
             yield other.root, done.shown
 
     def take(self, root: Node) -> None:
@@ -224,9 +221,8 @@ class Studio:
         """Write the numbers of a tree that has the elements of the document."""
         document = self.document
         pairs = zip(root.walk(), document.scene.root.walk(), strict=True)
-        nodes = [
-            (node, old) for node, old in pairs if old.place
-        ]  # others are unions of what has no element around
+        # what has no place is the union of elements side by side
+        nodes = [(node, old) for node, old in pairs if old.place]
         tags = [tag for tag in document.root.walk() if len(tag.place) > 1 and self._is_of_solid(tag)]
         text = document.text
         for tag, (node, before) in reversed(list(zip(tags, nodes, strict=True))):
@@ -271,8 +267,6 @@ class Studio:
 
     def set_number(self, place: Place, attribute: str, index: int, value: float) -> None:
         """Change one of the numbers of an attribute."""
-        from .panels import controls
-
         tag = self.document.find(place)
         control = next((c for c in controls(tag) if c["name"] == attribute), None) if tag else None
         if control is None or "values" not in control:
@@ -311,8 +305,6 @@ class Studio:
         self.edit(self._write_camera, self.live.camera)
 
     def _write_camera(self, camera: Camera) -> None:
-        from ..scene.model import part_to_xml
-
         eye, target, up = map(_rounded, (camera.eye, camera.target, camera.up))
         document, line = self.document, part_to_xml(replace(camera, eye=eye, target=target, up=up))
         tag = next((t for t in document.root.children if t.name == "camera"), None)
@@ -323,13 +315,12 @@ class Studio:
             text = f"{document.text[:end]}  {line}\n{document.text[end:]}"
         document.write(text)
 
-    def save(self, name: str = "") -> None:
-        """Write the text into its file, or into another one of the folder."""
-        path = self._inside(name) if name else self.target
-        with replacing(path) as file:
+    def save(self) -> None:
+        """Write the text into its file."""
+        with replacing(self.target) as file:
             file.write(self.document.text.encode())
-        self.target, self.document.saved = path, self.document.text
-        self.message = f"saved {path.name}"
+        self.document.saved = self.document.text
+        self.message = f"saved {self.target.name}"
 
     def _inside(self, name: str) -> Path:
         path = (self.folder / name).resolve()
@@ -343,8 +334,8 @@ class Studio:
             self.message = f"{self.job.path.name} is being made; cancel it first"
             return
         path = self._inside(name)
-        if path.suffix.lower() not in (*PICTURES, *MESHES):
-            raise SceneError(f"{name}: expected a file of {', '.join((*PICTURES, *MESHES))}")
+        if path.suffix.lower() not in (*IMAGES, *ENDINGS):
+            raise SceneError(f"{name}: expected a file of {', '.join((*IMAGES, *ENDINGS))}")
         job = self.job = Job(path)
         arguments = job, self.document.scene, self.live.camera, options
         self._worker = threading.Thread(target=self._make, args=arguments, name="fracslice job")
@@ -356,7 +347,7 @@ class Studio:
 
         how: dict[str, Any] = {"progress": job.progress, "cancel": job.cancel, "threads": self._work.threads}
         try:
-            if job.path.suffix.lower() in PICTURES:
+            if job.path.suffix.lower() in IMAGES:
                 seen = replace(scene, view=replace(scene.view, camera=camera))
                 render(seen, **options, **how).save(job.path)
                 job.result = f"{job.path.name} is written"
@@ -383,7 +374,7 @@ def _triple(array: NDArray[np.float64]) -> Triple:
 
 def command(target: Path, name: str, options: dict[str, Any]) -> str:
     """Command line that makes the same file."""
-    verb = "render" if Path(name).suffix.lower() in PICTURES else "mesh"
+    verb = "render" if Path(name).suffix.lower() in IMAGES else "mesh"
     given = "".join(f" --{option} {value}" for option, value in options.items())
     return f"fracslice {verb} {target.name} -o {name}{given}"
 

@@ -23,6 +23,7 @@ from ..fields.registry import Node
 from ..formulas import box as cuboid
 from ..formulas import cylinder, difference, intersection, plane, transform, union
 from ..records import PartsJob, Placed
+from ..scene.calibration import SEGMENTS
 from ..work import Work
 from . import with_depths
 from .amount import orient_field, sizing
@@ -49,8 +50,6 @@ FAR, MOST_PEGS = 60.0, 4
 """Distance from which on a joint has more than two pegs, and most of them."""
 HEIGHTS, DEPTH, OVER = (8.0, 5.0, 3.0), 0.6, 0.2
 """Heights of the digits that are tried, their depth, and what they are higher than that."""
-SEGMENTS = ("abcdef", "bc", "abged", "abgcd", "fgbc", "afgcd", "afgedc", "abc", "abcdefg", "abcdfg")
-"""Segments of each digit: a on top, then clockwise to f, and g in the middle."""
 UNEVEN, BARE = 0.02, 10.0
 """What parts of unequal length cost, by the square of their relative difference, and a plane without a place
 for a peg. A plane that cuts thin things alone costs 1.
@@ -470,7 +469,7 @@ class _Division:
         wide, bar, pitch = 0.5 * height, height / 7, 0.8 * height
         for n, digit in enumerate(text):
             start = (n - (len(text) - 1) / 2) * pitch
-            for segment in SEGMENTS[int(digit)]:
+            for segment in SEGMENTS[digit]:
                 u, v, across, along = _bar(segment, wide, height, bar)
                 size = np.abs(right) * across + np.abs(up) * along + np.abs(normal) * (DEPTH + OVER)
                 at = middle + (start + u) * right + v * up - (DEPTH - OVER) / 2 * normal
