@@ -150,8 +150,7 @@ def scene_path(source: str) -> Path:
 
     if is_model(source) and Path(source).is_file():
         raise BadInput(f"{source}: expected a scene, found a model")
-    bare = Path(source).name == source and not Path(source).suffix
-    return Path(source) if Path(source).exists() or not bare else library.path(source)
+    return library.file_of(source)
 
 
 def load_scene(source: str, settings: Iterable[str] = ()) -> Scene:

@@ -49,6 +49,13 @@ def path(name: str) -> Path:
     raise SceneError(f"{name}: no such scene; {hint(name, {*names(), *gallery()})}")
 
 
+def file_of(source: str) -> Path:
+    """Return the file that a source names: one on disk, or a scene that ships if it is a bare name."""
+    file = Path(source)
+    bare = file.name == source and not file.suffix
+    return file if file.exists() or not bare else path(source)
+
+
 def about(name: str) -> str:
     """Return the description of a shipped scene: its first comment, on one line."""
     comment = _COMMENT.search(path(name).read_text(encoding="utf-8"))

@@ -596,19 +596,12 @@ class Page:
                 v.VBtn("Cancel", v_if="!job.done", size="small", variant="text", click=self.cancel)
 
     def _dialogs(self) -> None:
-        for flag, title, around in (("adding", "Add an element", False), ("wrapping", "Wrap it in", True)):
-            with v.VDialog(v_model=(flag,), width=560), v.VCard(title=title):
-                v.VTextField(v_model=("search",), label="Search", autofocus=True, classes="mx-4")
-                shown = "choices.filter(c => (c.name + c.doc).includes(search)"
-                shown += " && (c.kind != 'shape' && c.kind != 'part'))" if around else ")"
-                with v.VList(density="compact", style="max-height: 60vh; overflow: auto"):
-                    v.VListItem(
-                        v_for=f"c in {shown}",
-                        key="c.name",
-                        title=("c.name",),
-                        subtitle=("c.doc",),
-                        click=(self.add, f"[c.name, {str(around).lower()}]"),
-                    )
+        found = "choices.filter(c => (c.name + c.doc).includes(search)"
+        around = f"{found} && c.kind != 'shape' && c.kind != 'part')"
+        self._list("adding", "Add an element", f"{found})", "c.doc", (self.add, "[c.name, false]"))
+        self._list("wrapping", "Wrap it in", around, "c.doc", (self.add, "[c.name, true]"))
+        scenes = "scenes.filter(name => name.includes(search)).map(name => ({name}))"
+        self._list("opening", "Open a scene", scenes, "''", (self.open, "[c.name]"))
         with v.VDialog(v_model=("varying",), width=700), v.VCard(title="Variations: click to go on from one"):
             with html.Div(classes="d-flex flex-wrap justify-center", style="min-height: 480px"):
                 html.Img(
@@ -629,15 +622,6 @@ class Page:
                     hide_details=True,
                 )
                 v.VBtn("Others", click=self.vary, variant="text")
-        with v.VDialog(v_model=("opening",), width=460), v.VCard(title="Open a scene"):
-            v.VTextField(v_model=("search",), label="Search", autofocus=True, classes="mx-4")
-            with v.VList(density="compact", style="max-height: 60vh; overflow: auto"):
-                v.VListItem(
-                    v_for="name in scenes.filter(name => name.includes(search))",
-                    key="name",
-                    title=("name",),
-                    click=(self.open, "[name]"),
-                )
         with v.VDialog(v_model=("helping",), width=460), v.VCard(title="Help"), v.VTable(), html.Tbody():
             for keys, meaning in HELP:
                 with html.Tr():
@@ -648,6 +632,17 @@ class Page:
             v.VTextField(v_model=("resolution",), type="number", label="Voxels along the longest side")
             v.VTextField(v_model=("samples",), type="number", label="Samples a pixel, of a picture")
             v.VBtn("Make", click=(self.make_and_close,), color="primary")
+
+    def _list(
+        self, flag: str, title: str, rows: str, about: str, click: tuple[Callable[..., None], str]
+    ) -> None:
+        """Dialog with a search and the rows `c` that it leaves, each with its name and what is about it."""
+        with v.VDialog(v_model=(flag,), width=560), v.VCard(title=title):
+            v.VTextField(v_model=("search",), label="Search", autofocus=True, classes="mx-4")
+            with v.VList(density="compact", style="max-height: 60vh; overflow: auto"):
+                v.VListItem(
+                    v_for=f"c in {rows}", key="c.name", title=("c.name",), subtitle=(about,), click=click
+                )
 
     def make_and_close(self) -> None:
         """Make the file and close the dialog."""

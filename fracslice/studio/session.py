@@ -386,14 +386,12 @@ def opened(source: str, folder: Path, files_outside: bool) -> tuple[Document, Pa
         name, place = SOLIDS[path.suffix.lower()], path.with_suffix(".xml")
         text = f'<scene version="1">\n  <solid unit="1mm">\n    <{name} file="{escape(path.name)}"/>\n'
         return Document(f"{text}  </solid>\n</scene>\n", place, files_outside), folder / place.name
-    shipped = not path.exists() and path.name == source and not path.suffix
-    file = library.path(source) if shipped else path
+    file = library.file_of(source)
     try:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise SceneError(f"{source}: {getattr(error, 'strerror', None) or error}") from None
-    target = folder / file.name if shipped else path
-    return Document(text, file, files_outside), target
+    return Document(text, file, files_outside), path if file == path else folder / file.name
 
 
 def jpeg(pixels: NDArray[np.uint8], quality: int) -> bytes:
