@@ -141,8 +141,12 @@ class CameraInput:
         return camera.rolled(TURN * seconds * self.roll) if self.roll else camera
 
 
-WITHIN = 0.05
+WITHIN = 0.035
 """Aim for the time of a draft, seconds."""
+REST = 0.1
+"""Time without a move after which the picture sharpens, seconds."""
+SLOWER, STEADY = 1.5, 0.3
+"""Ratio of the time of drafts to that, above which they are coarser, and the weight of the last one in it."""
 COARSEST = 8
 """Largest spacing of a draft's pixels."""
 FARTHEST = 100.0
@@ -184,6 +188,7 @@ class Live:
         self._drafting = replace(self._refining, cancel=threading.Event())  # input must not stop a draft
         self._lock = threading.Lock()
         self._camera_input, self._spacing = CameraInput(), COARSEST // 2
+        self._cost = WITHIN * self._spacing**2  # time of a draft with all pixels, seconds
         self._stepped = time.monotonic()
         self.making: float | None = None
         self._aim: Camera
@@ -277,8 +282,8 @@ class Live:
         try:
             if aim != self.camera or size != self._drawn:
                 self._draft(self._drafts, aim, size)
-            elif not self._refine():
-                self._refining.cancel.wait(POLL)
+            elif self.shown.samples or not self._refining.cancel.wait(REST):
+                self._sharpen()
         except SceneError:  # the eye is inside the solid
             with self._lock:
                 self._aim = self.camera
@@ -302,20 +307,22 @@ class Live:
         coarse = max(size[0] // self._spacing, 1), max(size[1] // self._spacing, 1)
         renderer = self._made(drafts, camera, coarse)
         start = time.monotonic()
-        *_, done = renderer.passes(1)
+        pixels = renderer.draft().shown
         seconds = time.monotonic() - start
         seen = camera or renderer.setup.camera
-        self.shown = Shown(done.shown, 0.0, seen, drafts.distance, self._problem)
+        self.shown = Shown(pixels, 0.0, seen, drafts.distance, self._problem)
         self._drafts, self._drawn, self._passes = drafts, size, self._sharpened()
-        if seconds > 1.5 * WITHIN:
+        self._cost += STEADY * (seconds * self._spacing**2 - self._cost)
+        if self._cost > SLOWER * WITHIN * self._spacing**2:
             self._spacing = min(self._spacing + 1, COARSEST)
-        elif seconds < WITHIN / 2:
-            self._spacing = max(self._spacing - 1, 1)
+        elif self._cost < WITHIN * (self._spacing - 1) ** 2:
+            self._spacing -= 1
 
-    def _refine(self) -> bool:
-        """Add a pass to the picture at rest; False if it is complete."""
+    def _sharpen(self) -> None:
+        """Add a pass to the picture at rest, or wait if it is complete."""
         try:
-            return next(self._passes, None) is not None
+            if next(self._passes, None) is None:
+                self._refining.cancel.wait(POLL)
         except Cancelled:  # ends a generator
             self._passes = self._sharpened()
             raise

@@ -176,7 +176,8 @@ class Studio:
         if root != scene.root:
             work = replace(self._work, threads=1, cancel=threading.Event())
             make = partial(Renderer, root, scene.view, (16, 16), work, self._device)
-            threading.Thread(target=make, name="fracslice compiling", daemon=True).start()
+            # no daemon: a process must not end while it compiles
+            threading.Thread(target=make, name="fracslice compiling").start()
 
     def close(self) -> None:
         """Stop rendering and the job."""
