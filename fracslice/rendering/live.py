@@ -15,6 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from ..errors import Cancelled, FracsliceError, SceneError
+from ..fields.depth import with_depths_of
 from ..fields.registry import Node
 from ..scene.model import Scene
 from ..scene.reader import read
@@ -53,16 +54,22 @@ class Follower:
         """True if depth and precision suit the camera's distance to the surface."""
         assert self._renderer
         try:
-            distance = clearance(self._renderer.setup.root, camera)
+            distance = clearance(self.root, camera)
         except SceneError:  # inside the solid at this depth
             return False
         return self._distance_then / NEARER < distance < self._distance_then * NEARER
 
     @property
+    def root(self) -> Node:
+        """The scene with the depths that suit the camera's distance to the surface."""
+        assert self._renderer
+        return self._renderer.setup.root
+
+    @property
     def distance(self) -> float:
         """Lower bound of the distance from the camera to the surface, scene units."""
         assert self._renderer
-        return clearance(self._renderer.setup.root, self._renderer.setup.camera)
+        return clearance(self.root, self._renderer.setup.camera)
 
 
 POLL = 0.2
@@ -192,6 +199,7 @@ class Live:
         self._stepped = time.monotonic()
         self.making: float | None = None
         self._aim: Camera
+        self._resolved: Node | None = None  # the scene of the last draft, with its depths
         self._load(source.read(), None)
         self.first = self.camera
         self._farthest = FARTHEST * math.dist(self.first.eye, self.first.target)
@@ -311,7 +319,7 @@ class Live:
         seconds = time.monotonic() - start
         seen = camera or renderer.setup.camera
         self.shown = Shown(pixels, 0.0, seen, drafts.distance, self._problem)
-        self._drafts, self._drawn, self._passes = drafts, size, self._sharpened()
+        self._resolved, self._drawn, self._passes = drafts.root, size, self._sharpened()
         self._cost += STEADY * (seconds * self._spacing**2 - self._cost)
         if self._cost > SLOWER * WITHIN * self._spacing**2:
             self._spacing = min(self._spacing + 1, COARSEST)
@@ -343,9 +351,14 @@ class Live:
 
     def _load(self, scene: Scene, camera: Camera | None) -> None:
         """Show a scene from a camera, or from its own; if that fails, the former scene stays."""
-        drafts = Follower(scene.root, scene.view, self._drafting, self._device)
+        # the depths of the scene before do for the first draft; to choose them takes longer than to draw it
+        near = with_depths_of(scene.root, self._resolved) if self._resolved else scene.root
+        drafts = Follower(near, scene.view, self._drafting, self._device)
         self._problem = ""
         self._draft(drafts, camera or scene.view.camera, self._size)
+        if near is not scene.root:
+            drafts = Follower(scene.root, scene.view, self._drafting, self._device)
+        self._drafts = drafts
         self._finals = Follower(scene.root, scene.view, self._refining, self._device)
         self.scene = scene
         with self._lock:
