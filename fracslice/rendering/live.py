@@ -201,8 +201,6 @@ class Live:
         self._aim: Camera
         self._resolved: Node | None = None  # the scene of the last draft, with its depths
         self._load(source.read(), None)
-        self.first = self.camera
-        self._farthest = FARTHEST * math.dist(self.first.eye, self.first.target)
         self._open = True
         self._failure: BaseException | None = None
         self._thread = threading.Thread(target=self._run, name="fracslice live", daemon=True)
@@ -218,6 +216,12 @@ class Live:
         """Camera that the picture follows."""
         with self._lock:
             return self._aim
+
+    @property
+    def root(self) -> Node:
+        """Scene of the picture, with the depths of its last draft."""
+        assert self._resolved
+        return self._resolved
 
     @property
     def size(self) -> tuple[int, int]:
@@ -361,6 +365,9 @@ class Live:
         self._drafts = drafts
         self._finals = Follower(scene.root, scene.view, self._refining, self._device)
         self.scene = scene
+        if camera is None:
+            self.first = self.camera
+            self._farthest = FARTHEST * math.dist(self.first.eye, self.first.target)
         with self._lock:
             self._aim = self.camera
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import base64
+import math
 import os
 import secrets
+import time
 import webbrowser
 from collections.abc import Awaitable, Callable
 from typing import Any, Literal
@@ -33,18 +35,27 @@ PENDING = 2
 """Frames that a page may have to fetch still before others are left out."""
 
 HELP = (
-    ("drag", "turn around the target"),
+    ("drag", "turn around what is under the mouse"),
     ("shift or right drag", "look around"),
-    ("wheel", "come nearer, go away"),
+    ("wheel", "come nearer to what is under the mouse, go away"),
+    ("double click", "walk to what is under the mouse"),
+    ("X", "focus on what is under the mouse"),
     ("W S A D R F, Q E", "fly, roll"),
     ("1 to 9", "pace"),
     ("V", "first view"),
+    (", .", "the view before, after"),
     ("ctrl Z, ctrl Y", "undo, redo"),
     ("?", "this help"),
 )
 
 CONTROL = {"z": "undo", "y": "redo"}
 """What keys do with ctrl."""
+
+ACTIONS = ("v", ",", ".", "?")
+"""Keys of the picture that do something once."""
+
+TWICE, NEAR = 0.35, 5.0
+"""Longest time between the clicks of a double click, seconds, and their distance, pixels."""
 
 AREA = "picture"
 
@@ -68,8 +79,9 @@ class Frames:
         self._studio, self._act = studio, act
         self._streamer: Any = None
         self._sent: object = None
-        self._grip: tuple[float, float] | None = None
-        self._looking = False
+        self._pressed, self._pressed_at = 0.0, (0.0, 0.0)
+        self._drag: Callable[[float, float], None] | None = None
+        self.mouse = 0.0, 0.0  # pixels from the upper left corner
         self.controls = Controls()
 
     def set_streamer(self, streamer: Any) -> None:
@@ -87,21 +99,32 @@ class Frames:
 
     def on_interaction(self, _: str, event: dict[str, Any]) -> None:
         """Do what an event of the mouse or a key says."""
-        kind = event.get("type", "")
-        at = float(event.get("x", 0)), float(event.get("y", 0))
-        if kind in ("LeftButtonPress", "RightButtonPress", "MiddleButtonPress"):
-            self._grip, self._looking = at, kind != "LeftButtonPress" or bool(event.get("shiftKey"))
-        elif kind.endswith("ButtonRelease"):
-            self._grip = None
-        elif kind == "MouseMove" and self._grip:
-            right, up = at[0] - self._grip[0], at[1] - self._grip[1]
-            self._grip = at
-            turn = self._studio.look_around if self._looking else self._studio.orbit
-            turn(right, -up)
-        elif kind == "MouseWheel":
-            self._studio.approach(1.0 if event.get("spinY", 0) < 0 else -1.0)
-        elif kind in ("KeyDown", "KeyPress", "KeyUp"):
+        kind, views = event.get("type", ""), self._studio.views
+        if kind in ("KeyDown", "KeyPress", "KeyUp"):
             self.key(str(event.get("key", "")).lower(), kind != "KeyUp", bool(event.get("controlKey")))
+            return
+        x, y = self.mouse
+        if "x" in event:
+            self.mouse = float(event["x"]), self._studio.live.size[1] - float(event["y"])
+        if kind.endswith("ButtonPress"):
+            self._press(kind == "LeftButtonPress" and not event.get("shiftKey"))
+        elif kind.endswith("ButtonRelease"):
+            self._drag = None
+        elif kind == "MouseMove" and self._drag:
+            self._drag(self.mouse[0] - x, self.mouse[1] - y)
+        elif kind == "MouseWheel":
+            views.approach(1.0 if event.get("spinY", 0) < 0 else -1.0, self.mouse)
+
+    def _press(self, around: bool) -> None:
+        """Begin a drag around the point under the mouse or in place; a second click walks there."""
+        views, now = self._studio.views, time.monotonic()
+        if now - self._pressed < TWICE and math.dist(self.mouse, self._pressed_at) < NEAR:
+            views.walk_to(self.mouse)
+            return
+        self._pressed, self._pressed_at = now, self.mouse
+        self._drag = views.orbit if around else views.look_around
+        if around:
+            views.grip(self.mouse)
 
     def key(self, key: str, down: bool, control: bool = False) -> None:
         """Press or release a key."""
@@ -112,7 +135,9 @@ class Frames:
             self.controls.release(key)
         elif key in MOVES or key in PACES:
             self.controls.press(key)
-        elif key in ("v", "?"):
+        elif key == "x":
+            self._studio.focus_on(self.mouse)
+        elif key in ACTIONS:
             self._act(key)
 
     async def send(self) -> None:
@@ -191,7 +216,9 @@ class Page:
         """Do what a key of the picture or of the page means."""
         document = self.studio.document
         if key == "v":
-            self.studio.home()
+            self.studio.views.home()
+        elif key in (",", "."):
+            self.studio.views.back(1 if key == "," else -1)
         elif key == "?":
             with self.state as state:
                 state.helping = not state.helping
@@ -332,7 +359,8 @@ class Page:
     async def follow(self) -> None:
         """Steer by the keys that are held, send frames, and say how far things are, until the server ends."""
         while True:
-            self.studio.steer(self.frames.controls.input)
+            self.studio.views.steer(self.frames.controls.input)
+            self.studio.views.advance()
             await self.frames.send()
             self._say()
             await asyncio.sleep(TICK)
@@ -417,6 +445,8 @@ class Page:
                 ("mdi-redo", "Redo", "redo", "redoes == 0"),
                 ("mdi-content-save", "Save", "save", "false"),
                 ("mdi-home", "First view", "v", "false"),
+                ("mdi-arrow-left", "View before", ",", "false"),
+                ("mdi-arrow-right", "View after", ".", "false"),
                 ("mdi-help", "Help", "?", "false"),
             ):
                 v.VBtn(icon=icon, click=(self.act, f"['{act}']"), disabled=(off,), raw_attrs=named(label))

@@ -24,7 +24,7 @@ from ..fields.registry import Fixed
 from ..formats import ENDINGS, SOLIDS
 from ..formulas import Node, intersection, plane
 from ..rendering import Renderer
-from ..rendering.live import CameraInput, Live, Shown
+from ..rendering.live import Live, Shown
 from ..scene import library
 from ..scene.layout import SOLID, varied
 from ..scene.model import Scene, part_to_xml
@@ -32,15 +32,13 @@ from ..scene.view import Camera
 from ..work import Work
 from .document import Document, Place, Tag, with_attribute
 from .panels import controls
-
-NEARER = 1.1
-"""Factor of a step of the wheel on the distance from the target."""
-
-DEGREES = 0.35
-"""Angle that a drag turns by, for each pixel."""
+from .views import Pixel, Views, depth_of
 
 THUMBNAIL, SAMPLES = (200, 150), 4
 """Pixels of the picture of a variation, and samples of each."""
+
+LENS = 0.01
+"""Radius of the lens that a camera is given when it is first focused, of the distance that is in focus."""
 
 NUDGE = 2.0**-30
 """By what a number is off, relative to it, that would otherwise be a constant of the code."""
@@ -164,6 +162,7 @@ class Studio:
         self.document, self.target = opened(source, folder, files_outside)
         self._scene = Latest(self.document.scene)
         self.live = Live(self._scene, work=self._work, device=device)
+        self.views = Views(self.live)
         self._compile_ahead()
         self.message = ""
         self.job: Job | None = None
@@ -195,6 +194,7 @@ class Studio:
         """Open another scene, seen by its own camera."""
         self.document, self.target = opened(source, self.folder, self._files_outside)
         self.section = None
+        self.views.forget()
         self._scene.put(self.document.scene)
         self.live.wake()
 
@@ -276,34 +276,19 @@ class Studio:
         numbers[index] = value
         self.edit(self.document.set_value, place, attribute, " ".join(f"{n:.6g}" for n in numbers))
 
-    def orbit(self, right: float, down: float) -> None:
-        """Turn around the target as a drag by some pixels says."""
-        camera = self.live.aim
-        turned = camera.turned(DEGREES * right, -DEGREES * down)
-        back = np.subtract(camera.target, turned.target)
-        self.live.look(replace(turned, eye=_triple(np.add(turned.eye, back)), target=camera.target))
-
-    def look_around(self, right: float, down: float) -> None:
-        """Turn in place as a drag by some pixels says."""
-        self.live.turn(-DEGREES / 2 * right, DEGREES / 2 * down)
-
-    def approach(self, steps: float) -> None:
-        """Come nearer to the target, or go away from it."""
-        camera = self.live.aim
-        arm = np.subtract(camera.eye, camera.target) * NEARER**-steps
-        self.live.look(replace(camera, eye=_triple(np.add(camera.target, arm))))
-
-    def steer(self, steering: CameraInput) -> None:
-        """Fly."""
-        self.live.steer(steering)
-
-    def home(self) -> None:
-        """Return to the first view."""
-        self.live.look(self.live.first)
-
     def keep_view(self) -> None:
         """Write the camera into the scene."""
         self.edit(self._write_camera, self.live.camera)
+
+    def focus_on(self, at: Pixel) -> None:
+        """Write the camera into the scene, focused on what is under the mouse."""
+        point, camera = self.views.surface_at(at), self.live.camera
+        if point is None or camera.kind != "perspective":
+            self.message = "no surface of a perspective view is there"
+            return
+        depth = depth_of(camera, point)
+        lens = camera.aperture or float(f"{LENS * depth:.2g}")
+        self.edit(self._write_camera, replace(camera, aperture=lens, focus=float(f"{depth:.6g}")))
 
     def _write_camera(self, camera: Camera) -> None:
         eye, target, up = map(_rounded, (camera.eye, camera.target, camera.up))
@@ -365,11 +350,6 @@ class Studio:
 def _rounded(numbers: Triple) -> Triple:
     """Numbers with nine digits."""
     x, y, z = (float(f"{number:.9g}") for number in numbers)
-    return x, y, z
-
-
-def _triple(array: NDArray[np.float64]) -> Triple:
-    x, y, z = array.tolist()
     return x, y, z
 
 
