@@ -18,12 +18,15 @@ from trame.ui.vuetify3 import VAppLayout
 from trame.widgets import html, rca
 from trame.widgets import vuetify3 as v
 
+from ..common.messages import format_count
 from ..errors import FracsliceError
 from ..export.images import IMAGES
 from ..formulas import Node
 from ..viewer.viewer import MOVES, PACES, Controls
 from . import panels
-from .session import Studio, command, jpeg
+from .film_page import HEIGHT, FilmPanel
+from .session import FILMS, Studio, command, jpeg
+from .widgets import named, named_by
 
 TICK = 1 / 60
 """Interval between two looks at the picture, seconds."""
@@ -57,17 +60,13 @@ ACTIONS = ("v", ",", ".", "?")
 TWICE, NEAR = 0.35, 5.0
 """Longest time between the clicks of a double click, seconds, and their distance, pixels."""
 
+BAR = 48
+"""Height of the bar above the picture, pixels."""
+
+NARROW = 900
+"""Width of a page below which the text covers the picture, pixels."""
+
 AREA = "picture"
-
-
-def named(label: str, title: str = "") -> list[str]:
-    """Attributes that name a control, for those who see it and those who do not."""
-    return [f'aria-label="{label}"', f'title="{title or label}"']
-
-
-def named_by(expression: str) -> list[str]:
-    """The same of an expression of the page."""
-    return [f':aria-label="{expression}"']
 
 
 class Frames:
@@ -188,6 +187,7 @@ class Page:
             }
         )
         self._sheet: list[Node] = []
+        self.film = FilmPanel(self)
         self.refresh()
         self.state.change("xml")(self.write)
         self.ctrl.on_server_bind.add(self.guard)
@@ -200,12 +200,13 @@ class Page:
         tag = document.chosen
         with self.state as state:
             state.rows = panels.outline(document)
-            state.panel = panels.controls(tag) if tag else []
+            state.panel = panels.controls(self.studio.at_time(tag)) if tag else []
             state.at = list(document.version.at)
             state.tag = tag.name if tag else ""
             state.xml = document.text
             state.problem = document.problem or self.studio.message
             state.undoes, state.redoes, state.saved = document.undoes, document.redoes, document.is_saved
+            self.film.refresh()
 
     def edit(self, change: Callable[..., None], *arguments: Any) -> None:
         """Change the document and the page."""
@@ -313,8 +314,12 @@ class Page:
 
     def set_text(self, name: str, value: str | None) -> None:
         """Give an attribute of the chosen element a text; none takes it away."""
-        document = self.studio.document
-        self.edit(document.set_value, document.version.at, name, value or None)
+        self.studio.set_value(self.studio.document.version.at, name, value or None)
+        self.refresh()
+
+    def value_of(self, name: str) -> str:
+        """Text of an attribute of the chosen element, as its control shows it."""
+        return str(next(control["text"] for control in self.state.panel if control["name"] == name))
 
     def set_number(self, name: str, index: int, value: Any) -> None:
         """Give a number of an attribute a value."""
@@ -346,10 +351,9 @@ class Page:
     @property
     def options(self) -> dict[str, Any]:
         """Options of the file that the page names."""
-        picture = str(self.state.file_name).lower().endswith(IMAGES)
-        return (
-            {"samples": int(self.state.samples)} if picture else {"resolution": float(self.state.resolution)}
-        )
+        if str(self.state.file_name).lower().endswith((*IMAGES, *FILMS)):
+            return {"samples": int(self.state.samples)}
+        return {"resolution": float(self.state.resolution)}
 
     def cancel(self) -> None:
         """Cancel what is being made."""
@@ -360,15 +364,16 @@ class Page:
         """Steer by the keys that are held, send frames, and say how far things are, until the server ends."""
         while True:
             self.studio.views.steer(self.frames.controls.input)
-            self.studio.views.advance()
+            self.studio.advance()
             await self.frames.send()
+            self.film.follow()
             self._say()
             await asyncio.sleep(TICK)
 
     def _say(self) -> None:
         """Bring the line below the picture, and that of the job, up to date."""
         shown, job = self.studio.shown, self.studio.job
-        state = "draft" if shown.samples < 1 else f"{shown.samples:.0f} samples a pixel"
+        state = "draft" if shown.samples < 1 else f"{format_count(round(shown.samples), 'sample')} a pixel"
         making = "   compiling ..." if self.studio.live.making else ""
         status = f"{state}   surface at {shown.distance:.2g}   pace {self.frames.controls.pace:.2g}{making}"
         told = {}
@@ -428,10 +433,13 @@ class Page:
                 self._tree()
                 v.VDivider()
                 self._panel()
-            with v.VNavigationDrawer(v_model=("editing",), location="right", width=460):
+            with v.VNavigationDrawer(
+                v_model=("editing",), location="right", width=460, mobile_breakpoint=NARROW
+            ):
                 self._editor()
             with v.VMain(style="height: 100vh"):
                 self._picture()
+                self.film.build()
             self._dialogs()
         self.layout = layout
 
@@ -456,6 +464,7 @@ class Page:
                 raw_attrs=named("Write this view into the scene"),
             )
             v.VBtn(icon="mdi-xml", click="editing = !editing", raw_attrs=named("Text", "Text of the scene"))
+            v.VBtn(icon="mdi-filmstrip", click=self.film.toggle, raw_attrs=named("Film"))
             v.VBtn(icon="mdi-cube-send", click="making = true", raw_attrs=named("Make a file", "Make a file"))
             v.VBtn(
                 icon="mdi-theme-light-dark",
@@ -511,6 +520,14 @@ class Page:
                         variant="text",
                         click=(self.set_text, "[c.name, null]"),
                         raw_attrs=named_by("'reset ' + c.name"),
+                    )
+                    v.VBtn(
+                        v_if="filming",
+                        icon="mdi-rhombus",
+                        size="x-small",
+                        variant="text",
+                        click=(self.film.key_value, "[c.name]"),
+                        raw_attrs=named_by("'keyframe of ' + c.name"),
                     )
                 with (
                     html.Template(v_if="c.kind == 'slider'"),
@@ -568,7 +585,8 @@ class Page:
         )
 
     def _picture(self) -> None:
-        with html.Div(style="position: relative; height: calc(100vh - 48px); background: #181a1d"):
+        below = f"${{filming ? {BAR + HEIGHT} : {BAR}}}px"
+        with html.Div(style=(f"`position: relative; background: #181a1d; height: calc(100vh - {below})`",)):
             area = rca.RemoteControlledArea(
                 name=AREA,
                 display="image",
@@ -658,9 +676,11 @@ class Page:
                     html.Td(keys)
                     html.Td(meaning)
         with v.VDialog(v_model=("making",), width=460), v.VCard(title="Make a file", classes="pa-3"):
-            v.VTextField(v_model=("file_name",), label="File: .stl .3mf .ply .obj .glb .png .jpg .webp")
+            v.VTextField(
+                v_model=("file_name",), label="File: .stl .3mf .ply .obj .glb .png .jpg .webp .mp4 .webm .gif"
+            )
             v.VTextField(v_model=("resolution",), type="number", label="Voxels along the longest side")
-            v.VTextField(v_model=("samples",), type="number", label="Samples a pixel, of a picture")
+            v.VTextField(v_model=("samples",), type="number", label="Samples a pixel, of a picture or a film")
             v.VBtn("Make", click=(self.make_and_close,), color="primary")
 
     def _list(

@@ -15,11 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..animation import ENDINGS as FILM_ENDINGS
+from ..animation import FilmJob, Timeline, check_film, encode, write_frames
 from ..common.files import replacing
 from ..common.parameters import AUTO, Number
-from ..errors import Cancelled, FracsliceError, SceneError
+from ..errors import Cancelled, FracsliceError, RenderError, SceneError
 from ..export.images import IMAGES
-from ..fields.box import Box, Triple
+from ..fields.box import Box
 from ..fields.registry import Fixed
 from ..formats import ENDINGS, SOLIDS
 from ..formulas import Node, intersection, plane
@@ -27,15 +29,20 @@ from ..rendering import Renderer
 from ..rendering.live import Live, Shown
 from ..scene import library
 from ..scene.layout import SOLID, varied
-from ..scene.model import Scene, part_to_xml
+from ..scene.model import Scene
 from ..scene.view import Camera
 from ..work import Work
-from .document import Document, Place, Tag, with_attribute
+from . import keyframes
+from .document import Document, Place, Tag, element_of, with_attribute
+from .keyframes import Player
 from .panels import controls
-from .views import Pixel, Views, depth_of
+from .views import Pixel, Views, depth_of, rounded
 
 THUMBNAIL, SAMPLES = (200, 150), 4
 """Pixels of the picture of a variation, and samples of each."""
+
+FILMS = tuple(ending for ending in FILM_ENDINGS if ending not in IMAGES)
+"""Endings of films."""
 
 LENS = 0.01
 """Radius of the lens that a camera is given when it is first focused, of the distance that is in focus."""
@@ -167,6 +174,8 @@ class Studio:
         self.message = ""
         self.job: Job | None = None
         self.section: CutPlane | None = None
+        self.player = Player()
+        self._film: Timeline | None = None
         self._worker: threading.Thread | None = None
 
     def _compile_ahead(self) -> None:
@@ -195,6 +204,7 @@ class Studio:
         self.document, self.target = opened(source, self.folder, self._files_outside)
         self.section = None
         self.views.forget()
+        self.player = Player()
         self._scene.put(self.document.scene)
         self.live.wake()
 
@@ -247,13 +257,79 @@ class Studio:
         self._show()
 
     def _show(self) -> None:
-        """Show the scene as it is now, cut open if it is to be."""
-        scene = self.document.scene
+        """Show the scene as it is now, at the time of its film, cut open if it is to be."""
+        scene = self._at_time()
         root = loosened(scene.root)
         if self.section:
             root = intersection(root, self.section.half(root.bounds.box))
+        if self.film and scene.view.camera and root == self.live.scene.root:
+            self.views.look(scene.view.camera)
+            return
         self._scene.put(replace(scene, root=root))
         self.live.wake()
+
+    def _at_time(self) -> Scene:
+        """The scene at the time of its film; as it is without it where it has none."""
+        if self.film is None or self.player.seconds is None:
+            return self.document.scene
+        try:
+            return self.film.at(self.player.seconds)
+        except SceneError as error:
+            self.message = str(error)
+            return self.document.scene
+
+    @property
+    def film(self) -> Timeline | None:
+        """The film that is looked at."""
+        scene = self.document.scene
+        if self.player.seconds is None or scene.animation is None:
+            return None
+        if self._film is None or self._film.scene is not scene:
+            self._film = Timeline(scene)
+        return self._film
+
+    def advance(self) -> None:
+        """Go on with flights and with the film; to be called again and again."""
+        self.views.advance()
+        if self.player.advance(keyframes.duration(self.document), self.live.aim):
+            self._show()
+
+    def seek(self, seconds: float | None) -> None:
+        """Look at a time of the film; None leaves it."""
+        self.player.seek(seconds)
+        self._show()
+
+    def record(self) -> None:
+        """Begin to record a flight, or end it and make it the film."""
+        if not self.player.is_recording:
+            self.player.record()
+            return
+        views = self.player.recorded()
+        if len(views) < 2:
+            self.message = "a flight of a second or more is expected"
+        else:
+            self.edit(keyframes.write_flight, self.document, views)
+
+    def at_time(self, tag: Tag) -> Tag:
+        """An element with the values that it has at the time of the film."""
+        if self.film is None or self.player.seconds is None or self.document.problem:
+            return tag
+        element, values = element_of(tag.name), {}
+        for name in element.parameters if element else ():
+            of = keyframes.path_of(self.document, tag, name)
+            if keyframes.track_of(self.document, of):
+                values[name] = self.film.value(of, self.player.seconds)
+        return replace(tag, attributes={**tag.attributes, **values})
+
+    def set_value(self, place: Place, attribute: str, value: str | None) -> None:
+        """Change an attribute; one that moves gets a keyframe at the time of the film."""
+        document, tag, seconds = self.document, self.document.find(place), self.player.seconds
+        if tag and value is not None and seconds is not None:
+            of = keyframes.path_of(document, tag, attribute)
+            if keyframes.track_of(document, of):
+                self.edit(keyframes.set_keys, document, seconds, {of: value})
+                return
+        self.edit(document.set_value, place, attribute, value)
 
     def cut(self, axis: str, share: float) -> None:
         """Cut the picture open across an axis, at a share of the length along it; the file stays whole."""
@@ -269,16 +345,17 @@ class Studio:
     def set_number(self, place: Place, attribute: str, index: int, value: float) -> None:
         """Change one of the numbers of an attribute."""
         tag = self.document.find(place)
-        control = next((c for c in controls(tag) if c["name"] == attribute), None) if tag else None
+        shown = controls(self.at_time(tag)) if tag else []
+        control = next((c for c in shown if c["name"] == attribute), None)
         if control is None or "values" not in control:
             return
         numbers = list(control["values"])
         numbers[index] = value
-        self.edit(self.document.set_value, place, attribute, " ".join(f"{n:.6g}" for n in numbers))
+        self.set_value(place, attribute, " ".join(f"{n:.6g}" for n in numbers))
 
     def keep_view(self) -> None:
         """Write the camera into the scene."""
-        self.edit(self._write_camera, self.live.camera)
+        self.edit(self.document.write_part, rounded(self.live.camera))
 
     def focus_on(self, at: Pixel) -> None:
         """Write the camera into the scene, focused on what is under the mouse."""
@@ -288,18 +365,8 @@ class Studio:
             return
         depth = depth_of(camera, point)
         lens = camera.aperture or float(f"{LENS * depth:.2g}")
-        self.edit(self._write_camera, replace(camera, aperture=lens, focus=float(f"{depth:.6g}")))
-
-    def _write_camera(self, camera: Camera) -> None:
-        eye, target, up = map(_rounded, (camera.eye, camera.target, camera.up))
-        document, line = self.document, part_to_xml(replace(camera, eye=eye, target=target, up=up))
-        tag = next((t for t in document.root.children if t.name == "camera"), None)
-        if tag is not None:
-            text = document.text[: tag.start] + line + document.text[tag.end :]
-        else:
-            end = document.root.close
-            text = f"{document.text[:end]}  {line}\n{document.text[end:]}"
-        document.write(text)
+        focused = replace(rounded(camera), aperture=lens, focus=float(f"{depth:.6g}"))
+        self.edit(self.document.write_part, focused)
 
     def save(self) -> None:
         """Write the text into its file."""
@@ -320,8 +387,8 @@ class Studio:
             self.message = f"{self.job.path.name} is being made; cancel it first"
             return
         path = self._inside(name)
-        if path.suffix.lower() not in (*IMAGES, *ENDINGS):
-            raise SceneError(f"{name}: expected a file of {', '.join((*IMAGES, *ENDINGS))}")
+        if path.suffix.lower() not in (*IMAGES, *ENDINGS, *FILMS):
+            raise SceneError(f"{name}: expected a file of {', '.join((*IMAGES, *ENDINGS, *FILMS))}")
         job = self.job = Job(path)
         arguments = job, self.document.scene, self.live.camera, options
         self._worker = threading.Thread(target=self._make, args=arguments, name="fracslice job")
@@ -338,6 +405,9 @@ class Studio:
                 render(seen, **options, **how).save(job.path)
                 job.result = f"{job.path.name} is written"
                 return
+            if job.path.suffix.lower() in FILMS:
+                self._make_film(job, scene, options["samples"], Work(**how))
+                return
             report = make_mesh(scene, path=job.path, **options, **how).report
             verdict = f", would not print: {', '.join(report.problems)}" if report.problems else ""
             job.result = f"{job.path.name}: {report.mesh.triangles:,} triangles{verdict}"
@@ -346,16 +416,25 @@ class Studio:
         except FracsliceError as error:
             job.problem = str(error)
 
-
-def _rounded(numbers: Triple) -> Triple:
-    """Numbers with nine digits."""
-    x, y, z = (float(f"{number:.9g}") for number in numbers)
-    return x, y, z
+    def _make_film(self, job: Job, scene: Scene, samples: int, work: Work) -> None:
+        """Make the frames of a film that are not there yet, and its file."""
+        film, rate = Timeline(scene), scene.animation.fps if scene.animation else 0.0
+        check_film(job.path, rate)
+        size = scene.view.film.width, scene.view.film.height
+        frames = FilmJob(film, size, samples, rate, device=self._device)
+        folder = job.path.with_suffix(".frames")
+        try:
+            paths = write_frames(frames, range(frames.frames), folder, True, work)
+        except RenderError:  # those of the film as it was before
+            paths = write_frames(frames, range(frames.frames), folder, False, work)
+        encode(paths, job.path, rate, work)
+        job.result = f"{job.path.name}: {frames.frames} frames"
 
 
 def command(target: Path, name: str, options: dict[str, Any]) -> str:
     """Command line that makes the same file."""
-    verb = "render" if Path(name).suffix.lower() in IMAGES else "mesh"
+    ending = Path(name).suffix.lower()
+    verb = "render" if ending in IMAGES else "animate" if ending in FILMS else "mesh"
     given = "".join(f" --{option} {value}" for option, value in options.items())
     return f"fracslice {verb} {target.name} -o {name}{given}"
 

@@ -97,6 +97,16 @@ def between(first: Camera, last: Camera, share: float) -> Camera:
     return replace(first, eye=eye, target=target, up=mixed(first.up, last.up), fov=fov)
 
 
+def rounded(camera: Camera) -> Camera:
+    """A view whose places have nine digits, to be written."""
+    eye, target, up = (triple(np.array([float(f"{x:.9g}") for x in place])) for place in _places(camera))
+    return replace(camera, eye=eye, target=target, up=up)
+
+
+def _places(camera: Camera) -> tuple[Triple, Triple, Triple]:
+    return camera.eye, camera.target, camera.up
+
+
 def triple(array: NDArray[np.float64]) -> Triple:
     """Three numbers of an array."""
     x, y, z = array.tolist()
@@ -145,21 +155,26 @@ class Views:
         """Turn around the point that is gripped, as a drag by some pixels says."""
         camera = self._live.aim
         pivot = self._pivot or camera.target
-        self._look(turned_about(camera, pivot, DEGREES * right, -DEGREES * down))
+        self.look(turned_about(camera, pivot, DEGREES * right, -DEGREES * down))
 
     def look_around(self, right: float, down: float) -> None:
         """Turn in place as a drag by some pixels says."""
-        self._look(self._live.aim.turned(-DEGREES / 2 * right, DEGREES / 2 * down))
+        self.look(self._live.aim.turned(-DEGREES / 2 * right, DEGREES / 2 * down))
 
     def approach(self, steps: float, at: Pixel | None = None) -> None:
         """Come nearer to the point under the mouse, or to the target, or go away from it."""
         camera = self._live.aim
         pivot = (self.surface_at(at) if at else None) or camera.target
         if at and pivot != camera.target:
-            self._look(scaled_about(camera, pivot, NEARER**-steps))
+            self.look(scaled_about(camera, pivot, NEARER**-steps))
         else:
             arm = np.subtract(camera.eye, camera.target) * NEARER**-steps
-            self._look(replace(camera, eye=triple(np.add(camera.target, arm))))
+            self.look(replace(camera, eye=triple(np.add(camera.target, arm))))
+
+    def look(self, camera: Camera) -> None:
+        """Look from another view at once."""
+        self._flight = None
+        self._live.look(camera)
 
     def steer(self, steering: CameraInput) -> None:
         """Fly."""
@@ -210,10 +225,6 @@ class Views:
         elif now - self._since > LEFT and aim not in self._visited[self._now :][:1]:
             self._visited = [*self._visited[: self._now + 1], aim][-MOST:]
             self._now = len(self._visited) - 1
-
-    def _look(self, camera: Camera) -> None:
-        self._flight = None
-        self._live.look(camera)
 
 
 def depth_of(camera: Camera, point: Triple) -> float:
