@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import base64
 import math
 import os
 import secrets
@@ -21,11 +20,11 @@ from trame.widgets import vuetify3 as v
 from ..common.messages import format_count
 from ..errors import FracsliceError
 from ..export.images import IMAGES
-from ..formulas import Node
 from ..viewer.viewer import MOVES, PACES, Controls
 from . import panels
 from .film_page import HEIGHT, FilmPanel
 from .session import FILMS, Studio, command, jpeg
+from .sheets import SheetPanel
 from .widgets import named, named_by
 
 TICK = 1 / 60
@@ -172,9 +171,6 @@ class Page:
                 "helping": False,
                 "making": False,
                 "opening": False,
-                "varying": False,
-                "sheet": [],
-                "spread": 0.3,
                 "axis": "",
                 "share": 0.5,
                 "scenes": studio.scenes,
@@ -186,7 +182,7 @@ class Page:
                 "job": {},
             }
         )
-        self._sheet: list[Node] = []
+        self.sheets = SheetPanel(self)
         self.film = FilmPanel(self)
         self.refresh()
         self.state.change("xml")(self.write)
@@ -246,6 +242,10 @@ class Page:
         except FracsliceError as error:
             self.studio.message = str(error)
         self.shut("opening")
+        self.renamed()
+
+    def renamed(self) -> None:
+        """Show the name of another scene, and all of it."""
         with self.state as state:
             state.file_name = f"{self.studio.document.path.stem}.3mf"
             state.trame__title = f"{self.studio.document.path.stem} - fracslice"
@@ -256,28 +256,6 @@ class Page:
         with self.state as state:
             state.update(dict.fromkeys(dialogs, False))
             state.dirty(*dialogs)
-
-    async def vary(self) -> None:
-        """Show a sheet of variations of the scene, one after the other."""
-        self._sheet = []
-        with self.state as state:
-            state.varying, state.sheet = True, []
-        made, loop = self.studio.variations(float(self.state.spread)), asyncio.get_running_loop()
-        sheet = self._sheet
-        try:
-            while (one := await loop.run_in_executor(None, next, made, None)) and sheet is self._sheet:
-                sheet.append(one[0])
-                with self.state as state:
-                    data = base64.b64encode(jpeg(one[1], QUALITIES[1])).decode()
-                    state.sheet = [*state.sheet, f"data:image/jpeg;base64,{data}"]
-        except FracsliceError as error:
-            self.studio.message = str(error)
-
-    async def take(self, number: int) -> None:
-        """Go on from a variation of the sheet."""
-        self.studio.take(self._sheet[number])
-        self.refresh()
-        await self.vary()
 
     def cut(self, axis: str, share: Any) -> None:
         """Cut the picture open, or close it."""
@@ -447,7 +425,14 @@ class Page:
         with v.VAppBar(density="compact"):
             v.VAppBarTitle("{{ trame__title }}{{ saved ? '' : ' *' }}")
             v.VBtn(icon="mdi-folder-open", click="opening = true; search = ''", raw_attrs=named("Open"))
-            v.VBtn(icon="mdi-dice-5", click=self.vary, raw_attrs=named("Vary", "Variations of the numbers"))
+            v.VBtn(
+                icon="mdi-bookmark-multiple", click=self.sheets.show_bookmarks, raw_attrs=named("Bookmarks")
+            )
+            v.VBtn(
+                icon="mdi-dice-5",
+                click=self.sheets.vary,
+                raw_attrs=named("Vary", "Variations of the numbers"),
+            )
             for icon, label, act, off in (
                 ("mdi-undo", "Undo", "undo", "undoes == 0"),
                 ("mdi-redo", "Redo", "redo", "redoes == 0"),
@@ -650,26 +635,7 @@ class Page:
         self._list("wrapping", "Wrap it in", around, "c.doc", (self.add, "[c.name, true]"))
         scenes = "scenes.filter(name => name.includes(search)).map(name => ({name}))"
         self._list("opening", "Open a scene", scenes, "''", (self.open, "[c.name]"))
-        with v.VDialog(v_model=("varying",), width=700), v.VCard(title="Variations: click to go on from one"):
-            with html.Div(classes="d-flex flex-wrap justify-center", style="min-height: 480px"):
-                html.Img(
-                    v_for="(image, i) in sheet",
-                    key="i",
-                    src=("image",),
-                    click=(self.take, "[i]"),
-                    style="width: 216px; margin: 3px; cursor: pointer",
-                    raw_attrs=[":alt=\"'variation ' + (i + 1)\""],
-                )
-            with html.Div(classes="d-flex align-center mx-4"):
-                v.VSlider(
-                    v_model=("spread",),
-                    min=0.02,
-                    max=1,
-                    step=0.02,
-                    label="Size of changes",
-                    hide_details=True,
-                )
-                v.VBtn("Others", click=self.vary, variant="text")
+        self.sheets.build()
         with v.VDialog(v_model=("helping",), width=460), v.VCard(title="Help"), v.VTable(), html.Tbody():
             for keys, meaning in HELP:
                 with html.Tr():

@@ -33,10 +33,12 @@ from ..scene.model import Scene
 from ..scene.view import Camera
 from ..work import Work
 from . import keyframes
+from .bookmarks import Bookmarks, between, is_worth_a_look
 from .document import Document, Place, Tag, element_of, with_attribute
 from .keyframes import Player
 from .panels import controls
 from .views import Pixel, Views, depth_of, rounded
+from .views import between as view_between
 
 THUMBNAIL, SAMPLES = (200, 150), 4
 """Pixels of the picture of a variation, and samples of each."""
@@ -46,6 +48,9 @@ FILMS = tuple(ending for ending in FILM_ENDINGS if ending not in IMAGES)
 
 LENS = 0.01
 """Radius of the lens that a camera is given when it is first focused, of the distance that is in focus."""
+
+SURPRISE, SURPRISES = 0.5, 20
+"""Size of the changes of a surprise, and how often one is drawn."""
 
 NUDGE = 2.0**-30
 """By what a number is off, relative to it, that would otherwise be a constant of the code."""
@@ -167,6 +172,7 @@ class Studio:
         self.folder, self._work, self._files_outside = folder, work or Work(), files_outside
         self._seed, self._drawn, self._device = secrets.randbits(32), 0, device
         self.document, self.target = opened(source, folder, files_outside)
+        self.bookmarks = Bookmarks(self.target)
         self._scene = Latest(self.document.scene)
         self.live = Live(self._scene, work=self._work, device=device)
         self.views = Views(self.live)
@@ -201,8 +207,11 @@ class Studio:
 
     def open(self, source: str) -> None:
         """Open another scene, seen by its own camera."""
-        self.document, self.target = opened(source, self.folder, self._files_outside)
-        self.section = None
+        self._open(*opened(source, self.folder, self._files_outside))
+
+    def _open(self, document: Document, target: Path) -> None:
+        self.document, self.target = document, target
+        self.bookmarks, self.section = Bookmarks(target), None
         self.views.forget()
         self.player = Player()
         self._scene.put(self.document.scene)
@@ -224,12 +233,51 @@ class Studio:
             *_, done = renderer.passes(SAMPLES)
             yield other.root, done.shown
 
+    def bookmark(self) -> None:
+        """Keep the scene as it is and is seen, with a small picture of it."""
+        if self.document.problem:
+            self.message = "a bookmark is of a valid scene"
+            return
+        copy = Document(self.document.text, self.document.path, self._files_outside)
+        copy.write_part(rounded(self.live.camera))
+        self.bookmarks.add(copy.text, jpeg(thumbnail(self.shown.pixels), 80))
+
+    def go_to(self, name: str) -> None:
+        """Return to a bookmark, with its view."""
+        self.edit(lambda: self.document.write(self.bookmarks.text(name)))
+
+    def mix(self, first: Scene, name: str, share: float) -> None:
+        """Show what lies between a scene and a bookmark, which have the same elements."""
+        self.edit(self._mix, first, name, share)
+
+    def _mix(self, first: Scene, name: str, share: float) -> None:
+        last = self.bookmarks.document(name, self._files_outside).scene
+        self._write_values(between(first.root, last.root, share), "mix")
+        cameras = first.view.camera, last.view.camera
+        if cameras[0] and cameras[1]:
+            self.views.look(view_between(cameras[0], cameras[1], share))
+
+    def surprise(self) -> None:
+        """Open a shipped scene with other numbers: a solid that is not empty and no ball."""
+        names = [*library.names(), *library.gallery()]
+        for _ in range(SURPRISES):
+            self._drawn += 1
+            name = names[(self._seed + 7 * self._drawn) % len(names)]
+            document, target = opened(name, self.folder, self._files_outside)
+            with suppress(SceneError):
+                other = varied(document.scene, (self._seed, self._drawn), SURPRISE)
+                if is_worth_a_look(other.root):
+                    self._open(document, target)
+                    self.take(other.root)
+                    return
+        self.message = "no surprise was found; try again"
+
     def take(self, root: Node) -> None:
         """Write the numbers of a variation into the text."""
         self.edit(self._write_values, root)
 
-    def _write_values(self, root: Node) -> None:
-        """Write the numbers of a tree that has the elements of the document."""
+    def _write_values(self, root: Node, what: str = "") -> None:
+        """Write the numbers of a tree that has the elements of the document; `what`: see `Document.write`."""
         document = self.document
         pairs = zip(root.walk(), document.scene.root.walk(), strict=True)
         # what has no place is the union of elements side by side
@@ -242,7 +290,7 @@ class Studio:
                 if node[name] != before[name]:
                     start = with_attribute(start, name, kind.text(node[name]))
             text = text[: tag.start] + start + text[tag.inner :]
-        document.write(text)
+        document.write(text, what=what)
 
     def _is_of_solid(self, tag: Tag) -> bool:
         return self.document.root.children[tag.place[0]].name == SOLID.name
@@ -452,6 +500,15 @@ def opened(source: str, folder: Path, files_outside: bool) -> tuple[Document, Pa
     except (OSError, UnicodeDecodeError) as error:
         raise SceneError(f"{source}: {getattr(error, 'strerror', None) or error}") from None
     return Document(text, file, files_outside), path if file == path else folder / file.name
+
+
+def thumbnail(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """A picture made as small as `THUMBNAIL`, uint8 [height, width, 3]."""
+    from PIL import Image
+
+    image = Image.fromarray(np.ascontiguousarray(pixels[..., :3]))
+    image.thumbnail(THUMBNAIL)
+    return np.asarray(image)
 
 
 def jpeg(pixels: NDArray[np.uint8], quality: int) -> bytes:
