@@ -25,7 +25,7 @@ from . import panels
 from .film_page import HEIGHT, FilmPanel
 from .session import FILMS, Studio, command, jpeg
 from .sheets import SheetPanel
-from .widgets import named, named_by
+from .widgets import named, named_by, number_field
 
 TICK = 1 / 60
 """Interval between two looks at the picture, seconds."""
@@ -415,6 +415,8 @@ class Page:
                 v_model=("editing",), location="right", width=460, mobile_breakpoint=NARROW
             ):
                 self._editor()
+            with v.VNavigationDrawer(v_model=("marking",), location="right", width=240):
+                self.sheets.build_bookmarks()
             with v.VMain(style="height: 100vh"):
                 self._picture()
                 self.film.build()
@@ -426,7 +428,7 @@ class Page:
             v.VAppBarTitle("{{ trame__title }}{{ saved ? '' : ' *' }}")
             v.VBtn(icon="mdi-folder-open", click="opening = true; search = ''", raw_attrs=named("Open"))
             v.VBtn(
-                icon="mdi-bookmark-multiple", click=self.sheets.show_bookmarks, raw_attrs=named("Bookmarks")
+                icon="mdi-bookmark-multiple", click=self.sheets.toggle_bookmarks, raw_attrs=named("Bookmarks")
             )
             v.VBtn(
                 icon="mdi-dice-5",
@@ -528,13 +530,10 @@ class Page:
                         hide_details=True,
                         raw_attrs=named_by("c.name + ' ' + (i + 1)"),
                     )
-                    html.Input(
-                        type="number",
-                        value=("value",),
-                        step="any",
-                        change=(self.set_number, "[c.name, i, $event.target.value]"),
-                        style="width: 84px; color: inherit",
-                        raw_attrs=named_by("c.name + ' ' + (i + 1) + ' as a number'"),
+                    number_field(
+                        "value",
+                        (self.set_number, "[c.name, i, $event.target.value]"),
+                        named_by("c.name + ' ' + (i + 1) + ' as a number'"),
                     )
                 v.VSelect(
                     v_if="c.kind == 'choice'",
@@ -635,7 +634,7 @@ class Page:
         self._list("wrapping", "Wrap it in", around, "c.doc", (self.add, "[c.name, true]"))
         scenes = "scenes.filter(name => name.includes(search)).map(name => ({name}))"
         self._list("opening", "Open a scene", scenes, "''", (self.open, "[c.name]"))
-        self.sheets.build()
+        self.sheets.build_variations()
         with v.VDialog(v_model=("helping",), width=460), v.VCard(title="Help"), v.VTable(), html.Tbody():
             for keys, meaning in HELP:
                 with html.Tr():
