@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Protocol
@@ -57,6 +57,18 @@ class Follower:
         except SceneError:  # inside the solid at this depth
             return False
         return self._distance_then / NEARER < distance < self._distance_then * NEARER
+
+    @property
+    def root(self) -> Node:
+        """The tree with the depths of the last picture."""
+        assert self._renderer
+        return self._renderer.setup.root
+
+    def distance_from(self, camera: Camera) -> float:
+        """Lower bound of the distance from a camera to the surface, on either side of it, scene units."""
+        root = self.root
+        f = float(root.kernel("cpu", "float64").points(*(np.array([c]) for c in camera.eye))[0])
+        return abs(f) / root.bounds.lipschitz
 
     @property
     def distance(self) -> float:
@@ -162,6 +174,10 @@ class Shown:
     problem: str = ""  # error message of the file's current version, or ""
 
 
+Drawing = Callable[[Camera, tuple[int, int]], np.ndarray]
+"""Draws a scene in another way than by rays, from a camera, in a size, pixels: uint8 [rows, columns, 3]."""
+
+
 class Live:
     """Live picture of a scene, which is read again whenever its source says that it has changed.
 
@@ -186,7 +202,11 @@ class Live:
         self._camera_input, self._spacing = CameraInput(), COARSEST // 2
         self._stepped = time.monotonic()
         self.making: float | None = None
+        self._drawing: Drawing | None = None
+        self._drawn_by: Drawing | None = None
         self._aim: Camera
+        self._drawn: tuple[int, int]
+        self._drafts: Follower
         self._load(source.read(), None)
         self.first = self.camera
         self._farthest = FARTHEST * math.dist(self.first.eye, self.first.target)
@@ -205,6 +225,11 @@ class Live:
         """Camera that the picture follows."""
         with self._lock:
             return self._aim
+
+    @property
+    def surface(self) -> Node:
+        """The field that is shown, in the detail of a draft."""
+        return self._drafts.root
 
     @property
     def size(self) -> tuple[int, int]:
@@ -248,6 +273,11 @@ class Live:
             self._size = size
             self._refining.cancel.set()
 
+    def draw(self, drawing: Drawing | None) -> None:
+        """Show the scene as a drawing has it from now on; None: by rays. It must not raise."""
+        self._drawing = drawing
+        self._refining.cancel.set()
+
     def wake(self) -> None:
         """Look at the source at once."""
         self._refining.cancel.set()
@@ -272,16 +302,19 @@ class Live:
 
     def _step(self) -> None:
         """Follow the source and the camera; otherwise refine the picture, or wait if it is complete."""
-        self._follow_source()
-        aim, size = self._flown(), self._size
+        aim, size, drawing = self._flown(), self._size, self._drawing
+        if drawing is None:
+            self._follow_source()
         try:
-            if aim != self.camera or size != self._drawn:
+            if drawing is not None:
+                self._draw(drawing, aim, size)
+            elif self._drawn_by is not None or aim != self.camera or size != self._drawn:
                 self._draft(self._drafts, aim, size)
             elif not self._refine():
                 self._refining.cancel.wait(POLL)
-        except SceneError:  # the eye is inside the solid
+        except SceneError:  # the eye is inside the solid, perhaps since a drawing was seen from there
             with self._lock:
-                self._aim = self.camera
+                self._aim = self.first if self._drawn_by is not None else self.camera
             self._refining.cancel.wait(POLL)
         except Cancelled:
             return
@@ -297,6 +330,15 @@ class Live:
                 self._aim = aim
             return self._aim
 
+    def _draw(self, drawing: Drawing, camera: Camera, size: tuple[int, int]) -> None:
+        """Show a drawing, unless it is shown; it may be seen from inside the solid, too."""
+        if drawing is self._drawn_by and camera == self.camera and size == self._drawn:
+            self._refining.cancel.wait(POLL)
+            return
+        distance = self._drafts.distance_from(camera)
+        self.shown = Shown(drawing(camera, size), 1.0, camera, distance, self._problem)
+        self._drawn, self._drawn_by = size, drawing
+
     def _draft(self, drafts: Follower, camera: Camera | None, size: tuple[int, int]) -> None:
         """Show a draft, and choose the spacing of the next one by the time that it took."""
         coarse = max(size[0] // self._spacing, 1), max(size[1] // self._spacing, 1)
@@ -306,6 +348,7 @@ class Live:
         seconds = time.monotonic() - start
         seen = camera or renderer.setup.camera
         self.shown = Shown(done.shown, 0.0, seen, drafts.distance, self._problem)
+        self._drawn_by = None
         self._drafts, self._drawn, self._passes = drafts, size, self._sharpened()
         if seconds > 1.5 * WITHIN:
             self._spacing = min(self._spacing + 1, COARSEST)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import base64
+import math
 import os
 import secrets
 import webbrowser
@@ -21,7 +22,8 @@ from ..export.images import IMAGES
 from ..formulas import Node
 from ..viewer.viewer import MOVES, PACES, Controls
 from . import panels
-from .session import Studio, command, jpeg
+from .inside_page import InsidePanel
+from .session import Studio, jpeg
 
 TICK = 1 / 60
 """Interval between two looks at the picture, seconds."""
@@ -31,6 +33,9 @@ QUALITIES = 75, 92
 
 PENDING = 2
 """Frames that a page may have to fetch still before others are left out."""
+
+CLICK = 4.0
+"""Way of the mouse, pixels, up to which a press and a release are a click."""
 
 HELP = (
     ("drag", "turn around the target"),
@@ -69,6 +74,7 @@ class Frames:
         self._streamer: Any = None
         self._sent: object = None
         self._grip: tuple[float, float] | None = None
+        self._pressed = (0.0, 0.0)
         self._looking = False
         self.controls = Controls()
 
@@ -89,17 +95,27 @@ class Frames:
         """Do what an event of the mouse or a key says."""
         kind = event.get("type", "")
         at = float(event.get("x", 0)), float(event.get("y", 0))
+        inside = self._studio.inside
         if kind in ("LeftButtonPress", "RightButtonPress", "MiddleButtonPress"):
             self._grip, self._looking = at, kind != "LeftButtonPress" or bool(event.get("shiftKey"))
+            self._pressed = at
         elif kind.endswith("ButtonRelease"):
             self._grip = None
+            if inside.measuring and kind == "LeftButtonRelease" and math.dist(at, self._pressed) < CLICK:
+                inside.pick(at[0], self._studio.live.size[1] - at[1])
         elif kind == "MouseMove" and self._grip:
             right, up = at[0] - self._grip[0], at[1] - self._grip[1]
             self._grip = at
+            if inside.drag(right, -up):
+                return
             turn = self._studio.look_around if self._looking else self._studio.orbit
             turn(right, -up)
+        elif kind == "MouseMove":
+            inside.hover(at[0], self._studio.live.size[1] - at[1])
         elif kind == "MouseWheel":
-            self._studio.approach(1.0 if event.get("spinY", 0) < 0 else -1.0)
+            nearer = 1.0 if event.get("spinY", 0) < 0 else -1.0
+            if not inside.zoom(nearer):
+                self._studio.approach(nearer)
         elif kind in ("KeyDown", "KeyPress", "KeyUp"):
             self.key(str(event.get("key", "")).lower(), kind != "KeyUp", bool(event.get("controlKey")))
 
@@ -117,14 +133,16 @@ class Frames:
 
     async def send(self) -> None:
         """Send the picture if there is a new one, and a page to send it to."""
-        shown = self._studio.shown
-        if shown is self._sent or self._streamer is None:
+        shown, inside = self._studio.shown, self._studio.inside
+        now = shown, inside.overlay
+        if now == self._sent or self._streamer is None:
             return
-        self._sent = shown
+        self._sent = now
         still = shown.samples > 0
         loop = asyncio.get_running_loop()
-        data = await loop.run_in_executor(None, jpeg, shown.pixels, QUALITIES[still])
-        rows, columns, _ = shown.pixels.shape
+        pixels = await loop.run_in_executor(None, inside.over, shown)
+        data = await loop.run_in_executor(None, jpeg, pixels, QUALITIES[still])
+        rows, columns, _ = pixels.shape
         meta = {"type": "image/jpeg", "codec": "", "w": columns, "h": rows, "st": 0, "key": "key"}
         self._streamer.push_content(AREA, meta, data)
 
@@ -163,6 +181,7 @@ class Page:
             }
         )
         self._sheet: list[Node] = []
+        self.inside = InsidePanel(self.state, studio.inside, self.refresh)
         self.refresh()
         self.state.change("xml")(self.write)
         self.ctrl.on_server_bind.add(self.guard)
@@ -335,20 +354,23 @@ class Page:
             self.studio.steer(self.frames.controls.input)
             await self.frames.send()
             self._say()
+            self.inside.follow()
             await asyncio.sleep(TICK)
 
     def _say(self) -> None:
         """Bring the line below the picture, and that of the job, up to date."""
         shown, job = self.studio.shown, self.studio.job
         state = "draft" if shown.samples < 1 else f"{shown.samples:.0f} samples a pixel"
+        state = state if self.studio.inside.mode == "field" else self.studio.inside.mode
         making = "   compiling ..." if self.studio.live.making else ""
         status = f"{state}   surface at {shown.distance:.2g}   pace {self.frames.controls.pace:.2g}{making}"
         told = {}
         if job:
             line = job.result or job.problem or job.stage
             told = {"line": line, "share": round(100 * job.share), "done": job.is_done}
-            told["command"] = command(self.studio.target, job.path.name, self.options)
-        problem = self.studio.document.problem or self.studio.message or shown.problem
+            told["command"] = job.command
+        said = self.studio.inside.message or self.studio.message
+        problem = self.studio.document.problem or said or shown.problem
         changes = {"status": status, "job": told, "problem": problem}
         if any(self.state[name] != value for name, value in changes.items()):
             with self.state as state_now:
@@ -402,6 +424,7 @@ class Page:
                 self._panel()
             with v.VNavigationDrawer(v_model=("editing",), location="right", width=460):
                 self._editor()
+            self.inside.build()
             with v.VMain(style="height: 100vh"):
                 self._picture()
             self._dialogs()
@@ -424,6 +447,11 @@ class Page:
                 icon="mdi-camera-marker",
                 click=self.keep_view,
                 raw_attrs=named("Write this view into the scene"),
+            )
+            v.VBtn(
+                icon="mdi-layers-search",
+                click="looking_inside = !looking_inside",
+                raw_attrs=named("Inside", "Mesh, layers, check, measures"),
             )
             v.VBtn(icon="mdi-xml", click="editing = !editing", raw_attrs=named("Text", "Text of the scene"))
             v.VBtn(icon="mdi-cube-send", click="making = true", raw_attrs=named("Make a file", "Make a file"))
@@ -572,6 +600,8 @@ class Page:
                     density="compact",
                     raw_attrs=named("Place of the cut"),
                 )
+            with html.Div(style="position: absolute; left: 8px; top: 8px"):
+                self.inside.modes()
             html.Div(
                 "{{ status }}",
                 style="position: absolute; left: 8px; bottom: 6px; color: #eee; text-shadow: 0 0 3px #000",
@@ -583,7 +613,7 @@ class Page:
                 v_if="problem",
                 type="warning",
                 density="compact",
-                style="position: absolute; left: 8px; right: 8px; top: 8px",
+                style="position: absolute; left: 8px; right: 8px; top: 56px",
             )
             with v.VCard(
                 v_if="job.line",

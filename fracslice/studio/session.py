@@ -23,6 +23,7 @@ from ..fields.box import Box, Triple
 from ..fields.registry import Fixed
 from ..formats import ENDINGS, SOLIDS
 from ..formulas import Node, intersection, plane
+from ..mesh.drawing import Plane
 from ..rendering import Renderer
 from ..rendering.live import CameraInput, Live, Shown
 from ..scene import library
@@ -31,6 +32,7 @@ from ..scene.model import Scene, part_to_xml
 from ..scene.view import Camera
 from ..work import Work
 from .document import Document, Place, Tag, with_attribute
+from .inside import Inside
 from .panels import controls
 
 NEARER = 1.1
@@ -100,19 +102,25 @@ class CutPlane:
     flipped: bool  # whether the part with larger coordinates stays
 
     def half(self, box: Box) -> Node:
-        """The half of space that stays; an unbounded solid counts as 20 units long."""
+        """The half of space that stays."""
+        before = self.plane(box)
+        return plane(before.normal, before.offset)
+
+    def plane(self, box: Box) -> Plane:
+        """The plane before which all is cut away; an unbounded solid counts as 20 units long."""
         low, high = max(box.lo[self.axis], -10.0), min(box.hi[self.axis], 10.0)
         at = low + self.share * (high - low)
         normal = [0.0, 0.0, 0.0]
         normal[self.axis] = -1.0 if self.flipped else 1.0
-        return plane(tuple(normal), -at if self.flipped else at)
+        return Plane((normal[0], normal[1], normal[2]), -at if self.flipped else at)
 
 
 @dataclass(eq=False)
 class Job:
-    """A file that is made in the background."""
+    """What is made in the background."""
 
-    path: Path
+    name: str
+    command: str = ""  # that makes the same
     stage: str = "beginning"
     share: float = 0.0
     result: str = ""  # what was made, once it is
@@ -169,6 +177,7 @@ class Studio:
         self.job: Job | None = None
         self.section: CutPlane | None = None
         self._worker: threading.Thread | None = None
+        self.inside = Inside(self, self._work)
 
     def _compile_ahead(self) -> None:
         """Compile in the background what the first edit of a number will need."""
@@ -186,6 +195,16 @@ class Studio:
         self.live.close()
 
     @property
+    def scene(self) -> Scene:
+        """The last valid scene."""
+        return self.document.scene
+
+    @property
+    def cut_plane(self) -> Plane | None:
+        """The plane that cuts the picture open, if one does."""
+        return self.section.plane(self.scene.root.bounds.box) if self.section else None
+
+    @property
     def shown(self) -> Shown:
         """The picture and what is known of it."""
         return self.live.shown
@@ -194,6 +213,7 @@ class Studio:
         """Open another scene, seen by its own camera."""
         self.document, self.target = opened(source, self.folder, self._files_outside)
         self.section = None
+        self.inside.release()
         self._scene.put(self.document.scene)
         self.live.wake()
 
@@ -264,6 +284,7 @@ class Studio:
             same = self.section and self.section.axis == number
             self.section = CutPlane(number, share, self.section.flipped if self.section and same else towards)
         self._show()
+        self.inside.draw()
 
     def set_number(self, place: Place, attribute: str, index: int, value: float) -> None:
         """Change one of the numbers of an attribute."""
@@ -274,6 +295,23 @@ class Studio:
         numbers = list(control["values"])
         numbers[index] = value
         self.edit(self.document.set_value, place, attribute, " ".join(f"{n:.6g}" for n in numbers))
+
+    def part(self, name: str) -> Tag | None:
+        """An element below `<scene>`."""
+        return next((tag for tag in self.document.root.children if tag.name == name), None)
+
+    def set_part(self, part: str, attribute: str, value: str | None) -> None:
+        """Give an attribute of an element below `<scene>` a value, or take it away; it is added at need."""
+        tag = self.part(part)
+        if tag is not None:
+            self.edit(self.document.set_value, tag.place, attribute, value)
+        elif value is not None:
+            self.edit(self._add_line, f'<{part} {attribute}="{escape(value)}"/>')
+
+    def _add_line(self, line: str) -> None:
+        """Write an element at the end of the scene."""
+        document, end = self.document, self.document.root.close
+        document.write(f"{document.text[:end]}  {line}\n{document.text[end:]}")
 
     def orbit(self, right: float, down: float) -> None:
         """Turn around the target as a drag by some pixels says."""
@@ -307,13 +345,10 @@ class Studio:
     def _write_camera(self, camera: Camera) -> None:
         eye, target, up = map(_rounded, (camera.eye, camera.target, camera.up))
         document, line = self.document, part_to_xml(replace(camera, eye=eye, target=target, up=up))
-        tag = next((t for t in document.root.children if t.name == "camera"), None)
-        if tag is not None:
-            text = document.text[: tag.start] + line + document.text[tag.end :]
-        else:
-            end = document.root.close
-            text = f"{document.text[:end]}  {line}\n{document.text[end:]}"
-        document.write(text)
+        tag = self.part("camera")
+        if tag is None:
+            return self._add_line(line)
+        document.write(document.text[: tag.start] + line + document.text[tag.end :])
 
     def save(self) -> None:
         """Write the text into its file."""
@@ -330,35 +365,43 @@ class Studio:
 
     def start(self, name: str, options: dict[str, Any]) -> None:
         """Begin to make a file: a picture or a mesh, by its extension; one at a time."""
-        if self.job and not self.job.is_done:
-            self.message = f"{self.job.path.name} is being made; cancel it first"
-            return
         path = self._inside(name)
         if path.suffix.lower() not in (*IMAGES, *ENDINGS):
             raise SceneError(f"{name}: expected a file of {', '.join((*IMAGES, *ENDINGS))}")
-        job = self.job = Job(path)
-        arguments = job, self.document.scene, self.live.camera, options
-        self._worker = threading.Thread(target=self._make, args=arguments, name="fracslice job")
+        make = partial(self._file, path, self.document.scene, self.live.camera, options)
+        self.run(path.name, make, command(self.target, name, options))
+
+    def run(self, name: str, make: Callable[[Work], str], command: str = "") -> None:
+        """Begin a job in the background, if none is running: it says what it made, in a line."""
+        if self.job and not self.job.is_done:
+            self.message = f"{self.job.name} is being made; cancel it first"
+            return
+        self.message, job = "", Job(name, command)
+        self.job = job
+        self._worker = threading.Thread(target=self._run, args=(job, make), name="fracslice job")
         self._worker.start()
 
-    def _make(self, job: Job, scene: Scene, camera: Camera, options: dict[str, Any]) -> None:
+    def _run(self, job: Job, make: Callable[[Work], str]) -> None:
         """Body of the thread of a job."""
-        from ..api.calls import make_mesh, render
-
-        how: dict[str, Any] = {"progress": job.progress, "cancel": job.cancel, "threads": self._work.threads}
         try:
-            if job.path.suffix.lower() in IMAGES:
-                seen = replace(scene, view=replace(scene.view, camera=camera))
-                render(seen, **options, **how).save(job.path)
-                job.result = f"{job.path.name} is written"
-                return
-            report = make_mesh(scene, path=job.path, **options, **how).report
-            verdict = f", would not print: {', '.join(report.problems)}" if report.problems else ""
-            job.result = f"{job.path.name}: {report.mesh.triangles:,} triangles{verdict}"
+            job.result = make(replace(self._work, progress=job.progress, cancel=job.cancel))
         except Cancelled:
             job.problem = "cancelled; nothing was written"
         except FracsliceError as error:
             job.problem = str(error)
+
+    def _file(self, path: Path, scene: Scene, camera: Camera, options: dict[str, Any], work: Work) -> str:
+        """Make a picture or a mesh."""
+        from ..api.calls import make_mesh, render
+
+        if path.suffix.lower() in IMAGES:
+            seen = replace(scene, view=replace(scene.view, camera=camera))
+            how: dict[str, Any] = {"progress": work.progress, "cancel": work.cancel, "threads": work.threads}
+            render(seen, **options, **how).save(path)
+            return f"{path.name} is written"
+        report = make_mesh(scene, work=work, path=path, **options).report
+        verdict = f", would not print: {', '.join(report.problems)}" if report.problems else ""
+        return f"{path.name}: {report.mesh.triangles:,} triangles{verdict}"
 
 
 def _rounded(numbers: Triple) -> Triple:
