@@ -4,6 +4,7 @@ a cluster.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -527,12 +528,33 @@ class Renderer:
         while (plan := self.accumulator.plan(most, tolerance)).samples:
             yield self._pass(plan)
 
-    def _pass(self, plan: PassPlan) -> Pass:
-        start = time.perf_counter()
+    def draft(self) -> Pass:
+        """Take the first sample of every pixel at once, in place of the first passes.
+
+        Returns
+        -------
+        Pass
+            The picture, whose error is unknown.
+
+        Raises
+        ------
+        Cancelled
+            If the work was cancelled.
+        """
+        self.accumulator.passes = len(grids(*self.crop.size)) - 1
+        plan = self.accumulator.plan(1, math.inf)
+        self._trace(plan)
+        return self._seen(1.0, math.inf, plan.samples, 0.0)
+
+    def _trace(self, plan: PassPlan) -> None:
         coarse = len(grids(*self.crop.size)) - 2  # passes with a pixel a block, or less: no prepass pays
         self.prepare(max(self.accumulator.passes - coarse, 0))
         self.tracer.add(self.accumulator.sums, plan, self.work)
         self.accumulator.passes += 1
+
+    def _pass(self, plan: PassPlan) -> Pass:
+        start = time.perf_counter()
+        self._trace(plan)
         samples, error = self.accumulator.statistics()
         return self._seen(samples, error, plan.samples, plan.samples / (time.perf_counter() - start))
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from html import escape
 from pathlib import Path
@@ -16,8 +16,9 @@ from xml.parsers import expat
 from ..common.parameters import REQUIRED, Choice, File, Parameter, printable
 from ..errors import SceneError
 from ..fields.node import FORMULAS
+from ..records import Part
 from ..scene.layout import SCENE, SECTIONS, SOLID, Element
-from ..scene.model import Scene
+from ..scene.model import Scene, part_to_xml
 from ..scene.reader import reads
 
 Place = tuple[int, ...]
@@ -278,6 +279,38 @@ class Document:
         inner = f"{indent}{INDENT}{old.replace(chr(10), chr(10) + INDENT)}"
         new = f"{_empty(name)[:-2]}>\n{inner}\n{indent}</{name}>"
         self.write(self.text[: tag.start] + new + self.text[tag.end :], place)
+
+    def part(self, name: str) -> Tag | None:
+        """The first element of a name beside the solid."""
+        return next((tag for tag in self.root.children if tag.name == name), None)
+
+    def append(self, line: str) -> None:
+        """Add an element at the end of the scene."""
+        end = self.root.close
+        self.write(f"{self.text[:end]}{INDENT}{line}\n{self.text[end:]}")
+
+    def write_part(self, part: Part) -> None:
+        """Write a record of what a scene has once, such as its camera."""
+        line, tag = part_to_xml(part), self.part(part.element)
+        if tag is None:
+            self.append(line)
+        else:
+            self.write(self.text[: tag.start] + line + self.text[tag.end :])
+
+    @contextmanager
+    def one_edit(self) -> Iterator[None]:
+        """Undo what is edited in a block together; the chosen element stays. If it fails, nothing is done."""
+        before, versions, at = self._now, [*self._versions], self.version.at
+        try:
+            yield
+        except SceneError:
+            self._versions, self._now = versions, before
+            self._look()
+            raise
+        if self._now > before + 1:
+            self._versions[before + 1 :] = [self.version]
+            self._now = before + 1
+        self._versions[self._now] = replace(self.version, at=at)
 
     def unwrap(self, place: Place) -> None:
         """Leave only what is inside an element."""

@@ -16,11 +16,10 @@ from ..checks.layer_checks import PrintReport, check_layers
 from ..checks.problems import Problem, verdict
 from ..common.messages import place as place_text
 from ..common.parameters import REQUIRED, Choice, Length, Parameter
-from ..errors import FracsliceError, SceneError
+from ..errors import FracsliceError
 from ..fields.box import Box, Triple
-from ..formulas import Node
 from ..jobs.mesh import make_mesh
-from ..mesh.drawing import BEHIND, Drawn, MeshView, Plane, Projection, Size
+from ..mesh.drawing import BEHIND, Drawn, MeshView, Plane, Size
 from ..records import SAME, MeshJob, Print, SliceJob
 from ..rendering.live import Live, Shown
 from ..scene import Scene
@@ -32,10 +31,11 @@ from ..volume import with_depths
 from ..volume.amount import sizing
 from ..volume.extent import extent
 from ..work import Work
-from .document import Tag
+from .document import Document
 from .layers import Layers, Pixels, Window
 from .measuring import Mark, Overlay, Tracer, outline, readout
 from .solid import Solid, legend
+from .views import Pixel, Views
 
 MODES = "field", "mesh", "layers"
 
@@ -59,6 +59,8 @@ class Host(Protocol):
     """What the inside needs of a studio."""
 
     live: Live
+    views: Views
+    document: Document
 
     @property
     def scene(self) -> Scene:
@@ -73,9 +75,6 @@ class Host(Protocol):
 
     def set_part(self, part: str, attribute: str, value: str | None) -> None:
         """Give an attribute of an element below `<scene>` a value, or take it away."""
-
-    def part(self, name: str) -> Tag | None:
-        """An element below `<scene>`."""
 
 
 class Frame(NamedTuple):
@@ -337,7 +336,7 @@ class Inside:
         elif problem and problem.at:
             tracer, live = self._tracer, self._host.live
             place, longest = self.frame.units(problem.at), max(self._longest, 1e-9)
-            live.look(tracer.view(place, live.aim, APPROACH * longest))
+            self._host.views.fly_to(tracer.view(place, live.aim, APPROACH * longest))
         self.draw()
 
     @property
@@ -351,69 +350,65 @@ class Inside:
     @property
     def _tracer(self) -> Tracer:
         """Rays through the field that is shown."""
-        root: Node = self._host.live.surface
+        root = self._host.live.root
         return Tracer(root, root.bounds.box if root.bounds.box.finite else Box((-10.0,) * 3, (10.0,) * 3))
 
-    def pick(self, column: float, row: float) -> None:
-        """Measure the point that is shown at a pixel of the page, after those before."""
-        found = self._surface_at(column, row)
+    def pick(self, at: Pixel) -> None:
+        """Measure the point that is under the mouse, after those before."""
+        found = self._surface_at(at)
         if found is None:
             return
         point, self.thickness = found
         self.points.append(point)
         self._mark()
 
-    def _surface_at(self, column: float, row: float) -> tuple[NDArray[np.float64], str] | None:
+    def _surface_at(self, at: Pixel) -> tuple[NDArray[np.float64], str] | None:
         """Point of the surface at a pixel, and the thickness there."""
-        live = self._host.live
         if isinstance(self._picture, MeshPicture):
-            spot = self._picture.drawn(live).at(column, row)
+            spot = self._picture.drawn(self._host.live).at(*at)
             return (np.array(spot.point), "") if spot else None
-        camera = live.camera
-        if camera.kind not in ("perspective", "orthographic"):
-            raise SceneError(f"measuring: expected a perspective or orthographic camera, found {camera.kind}")
-        tracer = self._tracer
-        point = tracer.meet(*Projection.of(camera, live.size).ray(column, row))
-        if point is None:
+        seen = self._host.views.surface_at(at)
+        if seen is None:
             return None
-        return point, f"{self.frame.scale * tracer.thickness(point):.4g} mm"
+        point = self._tracer.snapped(np.array(seen))
+        return point, f"{self.frame.scale * self._tracer.thickness(point):.4g} mm"
 
     def forget(self) -> None:
         """Forget the points that were measured."""
         self.points, self.thickness = [], ""
         self._mark()
 
-    def hover(self, column: float, row: float) -> None:
+    def hover(self, at: Pixel) -> None:
         """Say what is under the mouse."""
         self.hovered = ""
         if isinstance(self._picture, MeshPicture) and self.solid:
-            self.hovered = self.solid.value(self.measure, self._picture.drawn(self._host.live), column, row)
+            self.hovered = self.solid.value(self.measure, self._picture.drawn(self._host.live), *at)
 
-    def drag(self, right: float, down: float) -> bool:
-        """Move a layer with the mouse, by pixels; False if none is shown."""
-        if self.mode != "layers" or self.layers is None:
-            return False
+    @property
+    def is_flat(self) -> bool:
+        """True while a layer is shown, which is moved and enlarged in place of the camera."""
+        return self.mode == "layers" and self.layers is not None
+
+    def drag(self, right: float, down: float) -> None:
+        """Move a layer with the mouse, by pixels."""
+        assert self.layers is not None
         scale = self.window.scale(self.layers.stack, self._host.live.size)
         self.window = self.window.dragged(right, down, scale)
         self.draw()
-        return True
 
-    def zoom(self, steps: float) -> bool:
-        """Enlarge a layer; False if none is shown."""
-        if self.mode != "layers" or self.layers is None:
-            return False
+    def zoom(self, steps: float) -> None:
+        """Enlarge a layer."""
         self.window = self.window.zoomed(STEP**steps)
         self.draw()
-        return True
 
     # print edits
 
     @property
     def edits(self) -> list[dict[str, Any]]:
         """Print edits and the size, as JSON: name, text, choices or mm, the most of a slider, help."""
-        size = self._host.part(SOLID.name)
+        size = self._host.document.part(SOLID.name)
         rows = [_edit("size", SOLID.parameters["size"], size.attributes.get("size") if size else None)]
-        tag = self._host.part(Print.element)
+        tag = self._host.document.part(Print.element)
         for name, kind in Print.kinds().items():
             if isinstance(kind, (Length, Choice)):
                 rows.append(_edit(name, kind, tag.attributes.get(name) if tag else None))

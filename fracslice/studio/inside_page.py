@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from trame.widgets import html
 from trame.widgets import vuetify3 as v
 
 from ..errors import FracsliceError
 from ..slicing.printers import PRINTERS
-from .inside import MODES, Inside
+from .inside import MODES
 from .solid import MEASURES
+from .widgets import named, named_by
+
+if TYPE_CHECKING:
+    from .page import Page
 
 FINENESSES = 32, 64, 96, 128, 192, 256, 384, 512
 """Voxels along the longest side that the page offers."""
@@ -20,26 +24,18 @@ HEIGHTS = 0.02, 0.025, 0.03, 0.05, 0.1, 0.15, 0.2
 """Heights of layers that the page offers, mm."""
 
 
-def labelled(label: str) -> list[str]:
-    """Attributes that name a control."""
-    return [f'aria-label="{label}"']
-
-
 class InsidePanel:
-    """The panel, and what its controls do.
+    """The panel, and what its controls do."""
 
-    `state`: state of the page; `refresh`: brings what the page shows of the document up to date.
-    """
-
-    def __init__(self, state: Any, inside: Inside, refresh: Callable[[], None]) -> None:
-        self._state, self._inside, self._refresh = state, inside, refresh
-        state.update({"inside": inside.told, "looking_inside": False, "edits": inside.edits})
+    def __init__(self, page: Page) -> None:
+        self._page, self._inside = page, page.studio.inside
+        page.state.update({"inside": self._inside.told, "looking_inside": False, "edits": self._inside.edits})
 
     def follow(self) -> None:
         """Bring the panel up to date."""
         told, edits = self._inside.told, self._inside.edits
-        if self._state.inside != told or self._state.edits != edits:
-            with self._state as state:
+        if self._page.state.inside != told or self._page.state.edits != edits:
+            with self._page.state as state:
                 state.inside, state.edits = told, edits
 
     def act(self, change: Callable[..., Any], *arguments: Any) -> None:
@@ -54,7 +50,7 @@ class InsidePanel:
     def show(self, mode: str) -> None:
         """Show the field, the mesh or the layers."""
         if mode != "field":
-            self._state.looking_inside = True
+            self._page.state.looking_inside = True
         self.act(self._inside.show, mode)
 
     def make_mesh(self, fineness: Any) -> None:
@@ -77,7 +73,7 @@ class InsidePanel:
     def edit(self, name: str, value: Any) -> None:
         """Change a print edit, or the size."""
         self.act(self._inside.edit, name, "" if value is None else str(value))
-        self._refresh()
+        self._page.refresh()
 
     def modes(self) -> None:
         """Buttons that choose what is shown."""
@@ -85,7 +81,7 @@ class InsidePanel:
             model_value=("inside.mode",),
             mandatory=True,
             density="compact",
-            raw_attrs=labelled("What is shown"),
+            raw_attrs=named("What is shown"),
         ):
             for mode in MODES:
                 v.VBtn(mode, value=mode, size="small", click=(self.show, f"['{mode}']"))
@@ -122,7 +118,7 @@ class InsidePanel:
                 size="small",
                 variant="text",
                 color=("inside.stale ? 'warning' : undefined",),
-                raw_attrs=labelled("Make the mesh"),
+                raw_attrs=named("Make the mesh"),
             )
         with html.Div(classes="d-flex"):
             self._switch("edges", "Edges", "edges")
@@ -143,7 +139,7 @@ class InsidePanel:
             hide_details=True,
             classes="my-2",
         )
-        with html.Div(v_if="inside.legend", raw_attrs=labelled("Legend")):
+        with html.Div(v_if="inside.legend", raw_attrs=named("Legend")):
             html.Div(style=("`height: 12px; background: ${inside.legend.colours}`",))
             with html.Div(classes="d-flex justify-space-between text-caption"):
                 html.Span("{{ inside.legend.low }}")
@@ -185,7 +181,7 @@ class InsidePanel:
                 size="small",
                 variant="text",
                 color=("inside.old ? 'warning' : undefined",),
-                raw_attrs=labelled("Plan the layers"),
+                raw_attrs=named("Plan the layers"),
             )
         self._switch("bed", "Build volume in the picture", "bed", "!inside.printer")
         with html.Div(v_if="inside.count", classes="d-flex align-center"):
@@ -197,14 +193,14 @@ class InsidePanel:
                 step=1,
                 hide_details=True,
                 density="compact",
-                raw_attrs=labelled("Layer"),
+                raw_attrs=named("Layer"),
             )
             html.Input(
                 type="number",
                 value=("inside.index",),
                 change=(self.scrub, "[$event.target.value]"),
                 style="width: 64px; color: inherit",
-                raw_attrs=labelled("Layer as a number"),
+                raw_attrs=named("Layer as a number"),
             )
         with html.Div(v_if="inside.count", classes="text-caption"):
             for colour, text in (("#ec8c32", "nothing below"), ("#d63cc8", "island"), ("#5496d6", "support")):
@@ -213,10 +209,10 @@ class InsidePanel:
         self._table("inside.rows")
 
     def _check(self) -> None:
-        v.VBtn("Check", click=(self.act_check,), size="small", raw_attrs=labelled("Check the print"))
+        v.VBtn("Check", click=(self.act_check,), size="small", raw_attrs=named("Check the print"))
         html.Div("{{ inside.verdict }}", classes="text-subtitle-2 my-1", raw_attrs=['aria-live="polite"'])
         with (
-            v.VList(density="compact", raw_attrs=labelled("Problems")),
+            v.VList(density="compact", raw_attrs=named("Problems")),
             v.VListItem(
                 v_for="(p, i) in inside.problems",
                 key="i",
@@ -233,7 +229,7 @@ class InsidePanel:
                 click=(self.edit, "[m[0], m[1]]"),
                 size="x-small",
                 variant="tonal",
-                raw_attrs=[":aria-label=\"'mend by ' + m[0]\""],
+                raw_attrs=named_by("'mend by ' + m[0]"),
             )
 
     def act_check(self) -> None:
@@ -252,7 +248,7 @@ class InsidePanel:
                 click=(self.forget,),
                 size="small",
                 variant="text",
-                raw_attrs=labelled("Clear points"),
+                raw_attrs=named("Clear points"),
             )
         html.Div(
             "one: thickness; two: distance; three: angle, circle; more: sphere",
@@ -276,14 +272,14 @@ class InsidePanel:
                 step=("e.step",),
                 hide_details=True,
                 density="compact",
-                raw_attrs=[':aria-label="e.name"'],
+                raw_attrs=named_by("e.name"),
             )
             html.Input(
                 v_if="!e.choices",
                 value=("e.text",),
                 change=(self.edit, "[e.name, $event.target.value]"),
                 style="width: 72px; color: inherit",
-                raw_attrs=[":aria-label=\"e.name + ' as a text'\""],
+                raw_attrs=named_by("e.name + ' as a text'"),
             )
             v.VSelect(
                 v_if="e.choices",
@@ -292,7 +288,7 @@ class InsidePanel:
                 update_modelValue=(self.edit, "[e.name, $event]"),
                 density="compact",
                 hide_details=True,
-                raw_attrs=[':aria-label="e.name"'],
+                raw_attrs=named_by("e.name"),
             )
 
     def _switch(self, name: str, label: str, value: str, off: str = "false") -> None:

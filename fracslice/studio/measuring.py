@@ -1,5 +1,5 @@
-"""Measuring in the picture of a studio: where a ray meets the surface, lengths, angles, circles, spheres and
-thickness; a view of a place; marks over the picture.
+"""Measuring in the picture of a studio: the surface near a point that is seen, lengths, angles, circles,
+spheres and thickness; a view of a place; marks over the picture.
 """
 
 from __future__ import annotations
@@ -14,17 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.messages import significant
-from ..fields.box import Box, Triple
+from ..fields.box import Box
 from ..fields.field import Field
 from ..mesh.drawing import Projection
 from ..mesh.fit import AROUND
 from ..scene.view import Camera
+from .views import triple
 
 Point = NDArray[np.float64]
 """Three coordinates."""
 
-STEPS, ENOUGH = 4000, 1e-7
-"""Most steps of a ray, and how near it comes to the surface, shares of the way."""
+NEAR = 2e-3
+"""Distance within which a point is moved to the surface, longest sides."""
 
 SAMPLES = 8192
 """Samples along a line through a solid, whose bound may not hold inside."""
@@ -40,29 +41,23 @@ HELD = 0.03
 
 
 class Tracer:
-    """Rays through a field; all in scene units."""
+    """The surface of a field, and what lies below it and before it; all in scene units."""
 
     def __init__(self, root: Field, box: Box) -> None:
-        self._kernel, self._bound = root.kernel("cpu", "float64"), root.bounds.lipschitz
+        self._kernel = root.kernel("cpu", "float64")
         self._longest = math.dist(box.lo, box.hi)
-        self._centre = np.array(box.centre)
 
     def values(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """The field at points [n, 3]."""
         return np.asarray(self._kernel.points(*np.ascontiguousarray(points.T)))
 
-    def meet(self, start: Point, along: Point) -> Point | None:
-        """Where a ray from outside meets the surface first; None if it does not."""
-        far, way = math.dist(start, self._centre) + self._longest, 0.0
-        for _ in range(STEPS):
-            step = float(self.values((start + way * along)[None])[0]) / self._bound
-            near = ENOUGH * max(way, ENOUGH * far)
-            if step < near:
-                return start + self._root(start, along, way - 2 * near, way + 2 * near) * along
-            way += step
-            if way > far:
-                return None
-        return start + way * along
+    def snapped(self, point: Point) -> Point:
+        """Root of the field along the normal at a point that is seen; the point itself, if none is near."""
+        normal, reach = self.normal(point), NEAR * self._longest
+        low, high = self.values(point + np.array([[-reach], [reach]]) * normal)
+        if not low <= 0 < high:
+            return point
+        return point + reach * normal - self._root(point + reach * normal, -normal, 0.0, 2 * reach) * normal
 
     def _root(self, start: Point, along: Point, low: float, high: float) -> float:
         """Way to the surface between two others; the second, where the field has no other sign there."""
@@ -101,7 +96,7 @@ class Tracer:
         ways = distance * np.linspace(HELD, 1, 256)[:, None]
         hidden = [float((self.values(place + ways * d) <= 0).mean()) for d in choices]
         best = min(range(len(choices)), key=lambda k: (round(hidden[k], 2), -choices[k] @ back))
-        return replace(camera, eye=_triple(place + distance * choices[best]), target=_triple(place))
+        return replace(camera, eye=triple(place + distance * choices[best]), target=triple(place))
 
 
 def readout(points: Sequence[Point]) -> list[tuple[str, str]]:
@@ -207,8 +202,3 @@ def outline(box: Box, colour: tuple[int, int, int]) -> tuple[Mark, ...]:
     """Edges of a box."""
     corners = np.array(box.corners)
     return tuple(Mark(corners[list(ends)], colour) for ends in EDGES)
-
-
-def _triple(array: Point) -> Triple:
-    x, y, z = array.tolist()
-    return x, y, z

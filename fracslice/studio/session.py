@@ -15,34 +15,44 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..animation import ENDINGS as FILM_ENDINGS
+from ..animation import FilmJob, Timeline, check_film, encode, write_frames
 from ..common.files import replacing
 from ..common.parameters import AUTO, Number
-from ..errors import Cancelled, FracsliceError, SceneError
+from ..errors import Cancelled, FracsliceError, RenderError, SceneError
 from ..export.images import IMAGES
-from ..fields.box import Box, Triple
+from ..fields.box import Box
 from ..fields.registry import Fixed
 from ..formats import ENDINGS, SOLIDS
 from ..formulas import Node, intersection, plane
 from ..mesh.drawing import Plane
 from ..rendering import Renderer
-from ..rendering.live import CameraInput, Live, Shown
+from ..rendering.live import Live, Shown
 from ..scene import library
 from ..scene.layout import SOLID, varied
-from ..scene.model import Scene, part_to_xml
+from ..scene.model import Scene
 from ..scene.view import Camera
 from ..work import Work
-from .document import Document, Place, Tag, with_attribute
+from . import keyframes
+from .bookmarks import Bookmarks, between, is_worth_a_look
+from .document import Document, Place, Tag, element_of, with_attribute
 from .inside import Inside
+from .keyframes import Player
 from .panels import controls
-
-NEARER = 1.1
-"""Factor of a step of the wheel on the distance from the target."""
-
-DEGREES = 0.35
-"""Angle that a drag turns by, for each pixel."""
+from .views import Pixel, Views, depth_of, rounded
+from .views import between as view_between
 
 THUMBNAIL, SAMPLES = (200, 150), 4
 """Pixels of the picture of a variation, and samples of each."""
+
+FILMS = tuple(ending for ending in FILM_ENDINGS if ending not in IMAGES)
+"""Endings of films."""
+
+LENS = 0.01
+"""Radius of the lens that a camera is given when it is first focused, of the distance that is in focus."""
+
+SURPRISE, SURPRISES = 0.5, 20
+"""Size of the changes of a surprise, and how often one is drawn."""
 
 NUDGE = 2.0**-30
 """By what a number is off, relative to it, that would otherwise be a constant of the code."""
@@ -170,12 +180,16 @@ class Studio:
         self.folder, self._work, self._files_outside = folder, work or Work(), files_outside
         self._seed, self._drawn, self._device = secrets.randbits(32), 0, device
         self.document, self.target = opened(source, folder, files_outside)
+        self.bookmarks = Bookmarks(self.target)
         self._scene = Latest(self.document.scene)
         self.live = Live(self._scene, work=self._work, device=device)
+        self.views = Views(self.live)
         self._compile_ahead()
         self.message = ""
         self.job: Job | None = None
         self.section: CutPlane | None = None
+        self.player = Player()
+        self._film: Timeline | None = None
         self._worker: threading.Thread | None = None
         self.inside = Inside(self, self._work)
 
@@ -185,7 +199,8 @@ class Studio:
         if root != scene.root:
             work = replace(self._work, threads=1, cancel=threading.Event())
             make = partial(Renderer, root, scene.view, (16, 16), work, self._device)
-            threading.Thread(target=make, name="fracslice compiling", daemon=True).start()
+            # no daemon: a process must not end while it compiles
+            threading.Thread(target=make, name="fracslice compiling").start()
 
     def close(self) -> None:
         """Stop rendering and the job."""
@@ -211,9 +226,14 @@ class Studio:
 
     def open(self, source: str) -> None:
         """Open another scene, seen by its own camera."""
-        self.document, self.target = opened(source, self.folder, self._files_outside)
-        self.section = None
+        self._open(*opened(source, self.folder, self._files_outside))
+
+    def _open(self, document: Document, target: Path) -> None:
+        self.document, self.target = document, target
+        self.bookmarks, self.section = Bookmarks(target), None
+        self.views.forget()
         self.inside.release()
+        self.player = Player()
         self._scene.put(self.document.scene)
         self.live.wake()
 
@@ -233,12 +253,51 @@ class Studio:
             *_, done = renderer.passes(SAMPLES)
             yield other.root, done.shown
 
+    def bookmark(self) -> None:
+        """Keep the scene as it is and is seen, with a small picture of it."""
+        if self.document.problem:
+            self.message = "a bookmark is of a valid scene"
+            return
+        copy = Document(self.document.text, self.document.path, self._files_outside)
+        copy.write_part(rounded(self.live.camera))
+        self.bookmarks.add(copy.text, jpeg(thumbnail(self.shown.pixels), 80))
+
+    def go_to(self, name: str) -> None:
+        """Return to a bookmark, with its view."""
+        self.edit(lambda: self.document.write(self.bookmarks.text(name)))
+
+    def mix(self, first: Scene, name: str, share: float) -> None:
+        """Show what lies between a scene and a bookmark, which have the same elements."""
+        self.edit(self._mix, first, name, share)
+
+    def _mix(self, first: Scene, name: str, share: float) -> None:
+        last = self.bookmarks.document(name, self._files_outside).scene
+        self._write_values(between(first.root, last.root, share), "mix")
+        cameras = first.view.camera, last.view.camera
+        if cameras[0] and cameras[1]:
+            self.views.look(view_between(cameras[0], cameras[1], share))
+
+    def surprise(self) -> None:
+        """Open a shipped scene with other numbers: a solid that is not empty and no ball."""
+        names = [*library.names(), *library.gallery()]
+        for _ in range(SURPRISES):
+            self._drawn += 1
+            name = names[(self._seed + 7 * self._drawn) % len(names)]
+            document, target = opened(name, self.folder, self._files_outside)
+            with suppress(SceneError):
+                other = varied(document.scene, (self._seed, self._drawn), SURPRISE)
+                if is_worth_a_look(other.root):
+                    self._open(document, target)
+                    self.take(other.root)
+                    return
+        self.message = "no surprise was found; try again"
+
     def take(self, root: Node) -> None:
         """Write the numbers of a variation into the text."""
         self.edit(self._write_values, root)
 
-    def _write_values(self, root: Node) -> None:
-        """Write the numbers of a tree that has the elements of the document."""
+    def _write_values(self, root: Node, what: str = "") -> None:
+        """Write the numbers of a tree that has the elements of the document; `what`: see `Document.write`."""
         document = self.document
         pairs = zip(root.walk(), document.scene.root.walk(), strict=True)
         # what has no place is the union of elements side by side
@@ -251,7 +310,7 @@ class Studio:
                 if node[name] != before[name]:
                     start = with_attribute(start, name, kind.text(node[name]))
             text = text[: tag.start] + start + text[tag.inner :]
-        document.write(text)
+        document.write(text, what=what)
 
     def _is_of_solid(self, tag: Tag) -> bool:
         return self.document.root.children[tag.place[0]].name == SOLID.name
@@ -266,13 +325,79 @@ class Studio:
         self._show()
 
     def _show(self) -> None:
-        """Show the scene as it is now, cut open if it is to be."""
-        scene = self.document.scene
+        """Show the scene as it is now, at the time of its film, cut open if it is to be."""
+        scene = self._at_time()
         root = loosened(scene.root)
         if self.section:
             root = intersection(root, self.section.half(root.bounds.box))
+        if self.film and scene.view.camera and root == self.live.scene.root:
+            self.views.look(scene.view.camera)
+            return
         self._scene.put(replace(scene, root=root))
         self.live.wake()
+
+    def _at_time(self) -> Scene:
+        """The scene at the time of its film; as it is without it where it has none."""
+        if self.film is None or self.player.seconds is None:
+            return self.document.scene
+        try:
+            return self.film.at(self.player.seconds)
+        except SceneError as error:
+            self.message = str(error)
+            return self.document.scene
+
+    @property
+    def film(self) -> Timeline | None:
+        """The film that is looked at."""
+        scene = self.document.scene
+        if self.player.seconds is None or scene.animation is None:
+            return None
+        if self._film is None or self._film.scene is not scene:
+            self._film = Timeline(scene)
+        return self._film
+
+    def advance(self) -> None:
+        """Go on with flights and with the film; to be called again and again."""
+        self.views.advance()
+        if self.player.advance(keyframes.duration(self.document), self.live.aim):
+            self._show()
+
+    def seek(self, seconds: float | None) -> None:
+        """Look at a time of the film; None leaves it."""
+        self.player.seek(seconds)
+        self._show()
+
+    def record(self) -> None:
+        """Begin to record a flight, or end it and make it the film."""
+        if not self.player.is_recording:
+            self.player.record()
+            return
+        views = self.player.recorded()
+        if len(views) < 2:
+            self.message = "a flight of a second or more is expected"
+        else:
+            self.edit(keyframes.write_flight, self.document, views)
+
+    def at_time(self, tag: Tag) -> Tag:
+        """An element with the values that it has at the time of the film."""
+        if self.film is None or self.player.seconds is None or self.document.problem:
+            return tag
+        element, values = element_of(tag.name), {}
+        for name in element.parameters if element else ():
+            of = keyframes.path_of(self.document, tag, name)
+            if keyframes.track_of(self.document, of):
+                values[name] = self.film.value(of, self.player.seconds)
+        return replace(tag, attributes={**tag.attributes, **values})
+
+    def set_value(self, place: Place, attribute: str, value: str | None) -> None:
+        """Change an attribute; one that moves gets a keyframe at the time of the film."""
+        document, tag, seconds = self.document, self.document.find(place), self.player.seconds
+        if tag and value is not None and seconds is not None:
+            of = keyframes.path_of(document, tag, attribute)
+            if keyframes.track_of(document, of):
+                self.edit(keyframes.set_keys, document, seconds, {of: value})
+                return
+        self.edit(document.set_value, place, attribute, value)
 
     def cut(self, axis: str, share: float) -> None:
         """Cut the picture open across an axis, at a share of the length along it; the file stays whole."""
@@ -289,66 +414,36 @@ class Studio:
     def set_number(self, place: Place, attribute: str, index: int, value: float) -> None:
         """Change one of the numbers of an attribute."""
         tag = self.document.find(place)
-        control = next((c for c in controls(tag) if c["name"] == attribute), None) if tag else None
+        shown = controls(self.at_time(tag)) if tag else []
+        control = next((c for c in shown if c["name"] == attribute), None)
         if control is None or "values" not in control:
             return
         numbers = list(control["values"])
         numbers[index] = value
-        self.edit(self.document.set_value, place, attribute, " ".join(f"{n:.6g}" for n in numbers))
-
-    def part(self, name: str) -> Tag | None:
-        """An element below `<scene>`."""
-        return next((tag for tag in self.document.root.children if tag.name == name), None)
+        self.set_value(place, attribute, " ".join(f"{n:.6g}" for n in numbers))
 
     def set_part(self, part: str, attribute: str, value: str | None) -> None:
         """Give an attribute of an element below `<scene>` a value, or take it away; it is added at need."""
-        tag = self.part(part)
+        tag = self.document.part(part)
         if tag is not None:
             self.edit(self.document.set_value, tag.place, attribute, value)
         elif value is not None:
-            self.edit(self._add_line, f'<{part} {attribute}="{escape(value)}"/>')
-
-    def _add_line(self, line: str) -> None:
-        """Write an element at the end of the scene."""
-        document, end = self.document, self.document.root.close
-        document.write(f"{document.text[:end]}  {line}\n{document.text[end:]}")
-
-    def orbit(self, right: float, down: float) -> None:
-        """Turn around the target as a drag by some pixels says."""
-        camera = self.live.aim
-        turned = camera.turned(DEGREES * right, -DEGREES * down)
-        back = np.subtract(camera.target, turned.target)
-        self.live.look(replace(turned, eye=_triple(np.add(turned.eye, back)), target=camera.target))
-
-    def look_around(self, right: float, down: float) -> None:
-        """Turn in place as a drag by some pixels says."""
-        self.live.turn(-DEGREES / 2 * right, DEGREES / 2 * down)
-
-    def approach(self, steps: float) -> None:
-        """Come nearer to the target, or go away from it."""
-        camera = self.live.aim
-        arm = np.subtract(camera.eye, camera.target) * NEARER**-steps
-        self.live.look(replace(camera, eye=_triple(np.add(camera.target, arm))))
-
-    def steer(self, steering: CameraInput) -> None:
-        """Fly."""
-        self.live.steer(steering)
-
-    def home(self) -> None:
-        """Return to the first view."""
-        self.live.look(self.live.first)
+            self.edit(self.document.append, f'<{part} {attribute}="{escape(value)}"/>')
 
     def keep_view(self) -> None:
         """Write the camera into the scene."""
-        self.edit(self._write_camera, self.live.camera)
+        self.edit(self.document.write_part, rounded(self.live.camera))
 
-    def _write_camera(self, camera: Camera) -> None:
-        eye, target, up = map(_rounded, (camera.eye, camera.target, camera.up))
-        document, line = self.document, part_to_xml(replace(camera, eye=eye, target=target, up=up))
-        tag = self.part("camera")
-        if tag is None:
-            return self._add_line(line)
-        document.write(document.text[: tag.start] + line + document.text[tag.end :])
+    def focus_on(self, at: Pixel) -> None:
+        """Write the camera into the scene, focused on what is under the mouse."""
+        point, camera = self.views.surface_at(at), self.live.camera
+        if point is None or camera.kind != "perspective":
+            self.message = "no surface of a perspective view is there"
+            return
+        depth = depth_of(camera, point)
+        lens = camera.aperture or float(f"{LENS * depth:.2g}")
+        focused = replace(rounded(camera), aperture=lens, focus=float(f"{depth:.6g}"))
+        self.edit(self.document.write_part, focused)
 
     def save(self) -> None:
         """Write the text into its file."""
@@ -364,10 +459,10 @@ class Studio:
         return path
 
     def start(self, name: str, options: dict[str, Any]) -> None:
-        """Begin to make a file: a picture or a mesh, by its extension; one at a time."""
+        """Begin to make a file: a picture, a film or a mesh, by its extension; one at a time."""
         path = self._inside(name)
-        if path.suffix.lower() not in (*IMAGES, *ENDINGS):
-            raise SceneError(f"{name}: expected a file of {', '.join((*IMAGES, *ENDINGS))}")
+        if path.suffix.lower() not in (*IMAGES, *ENDINGS, *FILMS):
+            raise SceneError(f"{name}: expected a file of {', '.join((*IMAGES, *ENDINGS, *FILMS))}")
         make = partial(self._file, path, self.document.scene, self.live.camera, options)
         self.run(path.name, make, command(self.target, name, options))
 
@@ -391,33 +486,40 @@ class Studio:
             job.problem = str(error)
 
     def _file(self, path: Path, scene: Scene, camera: Camera, options: dict[str, Any], work: Work) -> str:
-        """Make a picture or a mesh."""
+        """Make a picture, a film or a mesh."""
         from ..api.calls import make_mesh, render
 
-        if path.suffix.lower() in IMAGES:
+        ending = path.suffix.lower()
+        if ending in IMAGES:
             seen = replace(scene, view=replace(scene.view, camera=camera))
             how: dict[str, Any] = {"progress": work.progress, "cancel": work.cancel, "threads": work.threads}
             render(seen, **options, **how).save(path)
             return f"{path.name} is written"
+        if ending in FILMS:
+            return self._film_of(path, scene, options["samples"], work)
         report = make_mesh(scene, work=work, path=path, **options).report
         verdict = f", would not print: {', '.join(report.problems)}" if report.problems else ""
         return f"{path.name}: {report.mesh.triangles:,} triangles{verdict}"
 
-
-def _rounded(numbers: Triple) -> Triple:
-    """Numbers with nine digits."""
-    x, y, z = (float(f"{number:.9g}") for number in numbers)
-    return x, y, z
-
-
-def _triple(array: NDArray[np.float64]) -> Triple:
-    x, y, z = array.tolist()
-    return x, y, z
+    def _film_of(self, path: Path, scene: Scene, samples: int, work: Work) -> str:
+        """Make the frames of a film that are not there yet, and its file."""
+        film, rate = Timeline(scene), scene.animation.fps if scene.animation else 0.0
+        check_film(path, rate)
+        size = scene.view.film.width, scene.view.film.height
+        frames = FilmJob(film, size, samples, rate, device=self._device)
+        folder = path.with_suffix(".frames")
+        try:
+            paths = write_frames(frames, range(frames.frames), folder, True, work)
+        except RenderError:  # those of the film as it was before
+            paths = write_frames(frames, range(frames.frames), folder, False, work)
+        encode(paths, path, rate, work)
+        return f"{path.name}: {frames.frames} frames"
 
 
 def command(target: Path, name: str, options: dict[str, Any]) -> str:
     """Command line that makes the same file."""
-    verb = "render" if Path(name).suffix.lower() in IMAGES else "mesh"
+    ending = Path(name).suffix.lower()
+    verb = "render" if ending in IMAGES else "animate" if ending in FILMS else "mesh"
     given = "".join(f" --{option} {value}" for option, value in options.items())
     return f"fracslice {verb} {target.name} -o {name}{given}"
 
@@ -435,6 +537,15 @@ def opened(source: str, folder: Path, files_outside: bool) -> tuple[Document, Pa
     except (OSError, UnicodeDecodeError) as error:
         raise SceneError(f"{source}: {getattr(error, 'strerror', None) or error}") from None
     return Document(text, file, files_outside), path if file == path else folder / file.name
+
+
+def thumbnail(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """A picture made as small as `THUMBNAIL`, uint8 [height, width, 3]."""
+    from PIL import Image
+
+    image = Image.fromarray(np.ascontiguousarray(pixels[..., :3]))
+    image.thumbnail(THUMBNAIL)
+    return np.asarray(image)
 
 
 def jpeg(pixels: NDArray[np.uint8], quality: int) -> bytes:

@@ -123,9 +123,9 @@ def test_layers_show_islands_in_the_pixels_of_a_printer(studio: Studio, inside: 
     within(lambda: not (studio.shown.pixels == ISLAND).all(2).any())
     assert not (studio.shown.pixels == HANGS).all(2).any()
     area = (studio.shown.pixels > 100).all(2).sum()
-    assert inside.zoom(2)
+    inside.zoom(2)
     within(lambda: (studio.shown.pixels > 100).all(2).sum() > 1.2 * area)
-    assert inside.drag(400, 0)
+    inside.drag(400, 0)
     within(lambda: not (studio.shown.pixels > 100).all(2).any())
 
 
@@ -139,8 +139,8 @@ def test_a_check_lists_problems_and_flies_to_them(studio: Studio, inside: Inside
     bodies = kinds.index("bodies")
     inside.go_to(bodies)
     floating = (0.0, 0.0, 5.0)  # middle of the lower face of the upper box, scene units
-    np.testing.assert_allclose(studio.live.aim.target, floating, atol=0.3)
-    away = np.subtract(studio.live.aim.eye, floating)
+    np.testing.assert_allclose(studio.views.camera.target, floating, atol=0.3)
+    away = np.subtract(studio.views.camera.eye, floating)
     assert np.linalg.norm(away) == pytest.approx(0.5 * 10, rel=0.05)
     assert inside.overlay.marks[0].label == "bodies"
     inside.show("layers")
@@ -154,9 +154,9 @@ def test_a_check_lists_problems_and_flies_to_them(studio: Studio, inside: Inside
 def test_points_of_the_field_are_measured(studio: Studio, inside: Inside) -> None:
     studio.live.look(Camera(eye=(0.0, -40.0, 0.0), target=(0.0, 0.0, 0.0), fov=30))
     within(lambda: studio.shown.camera.eye == (0.0, -40.0, 0.0))
-    inside.pick(48, 32)
+    inside.pick((48, 32))
     assert rows(inside.told["measures"]) == {"point 1": "0.000 -5.000 2.000 mm", "thickness": "10 mm"}
-    inside.pick(0, 0)
+    inside.pick((0, 0))
     assert len(inside.points) == 1
     inside.points += [np.array([3.0, -5.0, 0.0]), np.array([3.0, -5.0, 4.0])]
     told = rows(inside.told["measures"])
@@ -175,9 +175,9 @@ def test_points_of_a_mesh_are_measured(studio: Studio, inside: Inside) -> None:
     studio.live.look(Camera(eye=(0.0, -40.0, 0.0), target=(0.0, 0.0, 0.0), fov=30))
     inside.measuring = True
     within(lambda: studio.shown.camera.eye == (0.0, -40.0, 0.0))
-    inside.pick(48, 32)
+    inside.pick((48, 32))
     np.testing.assert_allclose(inside.points[0][1], -5.0, atol=1e-3)
-    inside.hover(48, 32)
+    inside.hover((48, 32))
     assert inside.hovered.endswith("mm") and "-5.0" in inside.hovered
 
 
@@ -207,16 +207,17 @@ def test_colours_measure_the_surface() -> None:
     assert 0 < np.median(solid.known["error"]) < 1000 * 0.1 * made.report.voxel_mm
 
 
-def test_rays_meet_the_surface_at_its_root() -> None:
+def test_points_snap_to_the_root() -> None:
     ball = sphere(5)
     tracer = Tracer(ball, ball.bounds.box)
-    point = tracer.meet(np.array([0.3, -20, 1.0]), np.array([0.0, 1, 0]))
-    assert point is not None and np.linalg.norm(point) == pytest.approx(5, abs=1e-12)
+    seen = np.array([0.3, -4.89, 1.0])
+    point = tracer.snapped(seen)
+    assert np.linalg.norm(point) == pytest.approx(5, abs=1e-12) and np.linalg.norm(point - seen) < 0.01
+    assert (tracer.snapped(2 * seen) == 2 * seen).all()
     assert tracer.thickness(point) == pytest.approx(10, abs=1e-6)
-    assert tracer.meet(np.array([6.0, -20, 0]), np.array([0.0, 1, 0])) is None
     camera = Camera(eye=(0.0, -20.0, 0.0), target=(0.0, 0.0, 0.0))
-    seen = tracer.view(np.array([0.0, 5.0, 0.0]), camera, 4.0)  # the far side: from there
-    assert seen.eye[1] >= 5 and seen.target == (0.0, 5.0, 0.0)
+    view = tracer.view(np.array([0.0, 5.0, 0.0]), camera, 4.0)  # the far side is not seen from the front
+    assert view.eye[1] >= 5 and view.target == (0.0, 5.0, 0.0)
 
 
 def test_points_make_angles_circles_and_spheres() -> None:
