@@ -141,7 +141,7 @@ def clip(triangles: NDArray[np.int32], heights: NDArray[np.float64]) -> Clipped:
     return Clipped(np.ascontiguousarray(made), of, edges, share)
 
 
-class Spot(NamedTuple):
+class SeenPoint(NamedTuple):
     """What of a mesh is at a point of a picture."""
 
     point: Triple  # scene units
@@ -151,7 +151,7 @@ class Spot(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Drawn:
+class MeshDrawing:
     """A picture of a mesh."""
 
     pixels: NDArray[np.uint8]  # sRGB [rows, columns, 3]
@@ -161,7 +161,7 @@ class Drawn:
     drawn: Clipped  # triangles that are drawn
     seen: NDArray[np.float64]  # columns, rows and nearness of their vertices
 
-    def at(self, column: float, row: float) -> Spot | None:
+    def at(self, column: float, row: float) -> SeenPoint | None:
         """What is at a point of the picture, pixels; None where nothing is."""
         width, height = self.projection.size
         if not (0 <= column < width and 0 <= row < height):
@@ -176,12 +176,12 @@ class Drawn:
         if cut and along @ normal > 0:
             facing = np.array(cut.normal)
             point = start + (cut.offset - facing @ start) / (facing @ along) * along
-            return Spot(_triple(point), _triple(facing / np.linalg.norm(facing)), None, (0.0, 0.0, 0.0))
+            return SeenPoint(_triple(point), _triple(facing / np.linalg.norm(facing)), None, (0.0, 0.0, 0.0))
         place = self.view.mesh.vertices[corners]
         point = start + ((place[0] - start) @ normal) / (along @ normal) * along
         weights = np.linalg.lstsq(np.vstack([place.T, np.ones(3)]), np.append(point, 1.0), rcond=None)[0]
         a, b, c = corners.tolist()
-        return Spot(_triple(point), _triple(normal), (a, b, c), _triple(weights))
+        return SeenPoint(_triple(point), _triple(normal), (a, b, c), _triple(weights))
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,7 +215,7 @@ class MeshView:
         colours = self.mesh.colours
         return None if colours is None else self.part.values(to_linear(colours / 255.0))
 
-    def draw(self, camera: Camera, size: Size) -> Drawn:
+    def draw(self, camera: Camera, size: Size) -> MeshDrawing:
         """Draw it; `size` in pixels."""
         projection = Projection.of(camera, size)
         away = projection.away(self._vertices)
@@ -227,7 +227,7 @@ class MeshView:
         shown = front[rows, columns]
         centres = np.stack([columns, rows], 1) + 0.5
         pixels[rows, columns] = self._shades(projection, drawn, seen, shown, centres)
-        return Drawn(pixels, self, projection, front, drawn, seen)
+        return MeshDrawing(pixels, self, projection, front, drawn, seen)
 
     def _shades(
         self,

@@ -6,7 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from functools import partial
+from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -14,16 +16,20 @@ from numpy.typing import NDArray
 
 from ..checks.layer_checks import PrintReport, check_layers
 from ..checks.problems import Problem, verdict
+from ..common.messages import format_count
 from ..common.messages import place as place_text
 from ..common.parameters import REQUIRED, Choice, Length, Parameter
-from ..errors import FracsliceError
+from ..errors import FracsliceError, SceneError
+from ..export.layers import PRINTS, printers_file, slice_format, write_slices
 from ..fields.box import Box, Triple
 from ..jobs.mesh import make_mesh
-from ..mesh.drawing import BEHIND, Drawn, MeshView, Plane, Size
+from ..jobs.slices import SliceRecipe
+from ..mesh.drawing import BEHIND, MeshDrawing, MeshView, Plane, Size
 from ..records import SAME, MeshJob, Print, SliceJob
 from ..rendering.live import Live, Shown
 from ..scene import Scene
 from ..scene.layout import SOLID
+from ..scene.model import to_xml
 from ..scene.view import Camera
 from ..slicing import plan_layers
 from ..slicing.printers import default_resin, printer
@@ -32,10 +38,10 @@ from ..volume.amount import sizing
 from ..volume.extent import extent
 from ..work import Work
 from .document import Document
-from .layers import Layers, Pixels, Window
+from .layer_view import LayerImage, PrintLayers, Window
 from .measuring import Mark, Overlay, Tracer, outline, readout
-from .solid import Solid, legend
-from .views import Pixel, Views
+from .solid import SceneSolid, legend
+from .views import Pixel, Views, triple
 
 MODES = "field", "mesh", "layers"
 
@@ -77,7 +83,7 @@ class Host(Protocol):
         """Give an attribute of an element below `<scene>` a value, or take it away."""
 
 
-class Frame(NamedTuple):
+class Footing(NamedTuple):
     """Where an object stands."""
 
     origin: Triple  # middle of its lower face, scene units
@@ -93,14 +99,14 @@ class MeshPicture:
 
     def __init__(self, view: MeshView) -> None:
         self.view = view
-        self._last: Drawn | None = None
+        self._last: MeshDrawing | None = None
 
     def __call__(self, camera: Camera, size: Size) -> NDArray[np.uint8]:
         """See `rendering.live.Drawing`."""
         self._last = self.view.draw(camera, size)
         return self._last.pixels
 
-    def drawn(self, live: Live) -> Drawn:
+    def drawn(self, live: Live) -> MeshDrawing:
         """The picture that is seen, or will be in a moment."""
         return self._last or self.view.draw(live.aim, live.size)
 
@@ -110,7 +116,7 @@ class LayerPicture:
     """Draws a layer for the page."""
 
     inside: Inside
-    layers: Layers
+    layers: PrintLayers
     index: int
     window: Window
     at: tuple[float, float] | None  # place that is marked, mm
@@ -136,9 +142,9 @@ class Inside:
         """Forget all that was made, and show the field."""
         self.mode, self.message = "field", ""
         self.fineness, self.edges, self.measure, self.designed = FINENESS, False, "", False
-        self.solids: dict[bool, tuple[Scene, Solid]] = {}  # by whether print edits were left out
+        self.solids: dict[bool, tuple[Scene, SceneSolid]] = {}  # by whether print edits were left out
         self.printer, self.layer, self.index, self.window = "", LAYER, 0, Window()
-        self.layers: Layers | None = None
+        self.layers: PrintLayers | None = None
         self.report: PrintReport | None = None
         self.chosen: int | None = None
         self.measuring, self.bed = False, False
@@ -149,14 +155,14 @@ class Inside:
         self._picture: MeshPicture | LayerPicture | None = None
         self._drawn_as: object = None  # mesh, colours, edges and section of the picture
         self._layered: Scene | None = None
-        self._seen: tuple[Layers, int, Pixels] | None = None
-        self._frame: tuple[Scene, Frame] | None = None
+        self._seen: tuple[PrintLayers, int, LayerImage] | None = None
+        self._footing: tuple[Scene, Footing] | None = None
         self._host.live.draw(None)
 
     # what is shown
 
     @property
-    def solid(self) -> Solid | None:
+    def solid(self) -> SceneSolid | None:
         """The mesh that is shown: as printed, or as designed."""
         made = self.solids.get(self.designed)
         return made[1] if made else None
@@ -199,34 +205,34 @@ class Inside:
             if len(self.points) > 1:
                 marks.append(Mark(np.array(self.points), POINT))
             if (problem := self.problem) and problem.at:
-                marks.append(Mark(self.frame.units(problem.at)[None], WRONG, False, problem.kind))
+                marks.append(Mark(self.footing.units(problem.at)[None], WRONG, False, problem.kind))
             if self.bed and self.printer:
                 marks += outline(self._build_volume(), BED)
         self.overlay = Overlay(tuple(marks))
 
     def _build_volume(self) -> Box:
         """Build volume of the printer around the object, scene units."""
-        frame, (width, depth, height) = self.frame, printer(self.printer).build_volume
-        corners = [frame.units((sign * width / 2, sign * depth / 2, z)) for sign, z in ((-1, 0), (1, height))]
-        low, high = (tuple(corner.tolist()) for corner in corners)
-        return Box(low, high)
+        footing, (width, depth, height) = self.footing, printer(self.printer).build_volume
+        low = footing.units((-width / 2, -depth / 2, 0.0))
+        high = footing.units((width / 2, depth / 2, height))
+        return Box(triple(low), triple(high))
 
     @property
-    def frame(self) -> Frame:
+    def footing(self) -> Footing:
         """Where the object stands: as layers or mesh have it, else as the scene says."""
         scene = self._host.scene
         if self.layers and self._layered is scene:
-            return Frame(self.layers.stack.origin, self.layers.stack.scale)
+            return Footing(self.layers.stack.origin, self.layers.stack.scale)
         if (made := self.solids.get(self.designed)) and made[0] is scene:
             result = made[1].result
             (x0, y0, z0), (x1, y1, _) = result.report.mesh.bbox_mm
-            (x, y, z), scale = result.place.offset, result.place.scale
-            return Frame((((x0 + x1) / 2 - x) / scale, ((y0 + y1) / 2 - y) / scale, (z0 - z) / scale), scale)
-        if self._frame is None or self._frame[0] is not scene:
+            middle = result.place.units(np.array([[(x0 + x1) / 2, (y0 + y1) / 2, z0]]))[0]
+            return Footing(triple(middle), result.place.scale)
+        if self._footing is None or self._footing[0] is not scene:
             box = extent(with_depths(scene.root, self._work), self._work).box
             (x, y, _), low = box.centre, box.lo[2]
-            self._frame = scene, Frame((x, y, low), sizing(scene, None, SAME, self._work).scale(box))
-        return self._frame[1]
+            self._footing = scene, Footing((x, y, low), sizing(scene, None, SAME, self._work).scale(box))
+        return self._footing[1]
 
     def over(self, shown: Shown) -> NDArray[np.uint8]:
         """The picture with its marks."""
@@ -236,17 +242,22 @@ class Inside:
 
     # the mesh
 
-    def make_mesh(self, fineness: float) -> None:
-        """Make the mesh of the scene, of so many voxels along its longest side."""
-        self.fineness, designed, scene = fineness, self.designed, self._host.scene
+    def make_mesh(self, fineness: float, designed: bool | None = None) -> None:
+        """Make the mesh of the scene, of so many voxels along its longest side, and show it.
+
+        `designed`: whether print edits are left out; by default as in the mesh that is shown.
+        """
+        designed = self.designed if designed is None else designed
+        self.fineness, scene = fineness, self._host.scene
         what = MeshJob(resolution=fineness, printing=Print() if designed else None)
         measure = self.measure
 
         def make(work: Work) -> str:
-            solid = Solid(make_mesh(scene, what, work))
+            solid = SceneSolid(make_mesh(scene, what, work))
             if measure:
                 solid.measure(measure, work)
             self.solids[designed] = scene, solid
+            self.mode, self.designed = "mesh", designed
             self.draw()
             return f"mesh of {solid.result.report.mesh.triangles:,} triangles"
 
@@ -268,8 +279,12 @@ class Inside:
 
     def compare(self, designed: bool) -> None:
         """Show the mesh as it was designed, without print edits, or as it is printed."""
-        self.designed = designed
-        self.show("mesh")
+        made = self.solids.get(designed)
+        if made and made[0] is self._host.scene:
+            self.designed = designed
+            self.draw()
+        else:
+            self.make_mesh(self.fineness, designed)
 
     # layers and checks
 
@@ -286,12 +301,35 @@ class Inside:
         job = self._job()
         stack = plan_layers(scene.root, job, work, sizing(scene, None, SAME, work))
         resin = default_resin(job.printer, job.layer[0]) if job.printer else None
-        layers = Layers(stack, self._work, job.printer, resin)
+        layers = PrintLayers(stack, self._work, job.printer, resin)
         layers.survey()
         self.layers, self._layered, self.report, self.chosen = layers, scene, None, None
         self.index = min(self.index or len(layers) // 2, len(layers) - 1)
         self.draw()
         return f"{len(layers):,} layers"
+
+    @property
+    def layer_options(self) -> dict[str, Any]:
+        """Options of the command that writes these layers."""
+        printing = {"printer": self.printer} if self.printer else {}
+        return {**printing, "layer": f"{self.layer:g}mm"}
+
+    def check_file(self, path: Path) -> None:
+        """Raise an error for a file of layers that the chosen printer does not read."""
+        kind, machine = slice_format(path), self._job().printer
+        if kind in PRINTS and machine is None:
+            raise SceneError(f"{path.name}: choose the printer of the layers first")
+        if machine and (other := printers_file(machine, path)):
+            raise SceneError(other)
+
+    def write_layers(self, path: Path, scene: Scene, work: Work) -> str:
+        """Write the layers as a file."""
+        job, kind = self._job(), slice_format(path)
+        resin = default_resin(job.printer, job.layer[0]) if job.printer else None
+        recipe = SliceRecipe(to_xml(scene), scene.name, job, kind, resin, datetime.now(UTC))
+        run = recipe.run(work, scene)
+        write_slices(run, path)
+        return f"{path.name}: {format_count(run.layers, 'layer')}"
 
     def scrub(self, index: int) -> None:
         """Show another layer."""
@@ -299,7 +337,7 @@ class Inside:
             self.index = min(max(index, 0), len(self.layers) - 1)
             self.draw()
 
-    def look(self, layers: Layers, index: int) -> Pixels:
+    def look(self, layers: PrintLayers, index: int) -> LayerImage:
         """A layer; the last one is kept."""
         if self._seen is None or self._seen[:2] != (layers, index):
             self._seen = layers, index, layers.look(index)
@@ -335,7 +373,7 @@ class Inside:
             self.window = Window(*problem.at[:2], max(self.window.zoom, 4.0))
         elif problem and problem.at:
             tracer, live = self._tracer, self._host.live
-            place, longest = self.frame.units(problem.at), max(self._longest, 1e-9)
+            place, longest = self.footing.units(problem.at), max(self._longest, 1e-9)
             self._host.views.fly_to(tracer.view(place, live.aim, APPROACH * longest))
         self.draw()
 
@@ -371,7 +409,7 @@ class Inside:
         if seen is None:
             return None
         point = self._tracer.snapped(np.array(seen))
-        return point, f"{self.frame.scale * self._tracer.thickness(point):.4g} mm"
+        return point, f"{self.footing.scale * self._tracer.thickness(point):.4g} mm"
 
     def forget(self) -> None:
         """Forget the points that were measured."""
@@ -426,7 +464,7 @@ class Inside:
         """What a page shows, as JSON."""
         scene, solid = self._host.scene, self.solid
         made = self.solids.get(self.designed)
-        points = [self.frame.scale * point for point in self.points] if self.points else []
+        points = [self.footing.scale * point for point in self.points] if self.points else []
         return {
             "mode": self.mode,
             "fineness": self.fineness,
@@ -469,7 +507,7 @@ class Inside:
         """Place and thickness of the last point."""
         if not points:
             return []
-        at = points[-1] - self.frame.scale * np.array(self.frame.origin)
+        at = points[-1] - self.footing.scale * np.array(self.footing.origin)
         rows = [(f"point {len(points)}", f"{place_text(at.tolist(), 3)} mm")]
         return [*rows, ("thickness", self.thickness)] if self.thickness else rows
 

@@ -147,6 +147,7 @@ class InsidePanel:
                 html.Span("{{ inside.legend.high }}")
         html.Div("{{ inside.hovered }}", classes="text-caption", style="min-height: 20px")
         self._table("inside.figures", "inside.other")
+        v.VBtn("Make a file", click=(self.file, "['mesh']"), size="small", variant="text")
 
     def compare(self, designed: Any) -> None:
         """Show the mesh before print edits, or after."""
@@ -207,6 +208,18 @@ class InsidePanel:
                 html.Span("■ ", style=f"color: {colour}")
                 html.Span(text, classes="mr-2")
         self._table("inside.rows")
+        label = "{{ inside.printer ? 'Make a file for the printer' : 'Make a file of layers' }}"
+        v.VBtn(label, v_if="inside.count", click=(self.file, "['layers']"), size="small", variant="text")
+
+    def file(self, of: str) -> None:
+        """Begin to make a file of the mesh or of the layers, in the dialog for that."""
+        path, inside = self._page.studio.document.path, self._inside
+        ending = f".{PRINTERS[inside.printer].file}" if inside.printer else ".svg"
+        with self._page.state as state:
+            if of == "mesh":
+                state.resolution = inside.fineness
+            state.file_name = path.with_suffix(".3mf" if of == "mesh" else ending).name
+            state.making = True
 
     def _check(self) -> None:
         v.VBtn("Check", click=(self.act_check,), size="small", raw_attrs=named("Check the print"))

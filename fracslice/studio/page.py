@@ -24,7 +24,7 @@ from ..viewer.viewer import MOVES, PACES, Controls
 from . import panels
 from .film_page import HEIGHT, FilmPanel
 from .inside_page import InsidePanel
-from .session import FILMS, Studio, jpeg
+from .session import FILMS, PRINT_ENDINGS, Studio, jpeg
 from .sheets import SheetPanel
 from .widgets import named, named_by
 
@@ -347,6 +347,8 @@ class Page:
         """Options of the file that the page names."""
         if str(self.state.file_name).lower().endswith((*IMAGES, *FILMS)):
             return {"samples": int(self.state.samples)}
+        if str(self.state.file_name).lower().endswith(PRINT_ENDINGS):
+            return self.studio.inside.layer_options
         return {"resolution": float(self.state.resolution)}
 
     def cancel(self) -> None:
@@ -670,7 +672,7 @@ class Page:
                     html.Td(meaning)
         with v.VDialog(v_model=("making",), width=460), v.VCard(title="Make a file", classes="pa-3"):
             v.VTextField(
-                v_model=("file_name",), label="File: .stl .3mf .ply .obj .glb .png .jpg .webp .mp4 .webm .gif"
+                v_model=("file_name",), label="File: .stl .3mf .ply .obj .glb .png .jpg .mp4 .goo .sl1 ..."
             )
             v.VTextField(v_model=("resolution",), type="number", label="Voxels along the longest side")
             v.VTextField(v_model=("samples",), type="number", label="Samples a pixel, of a picture or a film")

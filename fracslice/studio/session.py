@@ -21,6 +21,7 @@ from ..common.files import replacing
 from ..common.parameters import AUTO, Number
 from ..errors import Cancelled, FracsliceError, RenderError, SceneError
 from ..export.images import IMAGES
+from ..export.layers import ENDINGS as LAYER_ENDINGS
 from ..fields.box import Box
 from ..fields.registry import Fixed
 from ..formats import ENDINGS, SOLIDS
@@ -44,6 +45,9 @@ from .views import between as view_between
 
 THUMBNAIL, SAMPLES = (200, 150), 4
 """Pixels of the picture of a variation, and samples of each."""
+
+PRINT_ENDINGS = tuple(ending for ending in LAYER_ENDINGS if ending and ending not in ENDINGS)
+"""Endings of files of layers that are no meshes."""
 
 FILMS = tuple(ending for ending in FILM_ENDINGS if ending not in IMAGES)
 """Endings of films."""
@@ -459,10 +463,13 @@ class Studio:
         return path
 
     def start(self, name: str, options: dict[str, Any]) -> None:
-        """Begin to make a file: a picture, a film or a mesh, by its extension; one at a time."""
+        """Begin to make a file by its extension: a picture, a film, a mesh or layers; one at a time."""
         path = self._inside(name)
-        if path.suffix.lower() not in (*IMAGES, *ENDINGS, *FILMS):
-            raise SceneError(f"{name}: expected a file of {', '.join((*IMAGES, *ENDINGS, *FILMS))}")
+        known = *IMAGES, *ENDINGS, *FILMS, *PRINT_ENDINGS
+        if path.suffix.lower() not in known:
+            raise SceneError(f"{name}: expected a file of {', '.join(known)}")
+        if path.suffix.lower() in PRINT_ENDINGS:
+            self.inside.check_file(path)
         make = partial(self._file, path, self.document.scene, self.live.camera, options)
         self.run(path.name, make, command(self.target, name, options))
 
@@ -486,7 +493,7 @@ class Studio:
             job.problem = str(error)
 
     def _file(self, path: Path, scene: Scene, camera: Camera, options: dict[str, Any], work: Work) -> str:
-        """Make a picture, a film or a mesh."""
+        """Make a picture, a film, a mesh or layers."""
         from ..api.calls import make_mesh, render
 
         ending = path.suffix.lower()
@@ -495,6 +502,8 @@ class Studio:
             how: dict[str, Any] = {"progress": work.progress, "cancel": work.cancel, "threads": work.threads}
             render(seen, **options, **how).save(path)
             return f"{path.name} is written"
+        if ending in PRINT_ENDINGS:
+            return self.inside.write_layers(path, scene, work)
         if ending in FILMS:
             return self._film_of(path, scene, options["samples"], work)
         report = make_mesh(scene, work=work, path=path, **options).report
@@ -519,7 +528,8 @@ class Studio:
 def command(target: Path, name: str, options: dict[str, Any]) -> str:
     """Command line that makes the same file."""
     ending = Path(name).suffix.lower()
-    verb = "render" if ending in IMAGES else "animate" if ending in FILMS else "mesh"
+    verbs = {"render": IMAGES, "animate": FILMS, "slice": PRINT_ENDINGS}
+    verb = next((verb for verb, endings in verbs.items() if ending in endings), "mesh")
     given = "".join(f" --{option} {value}" for option, value in options.items())
     return f"fracslice {verb} {target.name} -o {name}{given}"
 

@@ -14,7 +14,7 @@ from ..common.messages import format_count, significant
 from ..formulas.material import PALETTES
 from ..jobs.report import Result
 from ..mesh import Mesh
-from ..mesh.drawing import Drawn
+from ..mesh.drawing import MeshDrawing
 from ..mesh.fit import surface_error
 from ..printing.walls import Samples
 from ..slicing.printers import START
@@ -37,7 +37,7 @@ INSIDE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class Solid:
+class SceneSolid:
     """A mesh that was made of a scene."""
 
     result: Result
@@ -86,7 +86,7 @@ class Solid:
         low, high = np.quantile(known, (1 - MOST, MOST)).tolist()
         return (low if measure.signed else 0.0), max(high, low + 1e-9)
 
-    def value(self, name: str, drawn: Drawn, column: float, row: float) -> str:
+    def value(self, name: str, drawn: MeshDrawing, column: float, row: float) -> str:
         """What is at a point of its picture: the place in mm, and the measure, if it shows one."""
         spot = drawn.at(column, row)
         if spot is None:
@@ -119,10 +119,10 @@ class Solid:
         ]
 
 
-def _widths(gaps: bool) -> Callable[[Solid, Work], NDArray[np.float64]]:
+def _widths(gaps: bool) -> Callable[[SceneSolid, Work], NDArray[np.float64]]:
     """Width of the wall below the surface, or of the gap above it; infinite where it is none, mm."""
 
-    def measured(of: Solid, _: Work) -> NDArray[np.float64]:
+    def measured(of: SceneSolid, _: Work) -> NDArray[np.float64]:
         bricks, mesh = of.result.bricks, of.mesh
         limit = FARTHEST * float((mesh.vertices.max(0) - mesh.vertices.min(0)).max())
         step, towards = INSIDE * bricks.voxel, -1.0 if gaps else 1.0
@@ -134,14 +134,14 @@ def _widths(gaps: bool) -> Callable[[Solid, Work], NDArray[np.float64]]:
     return measured
 
 
-def _overhang(of: Solid, _: Work) -> NDArray[np.float64]:
+def _overhang(of: SceneSolid, _: Work) -> NDArray[np.float64]:
     """How far the surface leans over, 90 where it is a flat ceiling, degrees; 0 on the plate."""
     height = of.result.vertices[:, 2]
     down = np.degrees(np.arcsin(np.clip(-of.normals[:, 2], 0, 1)))
     return np.where(height - height.min() > PLATE, down, 0.0)
 
 
-def _curvature(of: Solid, _: Work) -> NDArray[np.float64]:
+def _curvature(of: SceneSolid, _: Work) -> NDArray[np.float64]:
     """Mean curvature, positive where the surface bulges, 1/mm, by cotangents (Meyer 2003)."""
     vertices, triangles = of.result.vertices, of.result.triangles
     pull, area = np.zeros_like(vertices), np.zeros(len(vertices))
@@ -162,7 +162,7 @@ def _curvature(of: Solid, _: Work) -> NDArray[np.float64]:
     return mean
 
 
-def _error(of: Solid, work: Work) -> NDArray[np.float64]:
+def _error(of: SceneSolid, work: Work) -> NDArray[np.float64]:
     """Distance of the middles of the triangles around a vertex from the field, the farthest of them, um."""
     planned, place, triangles = of.result.planned, of.result.place, of.mesh.triangles
     middles = of.mesh.corners.mean(1)
@@ -174,25 +174,25 @@ def _error(of: Solid, work: Work) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True)
-class Measure:
+class SurfaceMeasure:
     """A measure of a surface."""
 
     unit: str
-    of: Callable[[Solid, Work], NDArray[np.float64]]
+    of: Callable[[SceneSolid, Work], NDArray[np.float64]]
     signed: bool = False  # whether colours begin below 0
     limits: tuple[float, float] | None = None  # values of the first and the last colour; by default its own
 
 
 MEASURES = {
-    "thickness": Measure("mm", _widths(False)),
-    "gap": Measure("mm", _widths(True)),
-    "overhang": Measure("degrees", _overhang, limits=(0.0, 90.0)),
-    "curvature": Measure("1/mm", _curvature, signed=True),
-    "error": Measure("um", _error),
+    "thickness": SurfaceMeasure("mm", _widths(False)),
+    "gap": SurfaceMeasure("mm", _widths(True)),
+    "overhang": SurfaceMeasure("degrees", _overhang, limits=(0.0, 90.0)),
+    "curvature": SurfaceMeasure("1/mm", _curvature, signed=True),
+    "error": SurfaceMeasure("um", _error),
 }
 
 
-def legend(solid: Solid, name: str) -> dict[str, Any]:
+def legend(solid: SceneSolid, name: str) -> dict[str, Any]:
     """Legend of a measure that was taken: its colours for a page, its limits and unit."""
     low, high = solid.limits(name)
     stops = ", ".join("#" + "".join(f"{round(255 * c):02x}" for c in colour) for colour in PALETTE)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,15 +10,16 @@ import numpy as np
 import pytest
 
 from fracslice import box, make_mesh, sphere
+from fracslice.errors import SceneError
 from fracslice.mesh.drawing import SECTION
 from fracslice.records import Print
 from fracslice.scene.view import Camera
 from fracslice.studio.inside import Inside
-from fracslice.studio.layers import HANGS, ISLAND
+from fracslice.studio.layer_view import HANGS, ISLAND
 from fracslice.studio.measuring import Mark, Overlay, Tracer, angle, circle, readout
 from fracslice.studio.measuring import sphere as best_sphere
 from fracslice.studio.session import Studio
-from fracslice.studio.solid import MEASURES, Solid, legend
+from fracslice.studio.solid import MEASURES, SceneSolid, legend
 from fracslice.work import Work
 
 from .test_session import within
@@ -129,6 +131,19 @@ def test_layers_show_islands_in_the_pixels_of_a_printer(studio: Studio, inside: 
     within(lambda: not (studio.shown.pixels > 100).all(2).any())
 
 
+def test_layers_are_written_for_the_printer(studio: Studio, inside: Inside, tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=r"two\.sl1: choose the printer"):
+        studio.start("two.sl1", {})
+    inside.printer, inside.layer = "sl1s", 0.5
+    with pytest.raises(SceneError, match=r"reads \.sl1 files: make two\.sl1"):
+        studio.start("two.goo", {})
+    studio.start("two.sl1", inside.layer_options)
+    assert done(studio) == "two.sl1: 18 layers" and studio.job
+    assert studio.job.command == "fracslice slice two.xml -o two.sl1 --printer sl1s --layer 0.5mm"
+    with zipfile.ZipFile(tmp_path / "two.sl1") as file:
+        assert sum(name.endswith(".png") and "thumbnail" not in name for name in file.namelist()) == 18
+
+
 def test_a_check_lists_problems_and_flies_to_them(studio: Studio, inside: Inside) -> None:
     inside.layer = 0.5
     inside.check()
@@ -190,7 +205,7 @@ def test_all_is_forgotten(studio: Studio, inside: Inside) -> None:
 
 def test_colours_measure_the_surface() -> None:
     made = make_mesh(sphere(10) - sphere(8) - box((30, 30, 0.5)), resolution=64, threads=1)
-    solid = Solid(made)
+    solid = SceneSolid(made)
     for name in MEASURES:
         solid.measure(name, WORK)
         assert solid.coloured(name).colours is not None and legend(solid, name)["unit"] == MEASURES[name].unit

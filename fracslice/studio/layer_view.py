@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +20,15 @@ from ..slicing.printers import START, Printer, Resin
 from ..slicing.raster import INK
 from ..work import Work
 
+if TYPE_CHECKING:
+    from PIL.Image import Image
+    from PIL.ImageDraw import ImageDraw
+
 HANGS, ISLAND, SUPPORT, BED = (236, 140, 50), (214, 60, 200), (84, 150, 214), (70, 76, 88)
 """Colours of pixels with nothing below them, of islands, of supports, and of the printer's screen, sRGB."""
+
+HELD, HANGING, ALONE = 1, 2, 3
+"""Classes of pixels: supports, those with nothing below them, and islands; 0: others."""
 
 FILLED = 0.9
 """Share of the page that a whole layer fills."""
@@ -44,7 +52,7 @@ class Window:
     zoom: float = 1.0
 
     def scale(self, stack: Stack, size: Size) -> float:
-        """Pixels of a millimetre in a picture of a size."""
+        """LayerImage of a millimetre in a picture of a size."""
         across, along, _ = stack.size
         return self.zoom * FILLED * min(size[0] / across, size[1] / along)
 
@@ -58,10 +66,11 @@ class Window:
 
 
 @dataclass(frozen=True, eq=False)
-class Pixels:
+class LayerImage:
     """A layer with what is wrong in it."""
 
     image: NDArray[np.uint8]  # sRGB [ny, nx, 3], front row first
+    classes: NDArray[np.uint8]  # number of the colour of each pixel
     area: float  # mm2
     bodies: int  # components
     islands: int  # components with nothing below them
@@ -69,7 +78,7 @@ class Pixels:
 
 
 @dataclass(frozen=True, eq=False)
-class Layers:
+class PrintLayers:
     """Planned layers, and what is known of their print."""
 
     stack: Stack
@@ -86,29 +95,31 @@ class Layers:
         """Slicer of the stack."""
         return Slicer(self.stack, self.work)
 
-    def look(self, index: int) -> Pixels:
+    def look(self, index: int) -> LayerImage:
         """A layer, compared with the one below it."""
         *below, now = self.slicer.map(_read, [index - 1, index] if index else [index])
         self.areas[index] = now.area
         pixel, classes = self.stack.pixel, now.classes
         if not below:
-            return Pixels(_colours(now), now.area, len(layer_components(now.runs)[0]), 0, 0.0)
+            return LayerImage(_colours(now), classes, now.area, len(layer_components(now.runs)[0]), 0, 0.0)
         reach = max(float(self.stack.heights[index]) / min(pixel), 1.0)
         bare = unsupported_pixels(below[0].runs, now.runs, reach)
-        classes[_mask(bare, np.ones(len(bare.begin), bool))] = 2
+        classes[_mask(bare, np.ones(len(bare.begin), bool))] = HANGING
         solid, held = (layer_components(runs)[0] for runs in (now.runs, below[0].runs))
         alone = np.ones(len(solid), bool)
         alone[overlaps(held, solid)[:, 1]] = False
-        classes[_mask(now.runs, alone[solid.label])] = 3
+        classes[_mask(now.runs, alone[solid.label])] = ALONE
         hanging = float((bare.end - bare.begin).sum()) * pixel[0] * pixel[1]
-        return Pixels(_colours(now), now.area, len(solid), int(alone.sum()), hanging)
+        return LayerImage(_colours(now), classes, now.area, len(solid), int(alone.sum()), hanging)
 
     def survey(self) -> None:
         """Look at the areas of some layers, by which the volume of all is estimated."""
         chosen = np.unique(np.linspace(0, len(self) - 1, SPREAD).astype(int)).tolist()
         self.areas.update(zip(chosen, self.slicer.map(lambda layer: layer.area, chosen), strict=True))
 
-    def figures(self, seen: Pixels | None, index: int, report: PrintReport | None) -> list[tuple[str, str]]:
+    def figures(
+        self, seen: LayerImage | None, index: int, report: PrintReport | None
+    ) -> list[tuple[str, str]]:
         """Names and values of figures of a layer, and of the whole print."""
         stack = self.stack
         rows = [("height", f"{stack.tops[index]:.3f} mm of {stack.tops[-1]:.2f} mm")]
@@ -143,7 +154,7 @@ class Layers:
         return float(areas @ self.stack.heights)
 
     def picture(
-        self, seen: Pixels, window: Window, size: Size, at: tuple[float, float] | None = None
+        self, seen: LayerImage, window: Window, size: Size, at: tuple[float, float] | None = None
     ) -> NDArray[np.uint8]:
         """A layer from above on the printer's screen, its back up; uint8 [rows, columns, 3].
 
@@ -151,30 +162,45 @@ class Layers:
         """
         from PIL import Image, ImageDraw
 
-        width, height = size
         scale = window.scale(self.stack, size)
         page = Image.new("RGB", size, BEHIND)
-        middle = np.array([width / 2 - scale * window.x, height / 2 + scale * window.y])
-        draw = ImageDraw.Draw(page)
+        draw, pixel = ImageDraw.Draw(page), scale * np.array(self.stack.pixel)
+        middle = np.array(size) / 2 + scale * np.array([-window.x, window.y])
         if self.printer:
             reach = scale * np.array(self.printer.screen) / 2
             draw.rectangle([*(middle - reach), *(middle + reach)], outline=BED)
-        ny, nx = seen.image.shape[:2]
-        pixel = scale * np.array(self.stack.pixel)
-        corner = middle - pixel * (nx, ny) / 2
-        low = np.maximum(np.floor(corner), 0).astype(int)
-        high = np.minimum(np.ceil(corner + pixel * (nx, ny)), size).astype(int)
-        if (high > low).all():
-            box = np.clip([(low - corner) / pixel, (high - corner) / pixel], 0, [nx, ny])
-            how = Image.Resampling.BOX if pixel.min() < 1 else Image.Resampling.NEAREST
-            shown = Image.fromarray(np.ascontiguousarray(seen.image[::-1]))
-            (left, upper), (right, lower) = low.tolist(), high.tolist()
-            part = shown.resize((right - left, lower - upper), how, tuple(box.ravel().tolist()))
-            page.paste(part, (left, upper))
+        corner = middle - pixel * seen.classes.shape[::-1] / 2
+        _paste(seen, page, corner, pixel)
+        if pixel.min() < 1:
+            _warn(seen, draw, corner, pixel)
         if at:
             x, y = middle + scale * np.array([at[0], -at[1]])
             draw.ellipse([x - RING, y - RING, x + RING, y + RING], outline=ISLAND, width=2)
         return np.asarray(page)
+
+
+def _paste(seen: LayerImage, page: Image, corner: NDArray[np.float64], pixel: NDArray[np.float64]) -> None:
+    """Paste what is seen of a layer; `corner`: its upper left one on the page, `pixel`: size of a pixel."""
+    from PIL import Image
+
+    count = np.array(seen.classes.shape[::-1])
+    low = np.maximum(np.floor(corner), 0).astype(int)
+    high = np.minimum(np.ceil(corner + pixel * count), page.size).astype(int)
+    if (high <= low).any():
+        return
+    box = np.clip([(low - corner) / pixel, (high - corner) / pixel], 0, count)
+    how = Image.Resampling.BOX if pixel.min() < 1 else Image.Resampling.NEAREST
+    (left, upper), (right, lower) = low.tolist(), high.tolist()
+    part = Image.fromarray(np.ascontiguousarray(seen.image[::-1]))
+    page.paste(part.resize((right - left, lower - upper), how, tuple(box.ravel().tolist())), (left, upper))
+
+
+def _warn(seen: LayerImage, draw: ImageDraw, corner: NDArray[np.float64], pixel: NDArray[np.float64]) -> None:
+    """Draw what is wrong over a layer whose pixels are smaller than those of the page and hide it."""
+    for number, colour in ((HANGING, HANGS), (ALONE, ISLAND)):
+        rows, columns = np.nonzero(seen.classes[::-1] == number)
+        places = np.unique(np.floor(corner + pixel * np.stack([columns, rows], 1)).astype(int), axis=0)
+        draw.point(places.ravel().tolist(), fill=colour)
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,7 +217,7 @@ def _read(layer: Layer) -> _Read:
     coverage = layer.coverage
     classes = np.zeros(coverage.shape, np.uint8)
     if isinstance(layer, SupportedLayer):
-        classes[layer.own.coverage < layer.supports.coverage] = 1
+        classes[layer.own.coverage < layer.supports.coverage] = HELD
     return _Read(layer.runs, coverage, classes, layer.area)
 
 
@@ -206,7 +232,7 @@ def _mask(runs: Runs, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def _colours(of: _Read) -> NDArray[np.uint8]:
     """Colours of the pixels of a layer by their classes and coverage, uint8 [ny, nx, 3]."""
-    table = np.array([INK[1], SUPPORT, HANGS, ISLAND])
+    table = np.array([INK[1], SUPPORT, HANGS, ISLAND])  # in the order of the classes
     share = of.coverage[..., None] / np.float32(255)
     colours: NDArray[np.float64] = INK[0] + share * (table[of.classes] - INK[0]) + 0.5
     return colours.astype(np.uint8)
