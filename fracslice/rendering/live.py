@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Protocol
@@ -173,6 +173,10 @@ class Shown:
     problem: str = ""  # error message of the file's current version, or ""
 
 
+Drawing = Callable[[Camera, tuple[int, int]], np.ndarray]
+"""Draws a scene in another way than by rays, from a camera, in a size, pixels: uint8 [rows, columns, 3]."""
+
+
 class Live:
     """Live picture of a scene, which is read again whenever its source says that it has changed.
 
@@ -198,7 +202,10 @@ class Live:
         self._cost = WITHIN * self._spacing**2  # time of a draft with all pixels, seconds
         self._stepped = time.monotonic()
         self.making: float | None = None
+        self._drawing: Drawing | None = None
+        self._drawn_by: Drawing | None = None
         self._aim: Camera
+        self._drawn: tuple[int, int]
         self._resolved: Node | None = None  # the scene of the last draft, with its depths
         self._load(source.read(), None)
         self._open = True
@@ -265,6 +272,11 @@ class Live:
             self._size = size
             self._refining.cancel.set()
 
+    def draw(self, drawing: Drawing | None) -> None:
+        """Show the scene as a drawing has it from now on; None: by rays. It must not raise."""
+        self._drawing = drawing
+        self._refining.cancel.set()
+
     def wake(self) -> None:
         """Look at the source at once."""
         self._refining.cancel.set()
@@ -289,16 +301,20 @@ class Live:
 
     def _step(self) -> None:
         """Follow the source and the camera; otherwise refine the picture, or wait if it is complete."""
-        self._follow_source()
+        drawing = self._drawing
+        if drawing is None:
+            self._follow_source()
         aim, size = self._flown(), self._size
         try:
-            if aim != self.camera or size != self._drawn:
+            if drawing is not None:
+                self._draw(drawing, aim, size)
+            elif self._drawn_by is not None or aim != self.camera or size != self._drawn:
                 self._draft(self._drafts, aim, size)
             elif self.shown.samples or not self._refining.cancel.wait(REST):
                 self._sharpen()
-        except SceneError:  # the eye is inside the solid
+        except SceneError:  # the eye is inside the solid, perhaps since a drawing was seen from there
             with self._lock:
-                self._aim = self.camera
+                self._aim = self.first if self._drawn_by is not None else self.camera
             self._refining.cancel.wait(POLL)
         except Cancelled:
             return
@@ -314,6 +330,16 @@ class Live:
                 self._aim = aim
             return self._aim
 
+    def _draw(self, drawing: Drawing, camera: Camera, size: tuple[int, int]) -> None:
+        """Show a drawing, unless it is shown; it may be seen from inside the solid, too."""
+        if drawing is self._drawn_by and camera == self.camera and size == self._drawn:
+            self._refining.cancel.wait(POLL)
+            return
+        value = float(self.root.kernel("cpu", "float64").points(*(np.array([c]) for c in camera.eye))[0])
+        distance = abs(value) / self.root.bounds.lipschitz
+        self.shown = Shown(drawing(camera, size), 1.0, camera, distance, self._problem)
+        self._drawn, self._drawn_by = size, drawing
+
     def _draft(self, drafts: Follower, camera: Camera | None, size: tuple[int, int]) -> None:
         """Show a draft, and choose the spacing of the next one by the time that it took."""
         coarse = max(size[0] // self._spacing, 1), max(size[1] // self._spacing, 1)
@@ -324,7 +350,7 @@ class Live:
         pixels = draft.smooth if self._spacing > 1 and renderer.device == "cpu" else draft.shown
         seconds = time.monotonic() - start
         seen = camera or renderer.setup.camera
-        self.shown = Shown(pixels, 0.0, seen, drafts.distance, self._problem)
+        self.shown, self._drawn_by = Shown(pixels, 0.0, seen, drafts.distance, self._problem), None
         self._resolved, self._drawn, self._passes = drafts.root, size, self._sharpened()
         self._cost += STEADY * (seconds * self._spacing**2 - self._cost)
         if self._cost > SLOWER * WITHIN * self._spacing**2:

@@ -23,7 +23,8 @@ from ..export.images import IMAGES
 from ..viewer.viewer import MOVES, PACES, Controls
 from . import panels
 from .film_page import HEIGHT, FilmPanel
-from .session import FILMS, Studio, command, jpeg
+from .inside_page import InsidePanel
+from .session import FILMS, PRINT_ENDINGS, Studio, jpeg
 from .sheets import SheetPanel, embedded
 from .widgets import named, named_by, number_field
 
@@ -103,7 +104,7 @@ class Frames:
 
     def on_interaction(self, _: str, event: dict[str, Any]) -> None:
         """Do what an event of the mouse or a key says."""
-        kind, views = event.get("type", ""), self._studio.views
+        kind, views, inside = event.get("type", ""), self._studio.views, self._studio.inside
         if kind in ("KeyDown", "KeyPress", "KeyUp"):
             self.key(str(event.get("key", "")).lower(), kind != "KeyUp", bool(event.get("controlKey")))
             return
@@ -114,18 +115,30 @@ class Frames:
             self._press(kind == "LeftButtonPress" and not event.get("shiftKey"))
         elif kind.endswith("ButtonRelease"):
             self._drag = None
+            if inside.measuring and math.dist(self.mouse, self._pressed_at) < NEAR:
+                inside.pick(self.mouse)
         elif kind == "MouseMove" and self._drag:
             self._drag(self.mouse[0] - x, self.mouse[1] - y)
+        elif kind == "MouseMove":
+            inside.hover(self.mouse)
         elif kind == "MouseWheel":
-            views.approach(1.0 if event.get("spinY", 0) < 0 else -1.0, self.mouse)
+            nearer = 1.0 if event.get("spinY", 0) < 0 else -1.0
+            if inside.is_flat:
+                inside.zoom(nearer)
+            else:
+                views.approach(nearer, self.mouse)
 
     def _press(self, around: bool) -> None:
         """Begin a drag around the point under the mouse or in place; a second click walks there."""
-        views, now = self._studio.views, time.monotonic()
-        if now - self._pressed < TWICE and math.dist(self.mouse, self._pressed_at) < NEAR:
+        views, inside, now = self._studio.views, self._studio.inside, time.monotonic()
+        still = inside.is_flat or inside.measuring
+        if not still and now - self._pressed < TWICE and math.dist(self.mouse, self._pressed_at) < NEAR:
             views.walk_to(self.mouse)
             return
         self._pressed, self._pressed_at = now, self.mouse
+        if inside.is_flat:
+            self._drag = inside.drag
+            return
         self._drag = views.orbit if around else views.look_around
         if around:
             views.grip(self.mouse)
@@ -146,14 +159,16 @@ class Frames:
 
     async def send(self) -> None:
         """Send the picture if there is a new one, and a page to send it to."""
-        shown = self._studio.shown
-        if shown is self._sent or self._streamer is None:
+        shown, inside = self._studio.shown, self._studio.inside
+        now = shown, inside.overlay
+        if now == self._sent or self._streamer is None:
             return
-        self._sent = shown
+        self._sent = now
         still = shown.samples > 0
         loop = asyncio.get_running_loop()
-        data = await loop.run_in_executor(None, jpeg, shown.pixels, QUALITIES[still])
-        rows, columns, _ = shown.pixels.shape
+        pixels = await loop.run_in_executor(None, inside.over, shown)
+        data = await loop.run_in_executor(None, jpeg, pixels, QUALITIES[still])
+        rows, columns, _ = pixels.shape
         meta = {"type": "image/jpeg", "codec": "", "w": columns, "h": rows, "st": 0, "key": "key"}
         self._streamer.push_content(AREA, meta, data)
 
@@ -192,6 +207,7 @@ class Page:
         )
         self.sheets = SheetPanel(self)
         self.film = FilmPanel(self)
+        self.inside = InsidePanel(self)
         self.refresh()
         self.state.change("xml")(self.write)
         self.ctrl.on_server_bind.add(self.guard)
@@ -339,6 +355,8 @@ class Page:
         """Options of the file that the page names."""
         if str(self.state.file_name).lower().endswith((*IMAGES, *FILMS)):
             return {"samples": int(self.state.samples)}
+        if str(self.state.file_name).lower().endswith(PRINT_ENDINGS):
+            return self.studio.inside.layer_options
         return {"resolution": float(self.state.resolution)}
 
     def cancel(self) -> None:
@@ -354,20 +372,23 @@ class Page:
             await self.frames.send()
             self.film.follow()
             self._say()
+            self.inside.follow()
             await asyncio.sleep(TICK)
 
     def _say(self) -> None:
         """Bring the line below the picture, and that of the job, up to date."""
         shown, job = self.studio.shown, self.studio.job
         state = "draft" if shown.samples < 1 else f"{format_count(round(shown.samples), 'sample')} a pixel"
+        state = state if self.studio.inside.mode == "field" else self.studio.inside.mode
         making = "   compiling ..." if self.studio.live.making else ""
         status = f"{state}   surface at {shown.distance:.2g}   pace {self.frames.controls.pace:.2g}{making}"
         told = {}
         if job:
             line = job.result or job.problem or job.stage
             told = {"line": line, "share": round(100 * job.share), "done": job.is_done}
-            told["command"] = command(self.studio.target, job.path.name, self.options)
-        problem = self.studio.document.problem or self.studio.message or shown.problem
+            told["command"] = job.command
+        said = self.studio.inside.message or self.studio.message
+        problem = self.studio.document.problem or said or shown.problem
         changes = {"status": status, "job": told, "problem": problem}
         if any(self.state[name] != value for name, value in changes.items()):
             with self.state as state_now:
@@ -425,6 +446,7 @@ class Page:
                 self._editor()
             with v.VNavigationDrawer(v_model=("marking",), location="right", width=240):
                 self.sheets.build_bookmarks()
+            self.inside.build()
             with v.VMain(style="height: 100vh"):
                 self._picture()
                 self.film.build()
@@ -457,6 +479,11 @@ class Page:
                 icon="mdi-camera-marker",
                 click=self.keep_view,
                 raw_attrs=named("Write this view into the scene"),
+            )
+            v.VBtn(
+                icon="mdi-layers-search",
+                click="looking_inside = !looking_inside",
+                raw_attrs=named("Inside", "Mesh, layers, check, measures"),
             )
             v.VBtn(icon="mdi-xml", click="editing = !editing", raw_attrs=named("Text", "Text of the scene"))
             v.VBtn(icon="mdi-filmstrip", click=self.film.toggle, raw_attrs=named("Film"))
@@ -612,6 +639,8 @@ class Page:
                     density="compact",
                     raw_attrs=named("Place of the cut"),
                 )
+            with html.Div(style="position: absolute; left: 8px; top: 8px"):
+                self.inside.modes()
             html.Div(
                 "{{ status }}",
                 style="position: absolute; left: 8px; bottom: 6px; color: #eee; text-shadow: 0 0 3px #000",
@@ -623,7 +652,7 @@ class Page:
                 v_if="problem",
                 type="warning",
                 density="compact",
-                style="position: absolute; left: 8px; right: 8px; top: 8px",
+                style="position: absolute; left: 8px; right: 8px; top: 56px",
             )
             with v.VCard(
                 v_if="job.line",
@@ -638,10 +667,10 @@ class Page:
     def _dialogs(self) -> None:
         found = "choices.filter(c => (c.name + c.doc).includes(search)"
         around = f"{found} && c.kind != 'shape' && c.kind != 'part')"
-        self._list("adding", "Add an element", f"{found})", "c.doc", (self.add, "[c.name, false]"))
-        self._list("wrapping", "Wrap it in", around, "c.doc", (self.add, "[c.name, true]"))
+        self._list("adding", "Add an element", f"{found})", (self.add, "[c.name, false]"))
+        self._list("wrapping", "Wrap it in", around, (self.add, "[c.name, true]"))
         scenes = "scenes.filter(c => (c.name + c.doc).includes(search))"
-        self._list("opening", "Open a scene", scenes, "c.doc", (self.open, "[c.name]"))
+        self._list("opening", "Open a scene", scenes, (self.open, "[c.name]"))
         self.sheets.build_variations()
         with v.VDialog(v_model=("helping",), width=460), v.VCard(title="Help"), v.VTable(), html.Tbody():
             for keys, meaning in HELP:
@@ -650,39 +679,27 @@ class Page:
                     html.Td(meaning)
         with v.VDialog(v_model=("making",), width=460), v.VCard(title="Make a file", classes="pa-3"):
             v.VTextField(
-                v_model=("file_name",), label="File: .stl .3mf .ply .obj .glb .png .jpg .webp .mp4 .webm .gif"
+                v_model=("file_name",), label="File: .stl .3mf .ply .obj .glb .png .jpg .mp4 .goo .sl1 ..."
             )
             v.VTextField(v_model=("resolution",), type="number", label="Voxels along the longest side")
             v.VTextField(v_model=("samples",), type="number", label="Samples a pixel, of a picture or a film")
             v.VBtn("Make", click=(self.make_and_close,), color="primary")
 
-    def _list(
-        self, flag: str, title: str, rows: str, about: str, click: tuple[Callable[..., None], str]
-    ) -> None:
-        """Dialog with a search and the rows `c` that it leaves, each with its name and what is about it."""
+    def _list(self, flag: str, title: str, rows: str, click: tuple[Callable[..., None], str]) -> None:
+        """Dialog with a search and the rows `c` that it leaves: picture, name and description."""
         with v.VDialog(v_model=(flag,), width=720), v.VCard(title=title):
             v.VTextField(v_model=("search",), label="Search", autofocus=True, classes="mx-4")
             with (
                 v.VList(
                     density="compact", classes="d-flex flex-wrap", style="max-height: 64vh; overflow: auto"
                 ),
-                v.VListItem(
-                    v_for=f"c in {rows}",
-                    key="c.name",
-                    click=click,
-                    style="width: 50%",
-                    raw_attrs=[f':title="{about}"'],
-                ),
+                v.VListItem(v_for=f"c in {rows}", key="c.name", click=click, style="width: 50%"),
                 html.Div(classes="d-flex align-center"),
             ):
-                html.Div(
-                    v_if="pictures[c.name]",
-                    style=(SMALL,),
-                    classes="mr-3",
-                )
+                html.Div(v_if="pictures[c.name]", style=(SMALL,), classes="mr-3")
                 with html.Div(style="min-width: 0"):
                     html.Div("{{ c.name }}")
-                    html.Div(f"{{{{ {about} }}}}", classes="text-caption text-medium-emphasis")
+                    html.Div("{{ c.doc }}", classes="text-caption text-medium-emphasis")
 
     def make_and_close(self) -> None:
         """Make the file and close the dialog."""

@@ -21,10 +21,12 @@ from ..common.files import replacing
 from ..common.parameters import AUTO, Number
 from ..errors import Cancelled, FracsliceError, RenderError, SceneError
 from ..export.images import IMAGES
+from ..export.layers import ENDINGS as LAYER_ENDINGS
 from ..fields.box import Box
 from ..fields.registry import Fixed
 from ..formats import ENDINGS, SOLIDS
 from ..formulas import Node, intersection, plane
+from ..mesh.drawing import Plane
 from ..rendering import Renderer
 from ..rendering.live import Live, Shown
 from ..scene import library
@@ -35,6 +37,7 @@ from ..work import Work
 from . import keyframes
 from .bookmarks import Bookmarks, between, is_worth_a_look
 from .document import Document, Place, Tag, element_of, with_attribute
+from .inside import Inside
 from .keyframes import Player
 from .panels import controls
 from .views import Pixel, Views, depth_of, rounded
@@ -42,6 +45,9 @@ from .views import between as view_between
 
 THUMBNAIL, SAMPLES = (200, 150), 4
 """Pixels of the picture of a variation, and samples of each."""
+
+PRINT_ENDINGS = tuple(ending for ending in LAYER_ENDINGS if ending and ending not in ENDINGS)
+"""Endings of files of layers that are no meshes."""
 
 FILMS = tuple(ending for ending in FILM_ENDINGS if ending not in IMAGES)
 """Endings of films."""
@@ -110,19 +116,25 @@ class CutPlane:
     flipped: bool  # whether the part with larger coordinates stays
 
     def half(self, box: Box) -> Node:
-        """The half of space that stays; an unbounded solid counts as 20 units long."""
+        """The half of space that stays."""
+        before = self.plane(box)
+        return plane(before.normal, before.offset)
+
+    def plane(self, box: Box) -> Plane:
+        """The plane before which all is cut away; an unbounded solid counts as 20 units long."""
         low, high = max(box.lo[self.axis], -10.0), min(box.hi[self.axis], 10.0)
         at = low + self.share * (high - low)
         normal = [0.0, 0.0, 0.0]
         normal[self.axis] = -1.0 if self.flipped else 1.0
-        return plane(tuple(normal), -at if self.flipped else at)
+        return Plane((normal[0], normal[1], normal[2]), -at if self.flipped else at)
 
 
 @dataclass(eq=False)
 class Job:
-    """A file that is made in the background."""
+    """What is made in the background."""
 
-    path: Path
+    name: str
+    command: str = ""  # that makes the same
     stage: str = "beginning"
     share: float = 0.0
     result: str = ""  # what was made, once it is
@@ -183,6 +195,7 @@ class Studio:
         self.player = Player()
         self._film: Timeline | None = None
         self._worker: threading.Thread | None = None
+        self.inside = Inside(self, self._work)
 
     def _compile_ahead(self) -> None:
         """Compile in the background what the first edit of a number will need."""
@@ -201,6 +214,16 @@ class Studio:
         self.live.close()
 
     @property
+    def scene(self) -> Scene:
+        """The last valid scene."""
+        return self.document.scene
+
+    @property
+    def cut_plane(self) -> Plane | None:
+        """The plane that cuts the picture open, if one does."""
+        return self.section.plane(self.scene.root.bounds.box) if self.section else None
+
+    @property
     def shown(self) -> Shown:
         """The picture and what is known of it."""
         return self.live.shown
@@ -213,6 +236,7 @@ class Studio:
         self.document, self.target = document, target
         self.bookmarks, self.section = Bookmarks(target), None
         self.views.forget()
+        self.inside.release()
         self.player = Player()
         self._scene.put(self.document.scene)
         self.live.wake()
@@ -391,6 +415,7 @@ class Studio:
             same = self.section and self.section.axis == number
             self.section = CutPlane(number, share, self.section.flipped if self.section and same else towards)
         self._show()
+        self.inside.draw()
 
     def set_number(self, place: Place, attribute: str, index: int, value: float) -> None:
         """Change one of the numbers of an attribute."""
@@ -402,6 +427,14 @@ class Studio:
         numbers = list(control["values"])
         numbers[index] = value
         self.set_value(place, attribute, " ".join(f"{n:.6g}" for n in numbers))
+
+    def set_part(self, part: str, attribute: str, value: str | None) -> None:
+        """Give an attribute of an element below `<scene>` a value, or take it away; it is added at need."""
+        tag = self.document.part(part)
+        if tag is not None:
+            self.edit(self.document.set_value, tag.place, attribute, value)
+        elif value is not None:
+            self.edit(self.document.append, f'<{part} {attribute}="{escape(value)}"/>')
 
     def keep_view(self) -> None:
         """Write the camera into the scene."""
@@ -432,59 +465,73 @@ class Studio:
         return path
 
     def start(self, name: str, options: dict[str, Any]) -> None:
-        """Begin to make a file: a picture or a mesh, by its extension; one at a time."""
-        if self.job and not self.job.is_done:
-            self.message = f"{self.job.path.name} is being made; cancel it first"
-            return
+        """Begin to make a file by its extension: a picture, a film, a mesh or layers; one at a time."""
         path = self._inside(name)
-        if path.suffix.lower() not in (*IMAGES, *ENDINGS, *FILMS):
-            raise SceneError(f"{name}: expected a file of {', '.join((*IMAGES, *ENDINGS, *FILMS))}")
-        job = self.job = Job(path)
-        arguments = job, self.document.scene, self.live.camera, options
-        self._worker = threading.Thread(target=self._make, args=arguments, name="fracslice job")
+        known = *IMAGES, *ENDINGS, *FILMS, *PRINT_ENDINGS
+        if path.suffix.lower() not in known:
+            raise SceneError(f"{name}: expected a file of {', '.join(known)}")
+        if path.suffix.lower() in PRINT_ENDINGS:
+            self.inside.check_file(path)
+        make = partial(self._file, path, self.document.scene, self.live.camera, options)
+        self.run(path.name, make, command(self.target, name, options))
+
+    def run(self, name: str, make: Callable[[Work], str], command: str = "") -> None:
+        """Begin a job in the background, if none is running: it says what it made, in a line."""
+        if self.job and not self.job.is_done:
+            self.message = f"{self.job.name} is being made; cancel it first"
+            return
+        self.message, job = "", Job(name, command)
+        self.job = job
+        self._worker = threading.Thread(target=self._run, args=(job, make), name="fracslice job")
         self._worker.start()
 
-    def _make(self, job: Job, scene: Scene, camera: Camera, options: dict[str, Any]) -> None:
+    def _run(self, job: Job, make: Callable[[Work], str]) -> None:
         """Body of the thread of a job."""
-        from ..api.calls import make_mesh, render
-
-        how: dict[str, Any] = {"progress": job.progress, "cancel": job.cancel, "threads": self._work.threads}
         try:
-            if job.path.suffix.lower() in IMAGES:
-                seen = replace(scene, view=replace(scene.view, camera=camera))
-                render(seen, **options, **how).save(job.path)
-                job.result = f"{job.path.name} is written"
-                return
-            if job.path.suffix.lower() in FILMS:
-                self._make_film(job, scene, options["samples"], Work(**how))
-                return
-            report = make_mesh(scene, path=job.path, **options, **how).report
-            verdict = f", would not print: {', '.join(report.problems)}" if report.problems else ""
-            job.result = f"{job.path.name}: {report.mesh.triangles:,} triangles{verdict}"
+            job.result = make(replace(self._work, progress=job.progress, cancel=job.cancel))
         except Cancelled:
             job.problem = "cancelled; nothing was written"
         except FracsliceError as error:
             job.problem = str(error)
 
-    def _make_film(self, job: Job, scene: Scene, samples: int, work: Work) -> None:
+    def _file(self, path: Path, scene: Scene, camera: Camera, options: dict[str, Any], work: Work) -> str:
+        """Make a picture, a film, a mesh or layers."""
+        from ..api.calls import make_mesh, render
+
+        ending = path.suffix.lower()
+        if ending in IMAGES:
+            seen = replace(scene, view=replace(scene.view, camera=camera))
+            how: dict[str, Any] = {"progress": work.progress, "cancel": work.cancel, "threads": work.threads}
+            render(seen, **options, **how).save(path)
+            return f"{path.name} is written"
+        if ending in PRINT_ENDINGS:
+            return self.inside.write_layers(path, scene, work)
+        if ending in FILMS:
+            return self._film_of(path, scene, options["samples"], work)
+        report = make_mesh(scene, work=work, path=path, **options).report
+        verdict = f", would not print: {', '.join(report.problems)}" if report.problems else ""
+        return f"{path.name}: {report.mesh.triangles:,} triangles{verdict}"
+
+    def _film_of(self, path: Path, scene: Scene, samples: int, work: Work) -> str:
         """Make the frames of a film that are not there yet, and its file."""
         film, rate = Timeline(scene), scene.animation.fps if scene.animation else 0.0
-        check_film(job.path, rate)
+        check_film(path, rate)
         size = scene.view.film.width, scene.view.film.height
         frames = FilmJob(film, size, samples, rate, device=self._device)
-        folder = job.path.with_suffix(".frames")
+        folder = path.with_suffix(".frames")
         try:
             paths = write_frames(frames, range(frames.frames), folder, True, work)
         except RenderError:  # those of the film as it was before
             paths = write_frames(frames, range(frames.frames), folder, False, work)
-        encode(paths, job.path, rate, work)
-        job.result = f"{job.path.name}: {frames.frames} frames"
+        encode(paths, path, rate, work)
+        return f"{path.name}: {frames.frames} frames"
 
 
 def command(target: Path, name: str, options: dict[str, Any]) -> str:
     """Command line that makes the same file."""
     ending = Path(name).suffix.lower()
-    verb = "render" if ending in IMAGES else "animate" if ending in FILMS else "mesh"
+    verbs = {"render": IMAGES, "animate": FILMS, "slice": PRINT_ENDINGS}
+    verb = next((verb for verb, endings in verbs.items() if ending in endings), "mesh")
     given = "".join(f" --{option} {value}" for option, value in options.items())
     return f"fracslice {verb} {target.name} -o {name}{given}"
 

@@ -71,9 +71,11 @@ def served(browser: playwright.Browser, tmp_path_factory: pytest.TempPathFactory
         address = process.stdout.readline().strip()
         page = browser.new_page(viewport={"width": 1200, "height": 640})
         page.goto(address)
-        page.get_by_text("sphere").wait_for()
-        yield Served(page, address, folder)
-        process.send_signal(2)
+        try:
+            row(page, "sphere").wait_for()
+            yield Served(page, address, folder)
+        finally:
+            process.send_signal(2)
         assert process.wait(60) in (0, 130)
 
 
