@@ -277,8 +277,9 @@ class Closing:
     loose: int = 0  # bodies that do not stand on the plate
     bridge: float = 0.0  # minimum diameter of struts
 
-    def lines(self) -> Iterator[str]:
-        """Iterate over the lines, each with the option that mends what it names."""
+    @property
+    def amount(self) -> str:
+        """Volume, weight, time and cost."""
         ml = self.volume / 1000
         amount = [
             f"{self.about}{millilitres(self.volume)}",
@@ -290,7 +291,11 @@ class Closing:
             amount.append(duration(self.seconds))
         if self.cost:
             amount.append(f"cost {self.cost:.2f}")
-        yield ", ".join(amount)
+        return ", ".join(amount)
+
+    def lines(self) -> Iterator[str]:
+        """Iterate over the lines, each with the option that mends what it names."""
+        yield self.amount
         if self.drains:
             places = [place(at, 1) for at in self.drains]
             where = f"{' and '.join(places)} mm"
@@ -342,6 +347,14 @@ def of_mesh(result: Result, material: str, price: float | None) -> Closing:
         loose=report.loose_bodies,
         bridge=JOINING * report.voxel_mm,
     )
+
+
+def total(parts: Iterable[Closing]) -> str:
+    """Amount of all meshes of a file."""
+    first, *others = parts
+    volume = sum((part.volume for part in others), first.volume)
+    cost = None if first.cost is None else first.cost * volume / first.volume
+    return replace(first, volume=volume, cost=cost).amount
 
 
 def of_material(report: PrintReport, material: str) -> PrintReport:

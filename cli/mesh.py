@@ -16,7 +16,6 @@ from fracslice.formats import ENDINGS
 from fracslice.records import PartsJob
 
 from .execution import (
-    DENSITIES,
     BadInput,
     check_folder,
     check_targets,
@@ -26,11 +25,13 @@ from .execution import (
     refuse_moved,
     refuse_options,
     summary,
+    total,
 )
 from .options import (
     AMOUNT,
     FOR_SLICERS,
     INTERVAL,
+    MATERIAL,
     SECONDS,
     ClusterOptions,
     MeshOptions,
@@ -41,6 +42,8 @@ from .options import (
     option,
     output,
 )
+from .plate import write_meshes
+from .slice import COPIES, SPACING
 from .sweeps import MOST, TABLE, families, going_on, is_table, with_suffix
 
 if TYPE_CHECKING:
@@ -87,11 +90,7 @@ class MeshFileOptions(ClusterOptions, MeshOptions):
         "The device that evaluates the field; cpu by default. auto: the GPU, if there is one.",
         default="cpu",
     )
-    material: str = option(
-        click.Choice(list(DENSITIES)),
-        "Material of the weight in the summary; resin by default.",
-        default="resin",
-    )
+    material: str = MATERIAL
     price: float | None = option(AMOUNT, "Price of a kilogram.")
 
 
@@ -101,12 +100,15 @@ class WholeOptions(MeshFileOptions):
     records = (PartsJob,)
     bed: Triple | None
     parts: tuple[int, int, int] | str | None
+    copies: int = COPIES
+    spacing: float = SPACING
 
 
 @command(WholeOptions)
 @families("output", "report", "picture")
 def mesh(given: WholeOptions) -> int:
-    """Make a printable mesh of SCENE, and print a summary. With --bed or --parts, make it in parts.
+    """Make a printable mesh of SCENE, and print a summary. With --bed or --parts, make it in parts; with
+    --copies, put several side by side.
 
     Exit status: 1 if the mesh would not print; the file is written. A mesh
     that does not fit in memory is made piece after piece if it goes to an .stl file.
@@ -117,11 +119,20 @@ def mesh(given: WholeOptions) -> int:
     fracslice mesh geode -o geode.3mf --thickness 0.8mm --bridge 1.5mm
     fracslice mesh menger-sponge -o sponge.stl --set menger.level=1..3
     """
+    if given.copies > 1:
+        from fracslice.slicing.packing import Beds
+
+        refuse_options(NO_COPIES, "not with --copies")
+        return write_meshes(given, [given.source] * given.copies, Beds(spacing=given.spacing))
+    refuse_options({"spacing"}, "only for several parts: --copies, or fracslice plate")
     return make_files(given) if given.bed is None and given.parts is None else make_parted(given)
 
 
 NO_PARTS = frozenset({"implicit", "report", "seconds", "every", "cluster", "shard", "store", *FOR_SLICERS})
 """Options that parts do not have."""
+
+NO_COPIES = NO_PARTS | {*PartsJob.kinds(), "picture", "cache", "device"}
+"""Options that copies do not have."""
 
 
 def make_parted(given: WholeOptions) -> int:
@@ -146,7 +157,10 @@ def make_parted(given: WholeOptions) -> int:
 
             draw(made.exploded(), given.picture)
     if not given.quiet:
-        click.echo(os.linesep.join(parted_lines(made, [str(file) for file in files])))
+        closing = [
+            of_mesh(m, given.material, given.price) for _, m, count in made.named for _ in range(count)
+        ]
+        click.echo(os.linesep.join([*parted_lines(made, [str(file) for file in files]), total(closing)]))
     return 1 if any(mesh.report.problems for mesh in made.meshes) else 0
 
 
@@ -165,7 +179,7 @@ def parted_lines(made: Parted, files: list[str]) -> Iterator[str]:
     if silent := [str(n) for n, part in enumerate(divided.parts, 1) if part.number is None]:
         yield f"no place for the number of part {', '.join(silent)}"
     if made.bed is not None and len(files) == 1:
-        yield format_count(made.beds, "bed")
+        yield format_count(made.laid_out.beds, "bed")
 
 
 def whole(scene: Scene, _: Work) -> Parts:

@@ -6,32 +6,36 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import concatenate
-from ..common.files import check_target, replacing
+from ..common.files import check_target
 from ..errors import SceneError
 from ..fields.box import Triple
 from ..formats import check_format, write
-from ..formats._3mf import Built, write_build
 from ..mesh import Mesh
 from ..records import SAME, UP, MeshJob, PartsJob
 from ..scene import Print, Scene
-from ..version import APPLICATION
+from ..slicing.packing import Beds
 from ..volume.amount import sizing
-from ..volume.dividing import BED_TO_BED, Divided, divide, laid_out
+from ..volume.dividing import Divided, divide
 from ..work import Work
 from .mesh import make_mesh
+from .plates import LaidOut, lay_out
 from .report import Result
+
+GAP = 5.0
+"""Distance between parts on a bed of a filament printer, mm."""
 
 APART = 0.25
 """How far parts are drawn from each other, by the longest side of the object."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Parted:
     """Meshes of an object in parts."""
 
@@ -46,24 +50,13 @@ class Parted:
         parts = [(str(n), mesh, 1) for n, mesh in enumerate(self.meshes, 1)]
         return parts + ([("peg", self.peg, len(self.divided.pegs))] if self.peg else [])
 
-    def placed(self) -> list[Built]:
-        """Objects with their places on beds, whose first has its corner at the origin."""
-        copies = [(name, mesh.mesh) for name, mesh, count in self.named for _ in range(count)]
-        sizes = [(float(mesh.size[0]), float(mesh.size[1])) for _, mesh in copies]
-        places: dict[str, list[NDArray[np.float64]]] = {}
-        for (name, mesh), (bed, x, y) in zip(copies, laid_out(sizes, self.bed), strict=True):
-            start = bed * BED_TO_BED * self.bed[0] if self.bed else 0.0
-            low = mesh.bounds[0]
-            moved = np.vstack([np.eye(3), [start + x - low[0], y - low[1], 0.0]])
-            places.setdefault(name, []).append(moved)
-        meshes = dict(copies)
-        return [Built(meshes[name], some, name) for name, some in places.items()]
-
-    @property
-    def beds(self) -> int:
-        """Number of beds."""
-        sizes = [tuple(mesh.mesh.size[:2].tolist()) for _, mesh, count in self.named for _ in range(count)]
-        return 1 + max(bed for bed, _, _ in laid_out(sizes, self.bed))
+    @cached_property
+    def laid_out(self) -> LaidOut:
+        """All on beds."""
+        meshes = [mesh.mesh for _, mesh, _ in self.named]
+        places = [k for k, (_, _, count) in enumerate(self.named) for _ in range(count)]
+        names = [f"part {self.named[k][0]}" for k in places]
+        return lay_out(meshes, places, names, Beds(self.bed and self.bed[:2], GAP, most=None))
 
     def exploded(self) -> Mesh:
         """All parts where they belong, moved away from each other, and the pegs between them."""
@@ -121,6 +114,5 @@ def write_parts(made: Parted, path: str | Path, about: dict[str, str], work: Wor
             check_target(name)
         pairs = zip(names, made.named, strict=True)
         return [write(mesh.mesh, name, about, work) for name, (_, mesh, _) in pairs]
-    with replacing(path) as file:
-        write_build(made.placed(), file, {"Application": APPLICATION} | about, work)
+    made.laid_out.write(path, about, work, [name for name, _, _ in made.named])
     return [path]

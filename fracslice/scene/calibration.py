@@ -43,19 +43,29 @@ FINEST, LARGEST = 0.02, 3.0
 """Limits of a size."""
 
 
-def number(text: str, x: float, y: float, top: float) -> Node:
-    """Number to cut out of a face, centred at x and y, as deep as `DEPTH` below `top`."""
-    wide = HEIGHT / 2
-    widths = [STROKE if sign == "." else wide for sign in text]
-    left = x - (sum(widths) + 2 * STROKE * (len(text) - 1)) / 2
-    boxes = list[Node]()
+def bars(text: str, height: float, stroke: float) -> Iterator[tuple[float, float, float, float]]:
+    """Middles along x and y and sizes of the lines of a number, centred.
+
+    `height`: between the middles of its lowest and highest lines; `stroke`: width of lines.
+    """
+    wide = height / 2
+    widths = [stroke if sign == "." else wide for sign in text]
+    left = -(sum(widths) + 2 * stroke * (len(text) - 1)) / 2
     for sign, width in zip(text, widths, strict=True):
         for across, along, dx, dy in map(_segment, SEGMENTS[sign]):
-            size = across * width + STROKE, along * HEIGHT / 2 + STROKE, 2 * DEPTH
-            at = left + width / 2 + dx * width, y + dy * HEIGHT / 2, top
-            boxes.append(transform(box(size=size), translate=at))
-        left += width + 2 * STROKE
-    return union(*boxes)
+            sides = across * width + stroke, along * wide + stroke
+            yield (left + width / 2 + dx * width, dy * wide, *sides)
+        left += width + 2 * stroke
+
+
+def number(text: str, x: float, y: float, top: float) -> Node:
+    """Number to cut out of a face, centred at x and y, as deep as `DEPTH` below `top`."""
+    return union(
+        *(
+            transform(box(size=(across, along, 2 * DEPTH)), translate=(x + u, y + v, top))
+            for u, v, across, along in bars(text, HEIGHT, STROKE)
+        )
+    )
 
 
 def _segment(name: str) -> tuple[float, float, float, float]:

@@ -23,7 +23,7 @@ from ..fields.registry import Node
 from ..formulas import box as cuboid
 from ..formulas import cylinder, difference, intersection, plane, transform, union
 from ..records import PartsJob, Placed
-from ..scene.calibration import SEGMENTS
+from ..scene.calibration import bars
 from ..work import Work
 from . import with_depths
 from .amount import orient_field, sizing
@@ -466,56 +466,9 @@ class _Division:
         up = np.eye(3)[1 if axis == 2 else 2]
         normal = outward * np.eye(3)[axis]
         right = np.cross(up, normal)
-        wide, bar, pitch = 0.5 * height, height / 7, 0.8 * height
-        for n, digit in enumerate(text):
-            start = (n - (len(text) - 1) / 2) * pitch
-            for segment in SEGMENTS[digit]:
-                u, v, across, along = _bar(segment, wide, height, bar)
-                size = np.abs(right) * across + np.abs(up) * along + np.abs(normal) * (DEPTH + OVER)
-                at = middle + (start + u) * right + v * up - (DEPTH - OVER) / 2 * normal
-                made = cuboid(size=(size / self.whole.unit).tolist())
-                yield transform(made, translate=self.whole.scene_point(at.tolist()))
-
-
-def _bar(segment: str, wide: float, height: float, bar: float) -> tuple[float, float, float, float]:
-    """Middle and sizes of a segment of a digit."""
-    if segment in "adg":
-        return 0.0, {"a": 1, "d": -1, "g": 0}[segment] * (height - bar) / 2, wide, bar
-    side = 1 if segment in "bc" else -1
-    half = (height + bar) / 2
-    return side * (wide - bar) / 2, (1 if segment in "bf" else -1) * (height - half) / 2, bar, half
-
-
-GAP, BED_TO_BED = 5.0, 1.2
-"""Distance between parts on a bed, and of beds by their width, as in Bambu Studio and OrcaSlicer."""
-
-
-def laid_out(sizes: Sequence[tuple[float, float]], bed: Triple | None) -> list[tuple[int, float, float]]:
-    """Bed of each part, and its low corner there: in rows, the deepest first. Without a bed, one row.
-
-    `sizes`: along x and y.
-    """
-    width, depth = bed[:2] if bed else (math.inf, math.inf)
-    places: list[tuple[int, float, float]] = [(0, 0.0, 0.0)] * len(sizes)
-    rows, ends = list[_Row](), list[float]()
-    for index in sorted(range(len(sizes)), key=lambda k: (-sizes[k][1], -sizes[k][0], k)):
-        across, along = sizes[index]
-        row = next((row for row in rows if row.end + across <= width), None)
-        if row is None:
-            number = next((n for n, end in enumerate(ends) if end + along <= depth), len(ends))
-            ends += [0.0] * (number == len(ends))
-            row = _Row(number, ends[number])
-            rows.append(row)
-            ends[number] += along + GAP
-        places[index] = row.bed, row.end, row.start
-        row.end += across + GAP
-    return places
-
-
-@dataclass
-class _Row:
-    """A row of parts on a bed, of which the first is the deepest."""
-
-    bed: int
-    start: float  # along y
-    end: float = 0.0  # along x
+        stroke = height / 7
+        for u, v, across, along in bars(text, height - stroke, stroke):
+            size = np.abs(right) * across + np.abs(up) * along + np.abs(normal) * (DEPTH + OVER)
+            at = middle + u * right + v * up - (DEPTH - OVER) / 2 * normal
+            made = cuboid(size=(size / self.whole.unit).tolist())
+            yield transform(made, translate=self.whole.scene_point(at.tolist()))
