@@ -233,6 +233,7 @@ class PrintFormat(LayerFormat):
             raise ExportError("a print file needs a printer")
         if run.resin is None:
             raise ExportError("a print file needs an exposure: none is known for this printer")
+        run.resin.check_depth(float(run.stack.heights.max()))
 
         def record(layer: Layer) -> bytes:
             data = self.encode(run, layer)

@@ -146,6 +146,17 @@ def exposure(sizes: Sequence[float], label: str) -> Node:
     return difference(union(*added, tab), *cut, *_labelled(label, 0, -15, PLATE))
 
 
+def depth(sizes: Sequence[float], label: str) -> Node:
+    """Bridges of several thicknesses, 6 mm long, which grow downwards by the light that passes them."""
+    wide = PITCH * len(sizes) + 2
+    walls = [_block(0, y, PLATE, wide, 2, 2) for y in (5, 13)]
+    added, cut = [_plate(sizes, 30.0), *walls], list[Node]()
+    for size, x in _columns(sizes):
+        added.append(_block(x, 9, PLATE + 2, 5, 10, size))
+        cut.append(number(f"{size:g}", x, -5, PLATE))
+    return difference(union(*added), *cut, *_labelled(label, 0, -11, PLATE))
+
+
 def _cut(solid: Node, cuts: Sequence[Node]) -> Node:
     return difference(solid, *cuts) if cuts else solid
 
@@ -155,6 +166,7 @@ def _labelled(label: str, x: float, y: float, top: float) -> list[Node]:
 
 
 OBJECTS: dict[str, tuple[Callable[[Sequence[float], str], Node], tuple[float, ...]]] = {
+    "depth": (depth, (1.0, 1.5, 2.0)),
     "elephant-foot": (elephant_foot, (0.1, 0.2, 0.3, 0.4, 0.6)),
     "exposure": (exposure, (0.2, 0.3, 0.4, 0.5, 0.6, 0.8)),
     "tolerance": (tolerance, (0.05, 0.1, 0.15, 0.2, 0.3, 0.4)),

@@ -5,6 +5,7 @@ sources.
 from __future__ import annotations
 
 import csv
+import math
 import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -155,6 +156,12 @@ class Resin:
     wait: float = attribute(Number, 0.5, "seconds before each layer", least=0, most=1000)
     wait_after: float = attribute(Number, 0.0, "seconds after each layer", least=0, most=1000)
     wait_lifted: float = attribute(Number, 0.0, "seconds after the lift", least=0, most=1000)
+    # working curve (Jacobs 1992): depth at which 1/e of the light is left, mm, and the exposure at which
+    # resin begins to cure, s; 0 for what was not measured
+    penetration: float = attribute(
+        Number, 0.0, "mm, depth at which 1/e of the light is left", least=0, most=10
+    )
+    critical: float = attribute(Number, 0.0, "seconds until resin begins to cure", least=0, most=1000)
     density: float = attribute(Number, 1.1, "g/ml", above=0, most=100)  # g/ml
     price: float = attribute(Number, 0.0, "of a litre", least=0)  # price of a litre
 
@@ -184,6 +191,30 @@ class Resin:
     def rest(self) -> float:
         """All rests of a layer, s: what stands before a layer in formats without the others."""
         return self.wait + self.wait_after + self.wait_lifted
+
+    def cured_depth(self, exposure: float) -> float | None:
+        """Depth to which an exposure, s, cures, mm; None if the working curve is not known."""
+        if not self.penetration or not self.critical:
+            return None
+        return self.penetration * math.log(exposure / self.critical)
+
+    def excess(self, layer: float) -> float | None:
+        """Distance by which faces that look down are cured too deep, mm; None as for `cured_depth`.
+
+        It is that of a face below many layers, `layer` mm high, whose doses add up.
+        """
+        depth = self.cured_depth(self.exposure)
+        return depth and depth - self.penetration * math.log(math.expm1(layer / self.penetration))
+
+    def check_depth(self, layer: float) -> None:
+        """Raise `ExportError` for an exposure that does not reach through a layer, mm."""
+        depth = self.cured_depth(self.exposure)
+        if depth is not None and depth < layer:
+            least = self.critical * math.exp(layer / self.penetration)
+            raise ExportError(
+                f"an exposure of {self.exposure:g} s cures {max(depth, 0):.2g} mm, a layer is {layer:g} mm: "
+                f"expected at least {least:.3g} s"
+            )
 
     def exposures(self, layers: int) -> NDArray[np.float64]:
         """Exposure of each layer.
