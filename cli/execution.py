@@ -386,7 +386,7 @@ def of_layers(run: SliceRun, price: float | None) -> Closing:
         density=resin.density if resin else DENSITIES["resin"],
         about="about " if len(known) < run.layers else "",
         layers=run.layers,
-        seconds=resin.seconds(run.layers) if resin else None,
+        seconds=resin.seconds(areas) if resin else None,
         cost=None if of is None else volume / 1e6 * of,
         drains=[tuple(p) for p in places.tolist()],
         drain=2 * stack.scale * max((d.radius for d in stack.drains), default=0.0),

@@ -199,7 +199,12 @@ class PrintData:
     @property
     def seconds(self) -> float:
         """Duration, s."""
-        return self.resin.seconds(self.layers)
+        return self.resin.seconds(self.areas)
+
+    @cached_property
+    def resins(self) -> list[Resin]:
+        """Settings of each layer."""
+        return self.resin.of_layers(self.areas)
 
     @property
     def mirrored(self) -> bool:

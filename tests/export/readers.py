@@ -29,6 +29,7 @@ class Read:
     exposures: list[float]
     previews: list[np.ndarray] = field(default_factory=list)
     about: dict[str, Any] = field(default_factory=dict)
+    lifts: list[tuple[float, ...]] = field(default_factory=list)  # and speeds, of layers, mm and mm/min
 
 
 class Bytes:
@@ -81,6 +82,7 @@ def goo(data: bytes) -> Read:
     for _ in range(layers):
         _, _, top, seconds = file.get("H3f")
         read.about["layers"].append(file.get("12f"))
+        read.lifts.append(read.about["layers"][-1][4:6])
         file.get("H")
         file.expect(b"\r\n")
         (size,) = file.get("I")
@@ -131,7 +133,9 @@ def ctb(data: bytes) -> Read:
             if extra:
                 assert extra == 84
                 assert file.get("3f6I") == entries[number * layers + k]
-                assert file.get("I11f")[0] == extra + size
+                length, *moved = file.get("I11f")
+                assert length == extra + size
+                read.lifts.append((moved[0], moved[1]))
             data = file.raw(size)
             decode = decoders.rle7 if magic == 0x12FD0086 else decoders.rle1
             try:
@@ -175,6 +179,7 @@ def cxdlp(data: bytes) -> Read:
     for top, exposure, _, begin, size, *_ in entries:
         file.at = begin
         read.about["motion"] = file.get("11f")
+        read.lifts.append(read.about["motion"][:2])
         read.pictures.append(decoders.picture(decoders.rle7(file.raw(size - 44)), (rows, columns)))
         read.tops.append(top)
         read.exposures.append(exposure)
@@ -242,8 +247,9 @@ def photon(data: bytes) -> Read:
         assert (length, supports) == (48, 0)
     assert entries[0][0] == images == file.at
     top = 0.0
-    for begin, size, _, _, seconds, height, _, _ in entries:
+    for begin, size, lift, speed, seconds, height, _, _ in entries:
         file.at, top = begin, top + height
+        read.lifts.append((lift, 60 * speed))
         try:
             read.pictures.append(decoders.picture(decoders.rle4(file.raw(size)), (rows, columns)))
         except (AssertionError, IndexError):

@@ -189,9 +189,35 @@ def test_a_lift_in_two_stages_and_all_rests(tmp_path: Path) -> None:
     for layer in about["layers"]:
         assert layer == pytest.approx((0, 0.5, 0.25, 1, 2, 40, 4, 180, *back, 1.5, 30)[: len(layer)])
     motion = 60 * (2 / 40 + 4 / 180 + 4.5 / slow.retract_speed + 1.5 / 30) + 1.75
-    assert slow.seconds(10) == pytest.approx(float(slow.exposures(10).sum()) + 10 * motion)
+    assert slow.seconds(np.ones(10)) == pytest.approx(float(slow.exposures(10).sum()) + 10 * motion)
     with pytest.raises(ExportError, match="retract_2 = 7: expected at most the whole lift, 6 mm"):
         replace(slow, retract_2=7)
+
+
+def test_larger_layers_are_lifted_farther_and_more_slowly(tmp_path: Path) -> None:
+    """By UVtools' full range, in files with a lift for each layer; the time is that of all lifts."""
+    resin = replace(
+        RESIN, bottom_layers=1, transition_layers=0, lift=6, lift_speed=40, small_lift=3, small_lift_speed=160
+    )
+    lifts = [(own.lift, own.lift_speed) for own in resin.of_layers(np.array([9, 4, 4, 1, 1, 3, 5.0]))]
+    assert lifts == [(6, 40), (6, 40), (5.2, 70), (5.2, 70), (3, 160), (4.5, 100), (6, 40)]
+    assert resin.of_layers(np.array([2.0, 2, 2]))[1:] == [replace(resin, lift=3, lift_speed=160)] * 2
+    for name in ("goo", "ctb 3", "pwma 516", "cxdlpv4"):
+        path, read, _ = CASES[name]
+        job = replace(run(int((name.split() + ["1"])[1])), resin=resin)
+        found = read(write_slices(job, tmp_path / path).read_bytes()).lifts
+        expected = [(own.lift, own.lift_speed) for own in resin.of_layers(_areas(job))]
+        assert np.array(found) == pytest.approx(np.array(expected)) and len(set(expected)) > 2
+    for values, reported in (
+        ({"small_lift": 7}, "small_lift = 7: expected at most lift, 6 mm"),
+        ({"small_lift_speed": 9}, "small_lift_speed = 9: expected at least lift_speed"),
+    ):
+        with pytest.raises(ExportError, match=reported):
+            replace(resin, **values)
+
+
+def _areas(job: SliceRun) -> np.ndarray:
+    return np.array([job.slicer.areas[k] for k in range(job.layers)])
 
 
 def test_pictures_that_are_compensated(tmp_path: Path) -> None:
