@@ -100,6 +100,7 @@ class WholeOptions(MeshFileOptions):
     records = (PartsJob,)
     bed: Triple | None
     parts: tuple[int, int, int] | str | None
+    plugs: bool
     copies: int = COPIES
     spacing: float = SPACING
 
@@ -125,14 +126,46 @@ def mesh(given: WholeOptions) -> int:
         refuse_options(NO_COPIES, "not with --copies")
         return write_meshes(given, [given.source] * given.copies, Beds(spacing=given.spacing))
     refuse_options({"spacing"}, "only for several parts: --copies, or fracslice plate")
+    if given.plugs:
+        return make_plugged(given)
     return make_files(given) if given.bed is None and given.parts is None else make_parted(given)
 
 
 NO_PARTS = frozenset({"implicit", "report", "seconds", "every", "cluster", "shard", "store", *FOR_SLICERS})
 """Options that parts do not have."""
 
-NO_COPIES = NO_PARTS | {*PartsJob.kinds(), "picture", "cache", "device"}
+NO_PLUGS = NO_PARTS | {"picture", "cache", "device"}
+"""Options that plugs do not have."""
+
+NO_COPIES = NO_PLUGS | PartsJob.kinds().keys()
 """Options that copies do not have."""
+
+
+def make_plugged(given: WholeOptions) -> int:
+    """Make the mesh of an object and plugs for its drain holes: in one .3mf file, or each in its own."""
+    from fracslice.jobs.mesh import make_mesh, make_plugs, metadata
+    from fracslice.jobs.plates import lay_out, write_each
+    from fracslice.slicing.packing import Beds
+
+    how, output = PartsJob(**given.values(PartsJob)), Path(given.output)
+    refuse_options(NO_PLUGS, "not with --plugs")
+    check_targets(given.source, given.output)
+    scene = load_scene(given.source, given.settings)
+    about = metadata(scene)
+    with given.working() as work:
+        made = make_mesh(scene, given.oriented(scene, work).mesh_job(scene), work)
+        plugs = make_plugs(scene, made, how.clearance, work)
+        meshes, names = [made.mesh, *plugs], ["", *(f"plug-{n}" for n in range(1, len(plugs) + 1))]
+        if output.suffix.lower() == ".3mf":
+            lay_out(meshes, range(len(names)), names, Beds()).write(output, about, work, names)
+        else:
+            write_each(meshes, names, output, about, work)
+    if not given.quiet:
+        count = format_count(len(plugs), "plug")
+        sizes = ", ".join(f"{mesh.size[0]:.2f} x {mesh.size[2]:.2f} mm" for mesh in plugs)
+        lines = [summary(given.output, made.report), *of_mesh(made, given.material, given.price).lines()]
+        click.echo(os.linesep.join([*lines, f"{count}, wide and high: {sizes}"]))
+    return 1 if made.report.problems else 0
 
 
 def make_parted(given: WholeOptions) -> int:

@@ -16,7 +16,7 @@ from ..common.arrays import concatenate
 from ..common.files import check_target
 from ..errors import SceneError
 from ..fields.box import Triple
-from ..formats import check_format, write
+from ..formats import check_format
 from ..mesh import Mesh
 from ..records import SAME, UP, MeshJob, PartsJob
 from ..scene import Print, Scene
@@ -25,7 +25,7 @@ from ..volume.amount import sizing
 from ..volume.dividing import Divided, divide
 from ..work import Work
 from .mesh import make_mesh
-from .plates import LaidOut, lay_out
+from .plates import LaidOut, lay_out, write_each
 from .report import Result
 
 GAP = 5.0
@@ -107,12 +107,8 @@ def make_parts(
 
 def write_parts(made: Parted, path: str | Path, about: dict[str, str], work: Work) -> list[Path]:
     """Write the parts to one .3mf file, laid on beds, or each to a file of its own. Returns the files."""
-    path = Path(path)
+    path, names = Path(path), [name for name, _, _ in made.named]
     if path.suffix.lower() != ".3mf":
-        names = [path.with_name(f"{path.stem}-{name}{path.suffix}") for name, _, _ in made.named]
-        for name in names:
-            check_target(name)
-        pairs = zip(names, made.named, strict=True)
-        return [write(mesh.mesh, name, about, work) for name, (_, mesh, _) in pairs]
-    made.laid_out.write(path, about, work, [name for name, _, _ in made.named])
+        return write_each([mesh.mesh for _, mesh, _ in made.named], names, path, about, work)
+    made.laid_out.write(path, about, work, names)
     return [path]

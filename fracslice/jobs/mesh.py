@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..common.arrays import product
 from ..common.memory import peak_rss_mb
 from ..common.messages import lacking
-from ..errors import SceneError, SharedError, TooLargeError, keeping
+from ..errors import SceneError, SharedError, TooLargeError, VolumeError, keeping
 from ..fields.box import Box
 from ..formulas import Node
 from ..records import MeshJob
@@ -87,6 +88,54 @@ def make_mesh(
     return result if result is first else noted(result, first)
 
 
+def make_plugs(scene: Scene, whole: Result, clearance: float, work: Work | None = None) -> list[Mesh]:
+    """Make plugs for the drain holes of a mesh: what was cut out there, less a clearance all around.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene of the mesh.
+    whole : Result
+        The mesh.
+    clearance : float
+        Gap around the plugs, mm.
+    work : Work, optional
+        Threads, progress and cancellation.
+
+    Returns
+    -------
+    list of Mesh
+        A plug for each hole, upright on its inner end, mm.
+
+    Raises
+    ------
+    VolumeError
+        If there is no hole, or the clearance leaves nothing.
+    """
+    from ..printing.drains import plugs
+
+    if not whole.planned.drains:
+        raise VolumeError("plugs: expected drain holes, by drain_at or hollow")
+    made, scale, clock = [], whole.place.scale, Clock(work or Work())
+    left = Print(keep="largest", cavities="fill")
+    for drain, planned in plugs(whole.planned, clearance / scale, clock.work):
+        side, voxel = (scale * length for length in (max(planned.box.size), planned.voxel))
+        what = MeshJob(size=side, voxel=voxel, chord=max(clearance, voxel / 4) / 8, printing=left)
+        plug, _ = _Job(scene, what, clock, None, Sized(planned, scale, left)).made()
+        made.append(standing_on(plug.mesh, np.array(drain.end) - drain.start))
+    return made
+
+
+def standing_on(mesh: Mesh, up: np.ndarray) -> Mesh:
+    """Mesh, turned so that a direction is up, centred on z = 0."""
+    up = up / np.linalg.norm(up)
+    right = np.cross(up, np.eye(3)[np.abs(up).argmin()])
+    right /= np.linalg.norm(right)
+    turned = replace(mesh, vertices=product(mesh.vertices, np.stack([right, np.cross(up, right), up], 1)))
+    (x0, y0, z0), (x1, y1, _) = turned.bounds.tolist()
+    return turned.translated(np.array([-(x0 + x1) / 2, -(y0 + y1) / 2, -z0]))
+
+
 def noted(result: Result, coarse: Result) -> Result:
     """A result with a note that it was made in place of a coarser one, and why."""
     report, asked = result.report, coarse.report
@@ -125,6 +174,7 @@ class _Job:
     what: MeshJob
     clock: Clock
     path: Path | None
+    given: Sized | None = None  # the field, if it is not that of the scene
 
     @cached_property
     def size(self) -> Sizing:
@@ -194,7 +244,8 @@ class _Job:
 
         Samples of walls thinner than a voxel do not tell bodies from crumbs: the field then chooses.
         """
-        sized, how = plan_mesh(self.scene, self.what, self.size, self.clock), self.what.edits(self.scene)
+        sized = self.given or plan_mesh(self.scene, self.what, self.size, self.clock)
+        how = self.what.edits(self.scene)
         with in_mm(self.size):
             signs = self.signs(sized.planned, False)
         thin = how.sorts and mesh_steps.has_thin_walls(signs)

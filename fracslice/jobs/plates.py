@@ -192,6 +192,19 @@ class LaidOut:
             write_build(built, file, {"Application": APPLICATION, **about}, work, self.whole.thumbnail())
 
 
+def write_each(
+    meshes: Sequence[Mesh], names: Sequence[str], path: Path, about: Mapping[str, str], work: Work
+) -> list[Path]:
+    """Write each mesh to a file of its own, whose name ends in its name. Returns the files."""
+    from ..common.files import check_target
+    from ..formats import write
+
+    files = [path.with_name("-".join(filter(None, (path.stem, name))) + path.suffix) for name in names]
+    for file in files:
+        check_target(file)
+    return [write(mesh, file, about, work) for mesh, file in zip(meshes, files, strict=True)]
+
+
 def lay_out(
     meshes: Sequence[Mesh], places: Sequence[int], names: Sequence[str], beds: Beds, height: float = math.inf
 ) -> LaidOut:
