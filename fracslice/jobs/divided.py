@@ -18,15 +18,16 @@ from ..errors import SceneError
 from ..fields.box import Triple
 from ..formats import check_format
 from ..mesh import Mesh
+from ..printing.dividing import Divided, divide
 from ..records import SAME, UP, MeshJob, PartsJob
 from ..scene import Print, Scene
 from ..slicing.packing import Beds
 from ..volume.amount import sizing
-from ..volume.dividing import Divided, divide
 from ..work import Work
-from .mesh import make_mesh
+from .mesh import make_mesh, mesh_of_part
+from .mesh_steps import apply_edits, plan_mesh
 from .plates import LaidOut, lay_out, write_each
-from .report import Result
+from .report import Clock, Result
 
 GAP = 5.0
 """Distance between parts on a bed of a filament printer, mm."""
@@ -84,24 +85,26 @@ def make_parts(
     """Make the meshes of an object in parts.
 
     `path`: file that the meshes are for. Raises what `divide` and `make_mesh` raise, and SceneError for
-    edits.
+    supports and colours.
     """
     work = work or Work()
-    if what.edits(scene) != Print():
-        raise SceneError(
-            "parts: expected no changes for printing, such as a base, of which each part had one"
-        )
+    if what.edits(scene).supports != "none":
+        raise SceneError("parts: expected no supports, as each part lies on the plate by itself")
     if what.colour is not None:
         raise SceneError("parts: expected no colours")
     if path is not None:
         check_format(path)
         check_target(path)
-    size = sizing(scene, what.size, what.scale, work)
-    voxel = size.longest / what.voxels(size.longest)
-    own = replace(what, voxel=voxel, resolution=None, size=None, up=UP, scale=SAME, printing=Print())
-    divided = divide(scene, how, what, work)
-    meshes = [make_mesh(part.scene, own, work) for part in divided.parts]
-    peg = make_mesh(divided.peg, replace(own, voxel=None, resolution=64), work) if divided.pegs else None
+    size, clock = sizing(scene, what.size, what.scale, work), Clock(work)
+    sized = plan_mesh(scene, what, size, clock)
+    if sized.left.sorts:
+        sized = apply_edits(sized.planned, scene, what, size, clock)
+    divided = divide(sized.planned, sized.scale, how, work)
+    voxel = sized.planned.voxel * sized.scale
+    own = replace(what, voxel=voxel, resolution=None, printing=Print())
+    meshes = [mesh_of_part(scene, sized.planned, sized.scale, part.root, own, work) for part in divided.parts]
+    upright = replace(own, voxel=None, resolution=64, size=None, up=UP, scale=SAME)
+    peg = make_mesh(divided.peg, upright, work) if divided.pegs else None
     return Parted(divided, meshes, peg, how.bed)
 
 

@@ -19,8 +19,9 @@ from ..common.memory import peak_rss_mb
 from ..common.messages import lacking
 from ..errors import SceneError, SharedError, TooLargeError, VolumeError, keeping
 from ..fields.box import Box
+from ..fields.field import Field
 from ..formulas import Node
-from ..records import MeshJob
+from ..records import SAME, UP, MeshJob
 from ..scene import Print, Scene
 from ..version import __version__
 from ..work import Work, ahead, in_background
@@ -88,6 +89,36 @@ def make_mesh(
     return result if result is first else noted(result, first)
 
 
+def mesh_of_part(scene: Scene, whole: Plan, scale: float, root: Field, what: MeshJob, work: Work) -> Result:
+    """Mesh of a part of an object.
+
+    `whole`: the object, `root`: the part, both of `scale` mm per scene unit; `what`: voxel or resolution, and
+    the bodies that are chosen in the mesh.
+    """
+    from ..volume import extent
+
+    extents = extent(root, work)
+    side = scale * max(extents.box.size)
+    what = replace(what, size=side, scale=SAME, up=UP)
+    planned = replace(
+        whole,
+        root=root,
+        box=extents.box,
+        outer=extents.outer,
+        tips=extents.tips,
+        voxel=side / what.voxels(side) / scale,
+        drains=(),
+        undrilled=None,
+        supports=None,
+    )
+    made, _ = _Job(scene, what, Clock(work), None, Sized(planned, scale, what.edits(scene))).made()
+    return made
+
+
+PLUG = 24
+"""Voxels along the longest side of a plug."""
+
+
 def make_plugs(scene: Scene, whole: Result, clearance: float, work: Work | None = None) -> list[Mesh]:
     """Make plugs for the drain holes of a mesh: what was cut out there, less a clearance all around.
 
@@ -114,14 +145,14 @@ def make_plugs(scene: Scene, whole: Result, clearance: float, work: Work | None 
     """
     from ..printing.drains import plugs
 
-    if not whole.planned.drains:
+    planned, scale = whole.planned, whole.place.scale
+    if not planned.drains:
         raise VolumeError("plugs: expected drain holes, by drain_at or hollow")
-    made, scale, clock = [], whole.place.scale, Clock(work or Work())
-    left = Print(keep="largest", cavities="fill")
-    for drain, planned in plugs(whole.planned, clearance / scale, clock.work):
-        side, voxel = (scale * length for length in (max(planned.box.size), planned.voxel))
-        what = MeshJob(size=side, voxel=voxel, chord=max(clearance, voxel / 4) / 8, printing=left)
-        plug, _ = _Job(scene, what, clock, None, Sized(planned, scale, left)).made()
+    made, left = [], Print(keep="largest", cavities="fill")
+    for drain, root in plugs(planned, clearance / scale):
+        chord = max(clearance, scale * drain.radius / 8) / 8
+        what = MeshJob(resolution=PLUG, chord=chord, printing=left)
+        plug = mesh_of_part(scene, planned, scale, root, what, work or Work())
         made.append(standing_on(plug.mesh, np.array(drain.end) - drain.start))
     return made
 

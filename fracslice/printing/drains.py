@@ -23,7 +23,7 @@ from ..fields.box import Box, Triple
 from ..fields.field import Field
 from ..formulas import Node, cylinder, intersection, plane, transform, union
 from ..records import Print
-from ..volume import Drain, Plan, extent
+from ..volume import Drain, Plan
 from ..work import Work
 from .edits import edited_field
 
@@ -44,9 +44,6 @@ MOST_HOLES = 16
 
 DIRECTIONS = 400
 """Directions of a hole that are compared, evenly distributed (Fibonacci)."""
-
-VOXELS = 24
-"""Voxels along the longest side of a plug."""
 
 STEP = 0.5
 """Cells between the samples of a direction."""
@@ -292,7 +289,7 @@ def drained(planned: Plan, how: Print, scale: float, work: Work) -> Plan:
     return replace(planned, root=root, drains=made, undrilled=undrilled, notes=(*planned.notes, *notes))
 
 
-def plugs(planned: Plan, clearance: float, work: Work) -> Iterator[tuple[Drain, Plan]]:
+def plugs(planned: Plan, clearance: float) -> Iterator[tuple[Drain, Field]]:
     """Each drain hole of an object, and what it cut out of that, less a clearance all around.
 
     `clearance` in scene units.
@@ -302,17 +299,13 @@ def plugs(planned: Plan, clearance: float, work: Work) -> Iterator[tuple[Drain, 
     VolumeError
         If the clearance leaves nothing.
     """
-    floor, whole = planned.box.lo[2], planned.undrilled
     for drain in planned.drains:
-        assert whole is not None
         if clearance >= drain.radius:
             raise VolumeError("clearance: expected less than half of the diameter of the drain holes")
+        assert planned.undrilled is not None
         pin = _cut(replace(drain, radius=drain.radius - clearance))
-        kept = intersection(pin, plane(normal=(0, 0, -1), offset=-floor))
-        root = edited_field(whole, "keep", kept)
-        extents = extent(root, work)
-        voxel = max(2 * drain.radius, max(extents.box.size)) / VOXELS
-        yield drain, Plan(root, extents.box, extents.outer, extents.tips, voxel)
+        above = plane(normal=(0, 0, -1), offset=-planned.box.lo[2])
+        yield drain, edited_field(planned.undrilled, "keep", intersection(pin, above))
 
 
 def _needed(drill: Drill, radius: float) -> list[Drain]:
