@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -148,13 +148,36 @@ BED_TO_BED = 1.2
 """Distance of beds by their width, as in Bambu Studio and OrcaSlicer."""
 
 
+class Item(NamedTuple):
+    """A mesh on a bed."""
+
+    mesh: int  # number of the mesh
+    bed: int
+    place: NDArray[np.float64]  # how it is moved from the corner of the bed; see `Built`
+
+
 @dataclass(frozen=True, eq=False)
 class LaidOut:
     """Meshes on beds, the first of which has its corner at the origin."""
 
     meshes: Sequence[Mesh]  # each once, mm
-    items: Sequence[tuple[int, NDArray[np.float64]]]  # number of a mesh, and how it is moved; see `Built`
-    beds: int  # number of beds
+    items: Sequence[Item]
+    width: float = 0.0  # of a bed, mm; 0 without limits
+
+    @property
+    def beds(self) -> int:
+        """Number of beds."""
+        return 1 + max(item.bed for item in self.items)
+
+    def on_bed(self, bed: int) -> LaidOut:
+        """What lies on one bed."""
+        here = [item._replace(bed=0) for item in self.items if item.bed == bed]
+        return LaidOut(self.meshes, here, self.width)
+
+    def places(self, mesh: int) -> list[NDArray[np.float64]]:
+        """Places of a mesh on all beds, side by side."""
+        step = np.array([[0.0] * 3] * 3 + [[BED_TO_BED * self.width, 0.0, 0.0]])
+        return [item.place + item.bed * step for item in self.items if item.mesh == mesh]
 
     @property
     def whole(self) -> Mesh:
@@ -164,8 +187,9 @@ class LaidOut:
 
         return concatenate(
             [
-                Mesh(product(self.meshes[k].vertices, m[:3]) + m[3], self.meshes[k].triangles)
-                for k, m in self.items
+                Mesh(product(mesh.vertices, place[:3]) + place[3], mesh.triangles)
+                for number, mesh in enumerate(self.meshes)
+                for place in self.places(number)
             ]
         )
 
@@ -184,10 +208,8 @@ class LaidOut:
         if Path(path).suffix.lower() != ".3mf":
             write(self.whole, path, about, work)
             return
-        built = [
-            Built(mesh, [place for k, place in self.items if k == number], name)
-            for number, (mesh, name) in enumerate(zip(self.meshes, names, strict=True))
-        ]
+        named = enumerate(zip(self.meshes, names, strict=True))
+        built = [Built(mesh, places, name) for k, (mesh, name) in named if (places := self.places(k))]
         with replacing(path) as file:
             write_build(built, file, {"Application": APPLICATION, **about}, work, self.whole.thumbnail())
 
@@ -242,11 +264,8 @@ def lay_out(
     placed = [outlines[k] for k in places]
     spots = packed(placed, names, cell, beds)
     middle = np.array(beds.sides) / 2 if beds.sides else corners(placed, spots)[1]
-    items = []
-    for k, spot in zip(places, spots, strict=True):
-        beside = spot.bed * BED_TO_BED * beds.sides[0] if beds.sides else 0.0
-        items.append((k, _transform(spot, middle + (beside, 0.0))))
-    return LaidOut(meshes, items, 1 + max(spot.bed for spot in spots))
+    items = [Item(k, spot.bed, _transform(spot, middle)) for k, spot in zip(places, spots, strict=True)]
+    return LaidOut(meshes, items, beds.sides[0] if beds.sides else 0.0)
 
 
 def _transform(spot: Spot, middle: NDArray[np.float64]) -> NDArray[np.float64]:
