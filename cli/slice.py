@@ -73,8 +73,8 @@ class LayerFileOptions(ClusterOptions, LayerOptions):
     )
     form: str | None = option(
         str,
-        "png, sl1, goo, ctb, cbddlp, pwmx, nanodlp, 3mf, svg, slic3r, cli, cli-binary or json; by default, "
-        "that of the extension of OUT.",
+        "png, sl1, goo, ctb, cbddlp, pwmx, pwsz, cxdlpv4, nanodlp, 3mf, svg, slic3r, cli, cli-binary "
+        "or json; by default, that of the extension of OUT.",
         "--format",
         metavar="NAME",
     )

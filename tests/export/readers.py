@@ -279,6 +279,45 @@ def nanodlp(data: bytes) -> Read:
     return Read(pictures, tops.tolist(), plate["CureTimes"], [preview], about)
 
 
+def pwsz(data: bytes) -> Read:
+    """UVtools' description, as far as it reads: AnycubicZipFile.cs."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            if archive.testzip() is not None:
+                raise DamagedError
+            settings, layers, amounts = (
+                json.loads(archive.read(name))
+                for name in ("anycubic_photon_resins.pwsp", "layers_controller.conf", "print_info.json")
+            )
+            machine, resins = settings["machine_type"], settings["machine_extern"]
+            (active,) = (
+                one for one in resins["user_resins"] if one["property"]["name"] == resins["active_resins"][0]
+            )
+            shape = machine["res_y"], machine["res_x"]
+            coded = [archive.read(f"layer_images/layer_{k}.pw0Img") for k in range(layers["count"])]
+            scene = Bytes(archive.read("scene.slice"), "<")
+            previews = []
+            for k in range(3):
+                with Image.open(io.BytesIO(archive.read(f"preview_images/preview_{k}.png"))) as image:
+                    previews.append(np.asarray(image) >> 3)
+    except zipfile.BadZipFile:
+        raise DamagedError from None
+    pictures = [decoders.picture(decoders.rle4(one), shape) for one in coded]
+    assert scene.raw(16).rstrip(b"\0") == b"ANYCUBIC-PWSZ"
+    scene.raw(64)
+    assert scene.get("4IfI")[-1] == layers["count"]
+    box = scene.get("6f")
+    scene.raw(4 + 256)
+    scene.expect(b"<---")
+    extents = [scene.get("6fIf8I")[:8] for _ in range(*scene.get("I"))]
+    scene.expect(b"--->")
+    rows = layers["paras"]
+    tops = np.cumsum([row["layer_thickness"] for row in rows]).tolist()
+    about = {"volume": amounts["volume"], "resin": active, "box": box, "extents": extents}
+    lifts = [(row["zup_height"], 60 * row["zup_speed"]) for row in rows]
+    return Read(pictures, tops, [row["exposure_time"] for row in rows], previews, about, lifts)
+
+
 def sl1(data: bytes) -> Read:
     """An archive of PrusaSlicer: config.ini, and pictures in the order of their names."""
     try:
