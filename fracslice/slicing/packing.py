@@ -305,11 +305,16 @@ def plate_of(stacks: Sequence[Stack], spots: Sequence[Spot]) -> Stack:
         tops=highest.tops,
         size=size,
         outer=whole.bounds.box,
-        notes=tuple(dict.fromkeys(note for stack in stacks for note in stack.notes)),
+        notes=tuple(dict.fromkeys(note for stack in stacks for note in _notes(stack))),
         drains=tuple(drain for part in parts for drain in _drains(part, shape)),
         parts=parts,
         side=max(size),
     )
+
+
+def _notes(stack: Stack) -> tuple[str, ...]:
+    """Notes of a part, one on its supports among them."""
+    return (str(stack.supports), *stack.notes) if stack.supports else stack.notes
 
 
 def _drains(part: Standing, shape: tuple[int, int]) -> list[Drain]:
