@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
-from fracslice.common.messages import significant
+from fracslice.common.messages import duration, significant
 from fracslice.errors import keeping
 from fracslice.records import MeshJob, PartsJob
 
-from .execution import check_targets, duration, load_scene, refuse_options
+from .execution import check_targets, load_scene, refuse_options
 from .options import FOR_SLICERS, MeshOptions, Name, argument, command, option, output
 from .slice import COPIES, SPACING
 from .sweeps import with_suffix
