@@ -345,7 +345,8 @@ class Live:
         coarse = max(size[0] // self._spacing, 1), max(size[1] // self._spacing, 1)
         renderer = self._made(drafts, camera, coarse)
         start = time.monotonic()
-        pixels = renderer.draft().shown
+        draft = renderer.draft()
+        pixels = draft.smooth if self._spacing > 1 else draft.shown
         seconds = time.monotonic() - start
         seen = camera or renderer.setup.camera
         self.shown, self._drawn_by = Shown(pixels, 0.0, seen, drafts.distance, self._problem), None

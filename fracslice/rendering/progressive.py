@@ -24,7 +24,19 @@ from ..fields.registry import Node
 from ..scene import Scene, reads, to_xml
 from ..scene.view import Camera, Film, View
 from ..work import Work
-from .accumulator import CHANNELS, COARSE, Accumulator, HostAccumulator, PassPlan, SampleRange, grids, picture
+from .accumulator import (
+    CHANNELS,
+    COARSE,
+    Accumulator,
+    HostAccumulator,
+    PassPlan,
+    SampleRange,
+    develop,
+    grids,
+    levels,
+    picture,
+    smoothed,
+)
 from .linking import Frame, link_frame
 from .packets import CpuTracer
 from .setup import clip_scene, optics, prepare
@@ -315,6 +327,19 @@ class Pass:
             If a later pass has replaced this picture.
         """
         return self.crop.within(self._current().shown(self.view))
+
+    @property
+    def smooth(self) -> np.ndarray:
+        """Developed picture with less noise and less detail: each pixel has the light around it.
+
+        Returns
+        -------
+        ndarray of uint8, shape (height, width, 3)
+            sRGB; the picture as it is in a mode other than "light".
+        """
+        if self.view.shading.mode != "light":
+            return self.shown
+        return levels(develop(smoothed(self.mean), self.view))
 
     @cached_property
     def developed(self) -> np.ndarray:

@@ -9,7 +9,7 @@ from trame.widgets import vuetify3 as v
 
 from ..scene.view import CURVES
 from . import keyframes
-from .widgets import named, named_by
+from .widgets import named, named_by, number_field
 
 if TYPE_CHECKING:
     from .page import Page
@@ -165,13 +165,8 @@ class FilmPanel:
                     raw_attrs=named("Time"),
                 )
                 html.Span("{{ seconds.toFixed(2) }} s of", classes="text-caption mx-2")
-                html.Input(
-                    type="number",
-                    value=("length",),
-                    step="any",
-                    change=(self.set_length, "[$event.target.value]"),
-                    style="width: 64px; color: inherit",
-                    raw_attrs=named("Length of the film, seconds"),
+                number_field(
+                    "length", (self.set_length, "[$event.target.value]"), named("Length of the film, seconds")
                 )
                 for label, act in (("Key view", self.key_view), ("Make", self.make)):
                     v.VBtn(label, click=act, size="small", variant="text", classes="ml-2")
@@ -184,13 +179,8 @@ class FilmPanel:
                 )
             with html.Div(v_if="key.of", classes="d-flex align-center text-caption"):
                 html.Span("{{ key.of }} at", classes="mr-2")
-                html.Input(
-                    type="number",
-                    value=("key.seconds",),
-                    step="any",
-                    change=(self.move_key, "[$event.target.value]"),
-                    style="width: 72px; color: inherit",
-                    raw_attrs=named("Time of the keyframe"),
+                number_field(
+                    "key.seconds", (self.move_key, "[$event.target.value]"), named("Time of the keyframe")
                 )
                 v.VBtn("Remove key", click=self.remove_key, size="small", variant="text")
             with html.Div(

@@ -162,6 +162,11 @@ class Inside:
     # what is shown
 
     @property
+    def has_made(self) -> bool:
+        """True if there is anything to forget."""
+        return bool(self.solids or self.layers)
+
+    @property
     def solid(self) -> SceneSolid | None:
         """The mesh that is shown: as printed, or as designed."""
         made = self.solids.get(self.designed)

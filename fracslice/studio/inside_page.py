@@ -12,7 +12,7 @@ from ..errors import FracsliceError
 from ..slicing.printers import PRINTERS
 from .inside import MODES
 from .solid import MEASURES
-from .widgets import named, named_by
+from .widgets import NARROW, named, named_by, number_field
 
 if TYPE_CHECKING:
     from .page import Page
@@ -84,12 +84,15 @@ class InsidePanel:
             raw_attrs=named("What is shown"),
         ):
             for mode in MODES:
-                v.VBtn(mode, value=mode, size="small", click=(self.show, f"['{mode}']"))
+                pressed = [f":aria-pressed=\"inside.mode == '{mode}'\""]
+                v.VBtn(mode, value=mode, size="small", click=(self.show, f"['{mode}']"), raw_attrs=pressed)
 
     def build(self) -> None:
         """Lay the panel out."""
         with (
-            v.VNavigationDrawer(v_model=("looking_inside",), location="right", width=320),
+            v.VNavigationDrawer(
+                v_model=("looking_inside",), location="right", width=320, mobile_breakpoint=NARROW
+            ),
             v.VExpansionPanels(multiple=True, model_value=([0, 1, 2, 3, 4],), variant="accordion"),
         ):
             for title, lay in (
@@ -196,13 +199,7 @@ class InsidePanel:
                 density="compact",
                 raw_attrs=named("Layer"),
             )
-            html.Input(
-                type="number",
-                value=("inside.index",),
-                change=(self.scrub, "[$event.target.value]"),
-                style="width: 64px; color: inherit",
-                raw_attrs=named("Layer as a number"),
-            )
+            number_field("inside.index", (self.scrub, "[$event.target.value]"), named("Layer as a number"))
         with html.Div(v_if="inside.count", classes="text-caption"):
             for colour, text in (("#ec8c32", "nothing below"), ("#d63cc8", "island"), ("#5496d6", "support")):
                 html.Span("■ ", style=f"color: {colour}")
@@ -287,11 +284,14 @@ class InsidePanel:
                 density="compact",
                 raw_attrs=named_by("e.name"),
             )
-            html.Input(
+            v.VTextField(
                 v_if="!e.choices",
-                value=("e.text",),
+                model_value=("e.text",),
                 change=(self.edit, "[e.name, $event.target.value]"),
-                style="width: 72px; color: inherit",
+                density="compact",
+                variant="plain",
+                hide_details=True,
+                style="flex: 0 0 72px; margin-top: -12px",
                 raw_attrs=named_by("e.name + ' as a text'"),
             )
             v.VSelect(

@@ -26,7 +26,7 @@ from .film_page import HEIGHT, FilmPanel
 from .inside_page import InsidePanel
 from .session import FILMS, PRINT_ENDINGS, Studio, jpeg
 from .sheets import SheetPanel
-from .widgets import named, named_by
+from .widgets import NARROW, named, named_by, number_field
 
 TICK = 1 / 60
 """Interval between two looks at the picture, seconds."""
@@ -63,8 +63,8 @@ TWICE, NEAR = 0.35, 5.0
 BAR = 48
 """Height of the bar above the picture, pixels."""
 
-NARROW = 900
-"""Width of a page below which the text covers the picture, pixels."""
+AWAY = 30.0
+"""Time after the last tab was closed in which another one finds the same, seconds."""
 
 AREA = "picture"
 
@@ -202,6 +202,7 @@ class Page:
         self.inside = InsidePanel(self)
         self.refresh()
         self.state.change("xml")(self.write)
+        self._tabs, self._left = 0, 0.0
         self.ctrl.on_server_bind.add(self.guard)
         self.ctrl.on_server_ready.add(lambda **_: asyncio.get_running_loop().create_task(self.follow()))
         self.build()
@@ -365,7 +366,18 @@ class Page:
             self.film.follow()
             self._say()
             self.inside.follow()
+            self._forget()
             await asyncio.sleep(TICK)
+
+    def _count_tabs(self, more: int) -> None:
+        """Note that a tab was opened, or closed, or nothing of either."""
+        self._tabs, self._left = self._tabs + more, time.monotonic()
+
+    def _forget(self) -> None:
+        """Free what was made to look at, some time after the last tab was closed."""
+        inside = self.studio.inside
+        if self._tabs == 0 and inside.has_made and time.monotonic() - self._left > AWAY:
+            inside.release()
 
     def _say(self) -> None:
         """Bring the line below the picture, and that of the job, up to date."""
@@ -387,7 +399,7 @@ class Page:
                 state_now.update(changes)
 
     def guard(self, server: Any) -> None:
-        """Refuse requests that were made to another host, or by the page of another site."""
+        """Refuse requests that were made to another host, or by the page of another site; count tabs."""
 
         @web.middleware
         async def refuse(
@@ -398,7 +410,12 @@ class Page:
             origin = request.headers.get("Origin")
             if request.host not in known or (origin and origin.partition("//")[2] not in known):
                 raise web.HTTPForbidden(text="expected the address that fracslice studio has printed")
-            return await handler(request)
+            is_tab = request.headers.get("Upgrade", "").lower() == "websocket"
+            self._count_tabs(is_tab)
+            try:
+                return await handler(request)
+            finally:
+                self._count_tabs(-is_tab)
 
         server.app.middlewares.append(refuse)
 
@@ -437,6 +454,8 @@ class Page:
             ):
                 self._editor()
             self.inside.build()
+            with v.VNavigationDrawer(v_model=("marking",), location="right", width=240):
+                self.sheets.build_bookmarks()
             with v.VMain(style="height: 100vh"):
                 self._picture()
                 self.film.build()
@@ -448,7 +467,7 @@ class Page:
             v.VAppBarTitle("{{ trame__title }}{{ saved ? '' : ' *' }}")
             v.VBtn(icon="mdi-folder-open", click="opening = true; search = ''", raw_attrs=named("Open"))
             v.VBtn(
-                icon="mdi-bookmark-multiple", click=self.sheets.show_bookmarks, raw_attrs=named("Bookmarks")
+                icon="mdi-bookmark-multiple", click=self.sheets.toggle_bookmarks, raw_attrs=named("Bookmarks")
             )
             v.VBtn(
                 icon="mdi-dice-5",
@@ -555,13 +574,10 @@ class Page:
                         hide_details=True,
                         raw_attrs=named_by("c.name + ' ' + (i + 1)"),
                     )
-                    html.Input(
-                        type="number",
-                        value=("value",),
-                        step="any",
-                        change=(self.set_number, "[c.name, i, $event.target.value]"),
-                        style="width: 84px; color: inherit",
-                        raw_attrs=named_by("c.name + ' ' + (i + 1) + ' as a number'"),
+                    number_field(
+                        "value",
+                        (self.set_number, "[c.name, i, $event.target.value]"),
+                        named_by("c.name + ' ' + (i + 1) + ' as a number'"),
                     )
                 v.VSelect(
                     v_if="c.kind == 'choice'",
@@ -664,7 +680,7 @@ class Page:
         self._list("wrapping", "Wrap it in", around, "c.doc", (self.add, "[c.name, true]"))
         scenes = "scenes.filter(name => name.includes(search)).map(name => ({name}))"
         self._list("opening", "Open a scene", scenes, "''", (self.open, "[c.name]"))
-        self.sheets.build()
+        self.sheets.build_variations()
         with v.VDialog(v_model=("helping",), width=460), v.VCard(title="Help"), v.VTable(), html.Tbody():
             for keys, meaning in HELP:
                 with html.Tr():

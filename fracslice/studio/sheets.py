@@ -66,10 +66,16 @@ class SheetPanel:
         self.studio.surprise()
         self.page.renamed()
 
-    def show_bookmarks(self) -> None:
-        """Show the bookmarks."""
+    def toggle_bookmarks(self) -> None:
+        """Show the bookmarks, or close them."""
         with self.state as state:
-            state.marking, state.mix = True, ""
+            state.marking = not state.marking
+        self.list_bookmarks()
+
+    def list_bookmarks(self) -> None:
+        """Show the bookmarks that there are."""
+        with self.state as state:
+            state.mix = ""
             state.bookmarks = [
                 {"name": name, "picture": embedded(self.studio.bookmarks.picture(name))}
                 for name in self.studio.bookmarks.names
@@ -78,7 +84,7 @@ class SheetPanel:
     def bookmark(self) -> None:
         """Keep the scene as it is and is seen."""
         self.studio.bookmark()
-        self.show_bookmarks()
+        self.list_bookmarks()
 
     def go_to(self, name: str) -> None:
         """Return to a bookmark."""
@@ -88,7 +94,7 @@ class SheetPanel:
     def drop(self, name: str) -> None:
         """Remove a bookmark."""
         self.studio.bookmarks.remove(name)
-        self.show_bookmarks()
+        self.list_bookmarks()
 
     def begin_mix(self, name: str) -> None:
         """Have a slider from what stands to a bookmark."""
@@ -110,12 +116,8 @@ class SheetPanel:
         self.page.refresh()
         await self.vary()
 
-    def build(self) -> None:
-        """Lay the dialogs out."""
-        self._variations()
-        self._bookmarks()
-
-    def _variations(self) -> None:
+    def build_variations(self) -> None:
+        """Lay the dialog of the variations out."""
         with v.VDialog(v_model=("varying",), width=700), v.VCard(title="Variations: click to go on from one"):
             with html.Div(classes="d-flex flex-wrap justify-center", style="min-height: 480px"):
                 html.Img(
@@ -138,19 +140,25 @@ class SheetPanel:
                 v.VBtn("Others", click=self.vary, variant="text")
                 v.VBtn("Surprise me", click=self.surprise, variant="text")
 
-    def _bookmarks(self) -> None:
-        with (
-            v.VDialog(v_model=("marking",), width=720, scrim=False, location="right"),
-            v.VCard(title="Bookmarks"),
-        ):
-            with (
-                html.Div(classes="d-flex flex-wrap px-3", style="max-height: 50vh; overflow: auto"),
-                v.VCard(v_for="b in bookmarks", key="b.name", variant="tonal", classes="ma-1"),
-            ):
+    def build_bookmarks(self) -> None:
+        """Lay what is beside the picture out."""
+        with html.Div(classes="pa-2"):
+            v.VBtn("Add this one", click=self.bookmark, variant="text")
+            v.VSlider(
+                v_if="mix",
+                model_value=("mixed",),
+                update_modelValue=(self.set_mix, "[$event]"),
+                min=0,
+                max=1,
+                step=0.01,
+                label=("'to ' + mix",),
+                hide_details=True,
+            )
+            with v.VCard(v_for="b in bookmarks", key="b.name", variant="tonal", classes="ma-1"):
                 html.Img(
                     src=("b.picture",),
                     click=(self.go_to, "[b.name]"),
-                    style="width: 200px; display: block; cursor: pointer",
+                    style="width: 100%; display: block; cursor: pointer",
                     raw_attrs=[":alt=\"'bookmark ' + b.name\""],
                 )
                 with html.Div(classes="d-flex align-center text-caption px-2"):
@@ -164,16 +172,3 @@ class SheetPanel:
                         variant="text",
                         raw_attrs=named_by("'remove bookmark ' + b.name"),
                     )
-            v.VSlider(
-                v_if="mix",
-                model_value=("mixed",),
-                update_modelValue=(self.set_mix, "[$event]"),
-                min=0,
-                max=1,
-                step=0.01,
-                label=("'towards ' + mix",),
-                hide_details=True,
-                classes="mx-4",
-            )
-            with html.Div(classes="pa-3"):
-                v.VBtn("Add this one", click=self.bookmark, variant="text")
