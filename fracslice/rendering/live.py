@@ -346,7 +346,8 @@ class Live:
         renderer = self._made(drafts, camera, coarse)
         start = time.monotonic()
         draft = renderer.draft()
-        pixels = draft.smooth if self._spacing > 1 else draft.shown
+        # a GPU has the next frame sooner than this one's noise is gone
+        pixels = draft.smooth if self._spacing > 1 and renderer.device == "cpu" else draft.shown
         seconds = time.monotonic() - start
         seen = camera or renderer.setup.camera
         self.shown, self._drawn_by = Shown(pixels, 0.0, seen, drafts.distance, self._problem), None

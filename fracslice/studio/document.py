@@ -269,15 +269,15 @@ class Document:
         """Add an element: inside another that takes any more, else behind it."""
         tag = self._at(place) if place else self.root
         if not self._takes_more(tag):
-            return self._insert(place[:-1], place[-1] + 1, _empty(name))
-        return self._insert(place, len(tag.children), _empty(name))
+            return self._insert(place[:-1], place[-1] + 1, empty_element(name))
+        return self._insert(place, len(tag.children), empty_element(name))
 
     def wrap(self, place: Place, name: str) -> None:
         """Put an element around another."""
         tag = self._at(place)
         old, indent = self.text[tag.start : tag.end], self._indent(tag)
         inner = f"{indent}{INDENT}{old.replace(chr(10), chr(10) + INDENT)}"
-        new = f"{_empty(name)[:-2]}>\n{inner}\n{indent}</{name}>"
+        new = f"{empty_element(name)[:-2]}>\n{inner}\n{indent}</{name}>"
         self.write(self.text[: tag.start] + new + self.text[tag.end :], place)
 
     def part(self, name: str) -> Tag | None:
@@ -430,7 +430,7 @@ def required(name: str) -> dict[str, str]:
     return {a: _starting(kind) for a, kind in element.parameters.items() if kind.default is REQUIRED}
 
 
-def _empty(name: str) -> str:
+def empty_element(name: str) -> str:
     """A new element without children."""
     given = "".join(f' {attribute}="{value}"' for attribute, value in required(name).items())
     return f"<{name}{given}/>"

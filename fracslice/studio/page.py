@@ -25,7 +25,7 @@ from . import panels
 from .film_page import HEIGHT, FilmPanel
 from .inside_page import InsidePanel
 from .session import FILMS, PRINT_ENDINGS, Studio, jpeg
-from .sheets import SheetPanel
+from .sheets import SheetPanel, embedded
 from .widgets import NARROW, named, named_by, number_field
 
 TICK = 1 / 60
@@ -36,6 +36,12 @@ QUALITIES = 75, 92
 
 PENDING = 2
 """Frames that a page may have to fetch still before others are left out."""
+
+SMALL = (
+    f"{{width: '{panels.CELL[0]}px', height: '{panels.CELL[1]}px', flexShrink: 0, borderRadius: '4px', "
+    "background: `url(${thumbnails})`, backgroundPosition: pictures[c.name]}"
+)
+"""Style of the small picture of a row."""
 
 HELP = (
     ("drag", "turn around what is under the mouse"),
@@ -179,6 +185,8 @@ class Page:
         self.state.update(
             {
                 "choices": panels.choices(),
+                "thumbnails": embedded(panels.THUMBNAILS.read_bytes(), "webp"),
+                "pictures": panels.places_of_pictures(),
                 "search": "",
                 "adding": False,
                 "wrapping": False,
@@ -453,9 +461,9 @@ class Page:
                 v_model=("editing",), location="right", width=460, mobile_breakpoint=NARROW
             ):
                 self._editor()
-            self.inside.build()
             with v.VNavigationDrawer(v_model=("marking",), location="right", width=240):
                 self.sheets.build_bookmarks()
+            self.inside.build()
             with v.VMain(style="height: 100vh"):
                 self._picture()
                 self.film.build()
@@ -676,10 +684,10 @@ class Page:
     def _dialogs(self) -> None:
         found = "choices.filter(c => (c.name + c.doc).includes(search)"
         around = f"{found} && c.kind != 'shape' && c.kind != 'part')"
-        self._list("adding", "Add an element", f"{found})", "c.doc", (self.add, "[c.name, false]"))
-        self._list("wrapping", "Wrap it in", around, "c.doc", (self.add, "[c.name, true]"))
-        scenes = "scenes.filter(name => name.includes(search)).map(name => ({name}))"
-        self._list("opening", "Open a scene", scenes, "''", (self.open, "[c.name]"))
+        self._list("adding", "Add an element", f"{found})", (self.add, "[c.name, false]"))
+        self._list("wrapping", "Wrap it in", around, (self.add, "[c.name, true]"))
+        scenes = "scenes.filter(c => (c.name + c.doc).includes(search))"
+        self._list("opening", "Open a scene", scenes, (self.open, "[c.name]"))
         self.sheets.build_variations()
         with v.VDialog(v_model=("helping",), width=460), v.VCard(title="Help"), v.VTable(), html.Tbody():
             for keys, meaning in HELP:
@@ -694,16 +702,21 @@ class Page:
             v.VTextField(v_model=("samples",), type="number", label="Samples a pixel, of a picture or a film")
             v.VBtn("Make", click=(self.make_and_close,), color="primary")
 
-    def _list(
-        self, flag: str, title: str, rows: str, about: str, click: tuple[Callable[..., None], str]
-    ) -> None:
-        """Dialog with a search and the rows `c` that it leaves, each with its name and what is about it."""
-        with v.VDialog(v_model=(flag,), width=560), v.VCard(title=title):
+    def _list(self, flag: str, title: str, rows: str, click: tuple[Callable[..., None], str]) -> None:
+        """Dialog with a search and the rows `c` that it leaves: picture, name and description."""
+        with v.VDialog(v_model=(flag,), width=720), v.VCard(title=title):
             v.VTextField(v_model=("search",), label="Search", autofocus=True, classes="mx-4")
-            with v.VList(density="compact", style="max-height: 60vh; overflow: auto"):
-                v.VListItem(
-                    v_for=f"c in {rows}", key="c.name", title=("c.name",), subtitle=(about,), click=click
-                )
+            with (
+                v.VList(
+                    density="compact", classes="d-flex flex-wrap", style="max-height: 64vh; overflow: auto"
+                ),
+                v.VListItem(v_for=f"c in {rows}", key="c.name", click=click, style="width: 50%"),
+                html.Div(classes="d-flex align-center"),
+            ):
+                html.Div(v_if="pictures[c.name]", style=(SMALL,), classes="mr-3")
+                with html.Div(style="min-width: 0"):
+                    html.Div("{{ c.name }}")
+                    html.Div("{{ c.doc }}", classes="text-caption text-medium-emphasis")
 
     def make_and_close(self) -> None:
         """Make the file and close the dialog."""

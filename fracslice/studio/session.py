@@ -242,10 +242,12 @@ class Studio:
         self.live.wake()
 
     @property
-    def scenes(self) -> list[str]:
-        """What can be opened: shipped scenes, and files of the folder."""
+    def scenes(self) -> list[dict[str, str]]:
+        """What can be opened, with its description: shipped scenes, and files of the folder."""
+        shipped = [*library.names(), *library.gallery()]
         own = (path.name for path in self.folder.glob("*") if path.suffix.lower() in (".xml", *SOLIDS))
-        return [*library.names(), *library.gallery(), *sorted(own)]
+        known = [{"name": name, "doc": library.about(name)} for name in shipped]
+        return known + [{"name": name, "doc": ""} for name in sorted(own)]
 
     def variations(self, spread: float, count: int = 9) -> Iterator[tuple[Node, NDArray[np.uint8]]]:
         """Trees with other numbers, drawn at random, and their pictures as the page sees the scene."""

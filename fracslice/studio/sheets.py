@@ -22,9 +22,9 @@ QUALITY = 90
 """Quality of JPEG of a variation."""
 
 
-def embedded(picture: bytes) -> str:
-    """Address of a JPEG that holds it."""
-    return f"data:image/jpeg;base64,{base64.b64encode(picture).decode()}"
+def embedded(picture: bytes, kind: str = "jpeg") -> str:
+    """Address of a picture that holds it."""
+    return f"data:image/{kind};base64,{base64.b64encode(picture).decode()}"
 
 
 class SheetPanel:
