@@ -4,6 +4,7 @@ the background and shown by the camera of the picture.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -40,7 +41,7 @@ from ..work import Work
 from .document import Document
 from .layer_view import LayerImage, PrintLayers, Window
 from .measuring import Mark, Overlay, Tracer, outline, readout
-from .solid import SceneSolid, legend
+from .solid import SceneSolid, legend, thickness_at
 from .views import Pixel, Views, triple
 
 MODES = "field", "mesh", "layers"
@@ -408,8 +409,12 @@ class Inside:
     def _surface_at(self, at: Pixel) -> tuple[NDArray[np.float64], str] | None:
         """Point of the surface at a pixel, and the thickness there."""
         if isinstance(self._picture, MeshPicture):
-            spot = self._picture.drawn(self._host.live).at(*at)
-            return (np.array(spot.point), "") if spot else None
+            spot, solid = self._picture.drawn(self._host.live).at(*at), self.solid
+            if spot is None or solid is None:
+                return None
+            point = np.array(spot.point)
+            width = thickness_at(solid, point, np.array(spot.normal)) if spot.corners else math.inf
+            return point, f"{width:.4g} mm" if math.isfinite(width) else ""
         seen = self._host.views.surface_at(at)
         if seen is None:
             return None

@@ -119,17 +119,29 @@ class SceneSolid:
         ]
 
 
+def thickness_at(of: SceneSolid, point: NDArray[np.float64], normal: NDArray[np.float64]) -> float:
+    """Thickness below a point of the surface, mm; infinite if it is more than can be measured."""
+    return float(_width(of, point[None], -normal[None], 1.0)[0])
+
+
+def _width(
+    of: SceneSolid, points: NDArray[np.float64], directions: NDArray[np.float64], towards: float
+) -> NDArray[np.float64]:
+    """Way through the solid, or what is empty if `towards` is -1, from points of the surface, [n], mm."""
+    bricks, mesh = of.result.bricks, of.mesh
+    limit = FARTHEST * float((mesh.vertices.max(0) - mesh.vertices.min(0)).max())
+    step = INSIDE * bricks.voxel
+    start = np.ascontiguousarray(points + step * directions)
+    width = Samples(bricks).native.through(start, directions, limit, towards)
+    return np.where(width < limit, of.result.place.scale * (width + step), np.inf)
+
+
 def _widths(gaps: bool) -> Callable[[SceneSolid, Work], NDArray[np.float64]]:
     """Width of the wall below the surface, or of the gap above it; infinite where it is none, mm."""
 
     def measured(of: SceneSolid, _: Work) -> NDArray[np.float64]:
-        bricks, mesh = of.result.bricks, of.mesh
-        limit = FARTHEST * float((mesh.vertices.max(0) - mesh.vertices.min(0)).max())
-        step, towards = INSIDE * bricks.voxel, -1.0 if gaps else 1.0
-        inwards = -towards * of.normals
-        start = np.ascontiguousarray(mesh.vertices + step * inwards)
-        width = Samples(bricks).native.through(start, inwards, limit, towards)
-        return np.where(width < limit, of.result.place.scale * (width + step), np.inf)
+        towards = -1.0 if gaps else 1.0
+        return _width(of, of.mesh.vertices, -towards * of.normals, towards)
 
     return measured
 

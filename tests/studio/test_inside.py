@@ -19,7 +19,7 @@ from fracslice.studio.layer_view import HANGS, ISLAND
 from fracslice.studio.measuring import Mark, Overlay, Tracer, angle, circle, readout
 from fracslice.studio.measuring import sphere as best_sphere
 from fracslice.studio.session import Studio
-from fracslice.studio.solid import MEASURES, SceneSolid, legend
+from fracslice.studio.solid import MEASURES, SceneSolid, legend, thickness_at
 from fracslice.work import Work
 
 from .test_session import within
@@ -192,6 +192,10 @@ def test_points_of_a_mesh_are_measured(studio: Studio, inside: Inside) -> None:
     within(lambda: studio.shown.camera.eye == (0.0, -40.0, 0.0))
     inside.pick((48, 32))
     np.testing.assert_allclose(inside.points[0][1], -5.0, atol=1e-3)
+    assert inside.thickness == ""  # 10 mm are more than a quarter of the object
+    assert inside.solid
+    top = thickness_at(inside.solid, np.array([1.0, 1.0, 7.0]), np.array([0.0, 0.0, 1.0]))
+    assert top == pytest.approx(2, abs=0.05)
     inside.hover((48, 32))
     assert inside.hovered.endswith("mm") and "-5.0" in inside.hovered
 
