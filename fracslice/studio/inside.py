@@ -136,19 +136,20 @@ class Inside:
     """The inside of the scene of a studio."""
 
     def __init__(self, host: Host, work: Work) -> None:
-        self._host, self._work = host, work
+        self._host, self._work = host, Work(work.threads)  # its progress is that of no job
+        self.fineness, self.edges, self.measure = FINENESS, False, ""
+        self.printer, self.layer = "", LAYER
+        self.measuring, self.bed = False, False
         self.release()
 
     def release(self) -> None:
         """Forget all that was made, and show the field."""
-        self.mode, self.message = "field", ""
-        self.fineness, self.edges, self.measure, self.designed = FINENESS, False, "", False
+        self.mode, self.message, self.designed = "field", "", False
         self.solids: dict[bool, tuple[Scene, SceneSolid]] = {}  # by whether print edits were left out
-        self.printer, self.layer, self.index, self.window = "", LAYER, 0, Window()
+        self.index, self.window = 0, Window()
         self.layers: PrintLayers | None = None
         self.report: PrintReport | None = None
         self.chosen: int | None = None
-        self.measuring, self.bed = False, False
         self.points: list[NDArray[np.float64]] = []  # scene units
         self.thickness = ""
         self.hovered = ""
@@ -309,7 +310,7 @@ class Inside:
         resin = default_resin(job.printer, job.layer[0]) if job.printer else None
         layers = PrintLayers(stack, self._work, job.printer, resin)
         layers.survey()
-        self.layers, self._layered, self.report, self.chosen = layers, scene, None, None
+        self.chosen, self.report, self.layers, self._layered = None, None, layers, scene
         self.index = min(self.index or len(layers) // 2, len(layers) - 1)
         self.draw()
         return f"{len(layers):,} layers"
@@ -357,10 +358,10 @@ class Inside:
             if self.layers is None or self._layered is not scene:
                 self._planned(scene, work)
             assert self.layers is not None
-            self.report = check_layers(self.layers.stack, None, self.layers.printer, work)
-            self.chosen = None
+            report = check_layers(self.layers.stack, None, self.layers.printer, work)
+            self.chosen, self.report = None, report
             self.draw()
-            return verdict(self.report.problems)
+            return verdict(report.problems)
 
         self._host.run("the check", make)
 
