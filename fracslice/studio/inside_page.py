@@ -276,7 +276,7 @@ class InsidePanel:
             v.VSlider(
                 v_if="!e.choices",
                 model_value=("e.value",),
-                end=(self.edit, "[e.name, $event ? $event + 'mm' : null]"),
+                update_modelValue=(self.edit, "[e.name, $event ? $event + 'mm' : null]"),
                 min=0,
                 max=("e.most",),
                 step=("e.step",),
@@ -317,15 +317,17 @@ class InsidePanel:
 
     def _table(self, rows: str, others: str = "") -> None:
         """Names and values, and beside them values of another state."""
-        with (
-            v.VTable(density="compact", classes="text-caption"),
-            html.Tbody(),
-            html.Tr(v_for=f"(row, i) in {rows}", key="i"),
-        ):
-            html.Td("{{ row[0] }}", classes="text-medium-emphasis")
-            html.Td("{{ row[1] }}")
+        with html.Table(classes="text-caption", style="width: 100%; table-layout: fixed"):
             if others:
-                html.Td(f"{{{{ {others}[i] ? {others}[i][1] : '' }}}}", v_if=f"{others}.length")
+                with html.Tr(v_if=f"{others}.length", classes="text-medium-emphasis"):
+                    html.Td("", style="width: 76px")
+                    html.Td("{{ inside.designed ? 'before' : 'after' }}")
+                    html.Td("{{ inside.designed ? 'after' : 'before' }}")
+            with html.Tr(v_for=f"(row, i) in {rows}", key="i", style="vertical-align: top"):
+                html.Td("{{ row[0] }}", classes="text-medium-emphasis pr-2", style="width: 76px")
+                html.Td("{{ row[1] }}")
+                if others:
+                    html.Td(f"{{{{ {others}[i] ? {others}[i][1] : '' }}}}", v_if=f"{others}.length")
 
 
 def _printers() -> list[dict[str, str]]:

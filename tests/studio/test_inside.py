@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -256,3 +257,18 @@ def test_marks_behind_the_eye_are_not_drawn() -> None:
         assert Overlay((mark,)).over(black, camera, size).any() == drawn
     through = Mark(np.array([[0.0, -10.0, -1.0], [0.0, 10.0, 1.0]]), (255, 0, 0))
     assert Overlay((through,)).over(black, camera, size).any()
+
+
+def test_what_was_made_is_freed_after_the_last_tab(
+    studio: Studio, inside: Inside, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pages = pytest.importorskip("fracslice.studio.page")
+    page = pages.Page(studio)
+    inside.show("mesh")
+    done(studio)
+    monkeypatch.setattr(pages, "AWAY", 0.0)
+    for tabs, kept in ((2, True), (-1, True), (-1, False)):
+        page._count_tabs(tabs)
+        time.sleep(0.001)
+        page._forget()
+        assert inside.has_made == kept
