@@ -493,6 +493,8 @@ class Studio:
             job.problem = "cancelled; nothing was written"
         except FracsliceError as error:
             job.problem = str(error)
+        except MemoryError:
+            job.problem = "there is not enough memory for it"
 
     def _file(self, path: Path, scene: Scene, camera: Camera, options: dict[str, Any], work: Work) -> str:
         """Make a picture, a film, a mesh or layers."""

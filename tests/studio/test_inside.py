@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 import zipfile
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ import pytest
 
 from fracslice import box, make_mesh, sphere
 from fracslice.errors import SceneError
+from fracslice.fields.box import Box
 from fracslice.mesh.drawing import SECTION
 from fracslice.records import Print
 from fracslice.scene.view import Camera
@@ -193,7 +195,7 @@ def test_points_of_a_mesh_are_measured(studio: Studio, inside: Inside) -> None:
     within(lambda: studio.shown.camera.eye == (0.0, -40.0, 0.0))
     inside.pick((48, 32))
     np.testing.assert_allclose(inside.points[0][1], -5.0, atol=1e-3)
-    assert inside.thickness == ""  # 10 mm are more than a quarter of the object
+    assert inside.there == []  # 10 mm are more than a quarter of the object
     assert inside.solid
     top = thickness_at(inside.solid, np.array([1.0, 1.0, 7.0]), np.array([0.0, 0.0, 1.0]))
     assert top == pytest.approx(2, abs=0.05)
@@ -229,12 +231,16 @@ def test_colours_measure_the_surface() -> None:
 
 def test_points_snap_to_the_root() -> None:
     ball = sphere(5)
-    tracer = Tracer(ball, ball.bounds.box)
+    tracer = Tracer(ball, ball.bounds.box, 0.02)
     seen = np.array([0.3, -4.89, 1.0])
     point = tracer.snapped(seen)
     assert np.linalg.norm(point) == pytest.approx(5, abs=1e-12) and np.linalg.norm(point - seen) < 0.01
     assert (tracer.snapped(2 * seen) == 2 * seen).all()
     assert tracer.thickness(point) == pytest.approx(10, abs=1e-6)
+    assert tracer.radius(point) == pytest.approx(5, rel=1e-4)
+    hollow = Tracer(box((20, 20, 20)) - ball, Box((-10.0,) * 3, (10.0,) * 3), 0.02)
+    assert hollow.radius(np.array([3.0, 4.0, 0.0])) == pytest.approx(-5, rel=1e-4)
+    assert math.isinf(hollow.radius(np.array([10.0, 0.0, 0.0])))
     camera = Camera(eye=(0.0, -20.0, 0.0), target=(0.0, 0.0, 0.0))
     view = tracer.view(np.array([0.0, 5.0, 0.0]), camera, 4.0)  # the far side is not seen from the front
     assert view.eye[1] >= 5 and view.target == (0.0, 5.0, 0.0)
