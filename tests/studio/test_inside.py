@@ -278,3 +278,14 @@ def test_what_was_made_is_freed_after_the_last_tab(
         time.sleep(0.001)
         page._forget()
         assert inside.has_made == kept
+
+
+def test_a_mesh_is_seen_from_inside_and_the_field_from_outside(studio: Studio, inside: Inside) -> None:
+    inside.show("mesh")
+    done(studio)
+    within_it = Camera(eye=(0.0, 0.0, 0.0), target=(0.0, 1.0, 0.0))
+    studio.live.look(within_it)
+    within(lambda: studio.shown.camera == within_it)
+    assert studio.shown.distance > 0
+    inside.show("field")
+    within(lambda: studio.shown.camera == studio.live.first)
