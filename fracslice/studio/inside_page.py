@@ -124,7 +124,7 @@ class InsidePanel:
                 raw_attrs=named("Make the mesh"),
             )
         with html.Div(classes="d-flex"):
-            self._switch("edges", "Edges", "edges")
+            self._switch("edges", "Edges")
             v.VCheckbox(
                 model_value=("inside.designed",),
                 update_modelValue=(self.compare, "[$event]"),
@@ -187,7 +187,7 @@ class InsidePanel:
                 color=("inside.old ? 'warning' : undefined",),
                 raw_attrs=named("Plan the layers"),
             )
-        self._switch("bed", "Build volume in the picture", "bed", "!inside.printer")
+        self._switch("bed", "Build volume in the picture", "!inside.printer")
         with html.Div(v_if="inside.count", classes="d-flex align-center"):
             v.VSlider(
                 model_value=("inside.index",),
@@ -252,7 +252,7 @@ class InsidePanel:
 
     def _measure(self) -> None:
         with html.Div(classes="d-flex align-center"):
-            self._switch("measuring", "Click points", "measuring")
+            self._switch("measuring", "Click points")
             v.VBtn(
                 "Clear",
                 click=(self.forget,),
@@ -304,10 +304,10 @@ class InsidePanel:
                 raw_attrs=named_by("e.name"),
             )
 
-    def _switch(self, name: str, label: str, value: str, off: str = "false") -> None:
+    def _switch(self, name: str, label: str, off: str = "false") -> None:
         """A box that turns something of the inside on or off."""
         v.VCheckbox(
-            model_value=(f"inside.{value}",),
+            model_value=(f"inside.{name}",),
             update_modelValue=(self.toggle, f"['{name}']"),
             label=label,
             density="compact",

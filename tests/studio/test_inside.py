@@ -6,23 +6,27 @@ import math
 import time
 import zipfile
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from fracslice import box, make_mesh, sphere
+from fracslice import box, cylinder, make_mesh, sphere, transform
 from fracslice.errors import SceneError
 from fracslice.fields.box import Box
 from fracslice.mesh.drawing import SECTION
-from fracslice.records import Print
+from fracslice.records import Print, SliceJob
 from fracslice.scene.view import Camera
+from fracslice.slicing import plan_stack
 from fracslice.studio.inside import Inside
-from fracslice.studio.layer_view import HANGS, ISLAND
+from fracslice.studio.layer_view import HANGS, HELD, ISLAND, PrintLayers
 from fracslice.studio.measuring import Mark, Overlay, Tracer, angle, circle, readout
 from fracslice.studio.measuring import sphere as best_sphere
 from fracslice.studio.session import Session
 from fracslice.studio.solid import MEASURES, SceneSolid, legend, thickness_at
+from fracslice.volume import Supports
+from fracslice.volume.amount import Sizing
 from fracslice.work import Work
 
 from .test_session import within
@@ -132,6 +136,17 @@ def test_layers_show_islands_in_the_pixels_of_a_printer(studio: Session, inside:
     within(lambda: (studio.shown.pixels > 100).all(2).sum() > 1.2 * area)
     inside.drag(400, 0)
     within(lambda: not (studio.shown.pixels > 100).all(2).any())
+
+
+def test_supports_of_a_layer_are_told_from_the_object() -> None:
+    ball = transform(sphere(2), translate=(0, 0, 4))
+    rod = transform(cylinder(0.5, 3), translate=(0, 0, 1.5))
+    size = Sizing.of(6.0)
+    stack = plan_stack(ball | rod, SliceJob(layer=0.5, pixel=0.1), WORK, size)
+    held = Supports(ball, rod, 0.5, 1, 0, 0, 1.0, 0.1)
+    layers = PrintLayers(replace(stack, supports=held), WORK, None, None)
+    assert (layers.look(1).classes == HELD).sum() == pytest.approx(100 * np.pi / 4, rel=0.2)
+    assert not (layers.look(8).classes == HELD).any()
 
 
 def test_layers_are_written_for_the_printer(studio: Session, inside: Inside, tmp_path: Path) -> None:
