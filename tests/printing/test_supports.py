@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import zlib
 from itertools import pairwise
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from scipy.ndimage import distance_transform_edt, label
 
 from fracslice import MeshJob, make_mesh
+from fracslice._slices import Encoding
 from fracslice.checks.layer_checks import check_layers
 from fracslice.errors import SceneError
 from fracslice.formulas import (
@@ -25,9 +27,10 @@ from fracslice.formulas import (
     union,
 )
 from fracslice.jobs.mesh import make_implicit
-from fracslice.printing.pillars import Room, steps_from
+from fracslice.printing.pillars import Object, Room, steps_from
 from fracslice.scene import Print, scene
 from fracslice.slicing import SliceJob, Slicer, Stack, plan_stack
+from fracslice.slicing.layers import Layer, ScreenView
 from fracslice.slicing.orientation import _runs, orientations
 from fracslice.volume.amount import Sizing
 from fracslice.work import Work
@@ -126,6 +129,38 @@ def test_what_hangs_in_a_cavity_is_caught() -> None:
     assert "1 in holes without exit (--cavities fill" in str(held)
     filled = supported(CAVITY, cavities="fill").supports  # type: ignore[arg-type]
     assert filled is not None and filled.caught == 0
+
+
+@pytest.mark.parametrize(("hole", "caught"), [(1.2, 0), (0.3, 1)])
+def test_what_comes_out_of_a_hole_is_not_caught(hole: float, caught: int) -> None:
+    room = difference(
+        CAVITY, transform(cylinder(radius=hole / 2, height=8), rotate=(0, 1, 0, 90), translate=(5, 0, 0))
+    )
+    held = supported(room).supports
+    assert held is not None and held.inner == 1 and held.caught == caught
+
+
+def test_a_strut_stands_on_what_is_as_wide() -> None:
+    rod, floor = cylinder(radius=0.1, height=4), at(box(size=(4, 4, 1)), 0, 0, -3)
+    of = Object(union(rod, floor), 1.0, np.ones(1), 0.1, Work(threads=1))
+    start = np.array([[0.0, 0.0, 4.0], [0.0, 1.0, 4.0]])
+    assert of.first_below(start, -9.0, 0.1, np.full(2, 0.08))[0] == pytest.approx(2, abs=0.2)
+    assert of.first_below(start, -9.0, 0.1, np.full(2, 0.2)) == pytest.approx(-2.5, abs=0.11)
+
+
+def test_pictures_show_what_either_layer_covers() -> None:
+    stack = supported(BALL)
+    view = ScreenView(stack.shape, False, False, (0, 0), stack.shape, bytes(range(256)))
+
+    def shown(layer: Layer) -> tuple[np.ndarray, np.ndarray, float, float]:
+        data = zlib.decompress(layer.encoded(view, Encoding.PNG))
+        area = layer.area
+        image = np.frombuffer(data, np.uint8).reshape(stack.shape[0], -1)[::-1, 1:]
+        return image, layer.coverage, area, int(layer.coverage.sum()) / 255 * STEP**2
+
+    for image, coverage, area, covered in Slicer(stack, Work(threads=1)).map(shown):
+        assert (image == coverage).all()
+        assert area == pytest.approx(covered, rel=0.02, abs=0.1)
 
 
 def test_more_carries_more() -> None:
