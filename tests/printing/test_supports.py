@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_edt, label
 
-from fracslice import MeshJob, make_mesh
+from fracslice import MeshJob, make_mesh, slice_layers
 from fracslice._slices import Encoding
 from fracslice.checks.layer_checks import check_layers
 from fracslice.errors import SceneError
@@ -273,6 +273,8 @@ def test_best_direction_up(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(best) == 5
     for k, one in enumerate(best):
         assert all(np.dot(one.up, other.up) < math.cos(math.radians(14.9)) for other in best[:k])
+    slices = slice_layers(MUSHROOM, layer=1, pixel=1, up="auto")
+    assert slices[0].sum(dtype=int) > 4 * slices[-1].sum(dtype=int)
     turned = orientations(transform(MUSHROOM, rotate=(1, 0, 0, 30)), Sizing(20.0), Work(threads=1))[0]
     assert turned.supports < 5  # the side of its hat is one of the hull
 
