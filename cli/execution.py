@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fracslice.common.messages import decimal, format_count, place, significant
+from fracslice.common.messages import decimal, duration, format_count, place, significant
 from fracslice.errors import Cancelled, FracsliceError, KeptError, MeshError, SceneError
 from fracslice.formats import ENDINGS, SOLIDS
 from fracslice.records import JOINING
@@ -314,14 +314,6 @@ class Closing:
 def millilitres(volume: float) -> str:
     """Volume in millilitres, mm3 given; in mm3 below a hundredth of one."""
     return f"{significant(volume / 1000)} ml" if volume >= 10 else f"{significant(volume, 2)} mm3"
-
-
-def duration(seconds: float) -> str:
-    """Duration in hours and minutes, or in seconds."""
-    minutes = round(seconds / 60)
-    if seconds < 60:
-        return f"{max(round(seconds), 1)} s"
-    return f"{minutes // 60} h {minutes % 60} min" if minutes >= 60 else f"{minutes} min"
 
 
 def of_mesh(result: Result, material: str, price: float | None) -> Closing:

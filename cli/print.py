@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fracslice.common.messages import significant
+from fracslice.common.messages import duration, significant
 from fracslice.errors import keeping
 
-from .execution import check_targets, duration, load_scene
+from .execution import check_targets, load_scene
 from .options import MeshOptions, Name, argument, command, option, output
 
 if TYPE_CHECKING:

@@ -252,6 +252,31 @@ class Timeline:
         target = np.array(self.scene.view.camera.target if self.scene.view.camera else (0.0, 0.0, 0.0))
         return lambda _: target
 
+    def value(self, of: str, seconds: float) -> str:
+        """Return the value of an attribute that moves, as a scene's text has it.
+
+        Parameters
+        ----------
+        of : str
+            Attribute of a track.
+        seconds : float
+            Time, seconds.
+
+        Returns
+        -------
+        str
+            The value.
+
+        Raises
+        ------
+        SceneError
+            If the attribute has no track.
+        """
+        if of not in self._tracks:
+            raise SceneError(f"of={of!r}: expected the attribute of a track")
+        track, curve = self._tracks[of]
+        return str(kind_of(self.scene, of, track.fail).text(curve(seconds)))
+
     def at(self, seconds: float) -> Scene:
         """Return the scene at a time, without its animation.
 
@@ -275,12 +300,11 @@ class Timeline:
         camera: dict[str, Any] = {}
         for of, (track, curve) in self._tracks.items():
             try:
-                value = curve(seconds)
                 element, _, attribute = of.rpartition(".")
                 if element == "camera":
-                    camera[attribute] = value
+                    camera[attribute] = curve(seconds)
                 else:
-                    scene = scene.with_values([f"{of}={kind_of(scene, of, track.fail).text(value)}"])
+                    scene = scene.with_values([f"{of}={self.value(of, seconds)}"])
             except (SceneError, ValueError) as error:
                 raise track.fail(f"at {seconds:g}s: {error}") from None
         seen = scene.view.camera

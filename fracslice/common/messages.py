@@ -39,6 +39,20 @@ def place(at: Iterable[float], decimals: int = 2) -> str:
     return " ".join(f"{round(x, decimals) + 0.0:.{decimals}f}" for x in at)
 
 
+def duration(seconds: float) -> str:
+    """Format a time in hours and minutes, or in seconds.
+
+    Examples
+    --------
+    >>> duration(0.3), duration(95), duration(7260)
+    ('1 s', '2 min', '2 h 1 min')
+    """
+    minutes = round(seconds / 60)
+    if seconds < 60:
+        return f"{max(round(seconds), 1)} s"
+    return f"{minutes // 60} h {minutes % 60} min" if minutes >= 60 else f"{minutes} min"
+
+
 def format_count(count: int, one: str, more: str = "") -> str:
     """Format a count with its noun.
 

@@ -40,7 +40,6 @@ from .language import (
     check,
     depends_on_points,
     fingerprint,
-    fingerprints,
     identity,
     intrinsic_name,
     is_number,
@@ -152,7 +151,8 @@ def loop_function(loop: Loop) -> Function:
 
 def kernel_function(function: Callable[..., Any], fixed: Fixed = ()) -> Function:
     """Return a function of a kernel with some arguments fixed: records of which `repr` says everything."""
-    plain = _function(KernelReader, function, (), function.__name__, fingerprints(function))
+    # all of it is ours: only another process sees other values around it, unlike a formula of a notebook
+    plain = _function(KernelReader, function, (), function.__name__, None)
     return _read_again(KernelReader, plain, fixed, repr(fixed)) if fixed else plain
 
 

@@ -64,27 +64,6 @@ def fingerprint(function: Callable[..., Any]) -> Hashable:
     return code, tuple(_mark(around.get(n, function.__globals__.get(n)), names) for n in names)
 
 
-def fingerprints(function: Callable[..., Any]) -> Hashable:
-    """Return the fingerprints of a function and of all functions that it calls."""
-    marks = {function: fingerprint(function)}
-    left = [function]
-    while left:
-        for called in _functions_in(marks[left.pop()]):
-            if called not in marks:
-                marks[called] = fingerprint(called)
-                left.append(called)
-    return tuple(marks.items())
-
-
-def _functions_in(mark: Any) -> Iterator[FunctionType]:
-    """Functions in a fingerprint."""
-    if isinstance(mark, FunctionType):
-        yield mark
-    elif isinstance(mark, tuple):
-        for part in mark:
-            yield from _functions_in(part)
-
-
 @lru_cache(maxsize=4096)
 def outer_names(code: CodeType) -> tuple[str, ...]:
     """Return the names that a function uses from outside, and their attributes."""

@@ -81,6 +81,16 @@ def resolve_depths(root: Node, detail: float) -> Node:
     return _at(root, automatic, _depth(root, automatic, detail)) if automatic else root
 
 
+def with_depths_of(root: Node, known: Node) -> Node:
+    """Give automatic depths the values that they have in another scene of the same elements."""
+    if root.formula is not known.formula or len(root.children) != len(known.children):
+        return root
+    depths = {name: known[name] for name, value in root.values.items() if value == AUTO}
+    pairs = zip(root.children, known.children, strict=True)
+    children = tuple(with_depths_of(*pair) for pair in pairs)
+    return root.changed(children, **depths) if depths or children != root.children else root
+
+
 def depth_notes(root: Node, known: Node) -> tuple[str, ...]:
     """Describe the automatic depths of a scene, such as "mandelbulb 5"."""
     pairs = zip(root.walk(), known.walk(), strict=True)

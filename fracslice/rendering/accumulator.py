@@ -117,6 +117,24 @@ def develop(mean: np.ndarray, view: View, work: Work | None = None) -> np.ndarra
     return np.concatenate([shown, alpha], 2) if film.transparent else shown
 
 
+def smoothed(mean: np.ndarray) -> np.ndarray:
+    """Average the light of pixels of one sample with that of their neighbours, without those behind an edge.
+
+    `mean`: float32 (height, width, 4), as of `develop`. Returns the same; pixels whose ray missed stay.
+    """
+    light, hit = mean[..., :3], (mean[..., 3:] > 0).astype(np.float32)
+    sums, counts = _around(light * hit), _around(hit)
+    near = np.where(hit > 0, sums / np.maximum(counts, 1), light)
+    return np.concatenate([near, mean[..., 3:]], 2)
+
+
+def _around(values: np.ndarray) -> np.ndarray:
+    """Sums over the 3 x 3 pixels around each."""
+    padded = np.pad(values, ((1, 1), (1, 1), (0, 0)))
+    columns = padded[:, :-2] + padded[:, 1:-1] + padded[:, 2:]
+    return np.asarray(columns[:-2] + columns[1:-1] + columns[2:])
+
+
 def shows_background(view: View) -> bool:
     """Return whether rays that miss show the film's background."""
     lit = view.shading.mode == "light"

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Protocol
@@ -15,6 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from ..errors import Cancelled, FracsliceError, SceneError
+from ..fields.depth import with_depths_of
 from ..fields.registry import Node
 from ..scene.model import Scene
 from ..scene.reader import read
@@ -53,16 +54,22 @@ class Follower:
         """True if depth and precision suit the camera's distance to the surface."""
         assert self._renderer
         try:
-            distance = clearance(self._renderer.setup.root, camera)
+            distance = clearance(self.root, camera)
         except SceneError:  # inside the solid at this depth
             return False
         return self._distance_then / NEARER < distance < self._distance_then * NEARER
 
     @property
+    def root(self) -> Node:
+        """The scene with the depths that suit the camera's distance to the surface."""
+        assert self._renderer
+        return self._renderer.setup.root
+
+    @property
     def distance(self) -> float:
         """Lower bound of the distance from the camera to the surface, scene units."""
         assert self._renderer
-        return clearance(self._renderer.setup.root, self._renderer.setup.camera)
+        return clearance(self.root, self._renderer.setup.camera)
 
 
 POLL = 0.2
@@ -141,8 +148,12 @@ class CameraInput:
         return camera.rolled(TURN * seconds * self.roll) if self.roll else camera
 
 
-WITHIN = 0.05
+WITHIN = 0.035
 """Aim for the time of a draft, seconds."""
+REST = 0.1
+"""Time without a move after which the picture sharpens, seconds."""
+SLOWER, STEADY = 1.5, 0.3
+"""Ratio of the time of drafts to that, above which they are coarser, and the weight of the last one in it."""
 COARSEST = 8
 """Largest spacing of a draft's pixels."""
 FARTHEST = 100.0
@@ -160,6 +171,10 @@ class Shown:
     camera: Camera  # camera of the picture
     distance: float  # lower bound of the distance from the camera to the surface, scene units
     problem: str = ""  # error message of the file's current version, or ""
+
+
+Drawing = Callable[[Camera, tuple[int, int]], np.ndarray]
+"""Draws a scene in another way than by rays, from a camera, in a size, pixels: uint8 [rows, columns, 3]."""
 
 
 class Live:
@@ -184,12 +199,15 @@ class Live:
         self._drafting = replace(self._refining, cancel=threading.Event())  # input must not stop a draft
         self._lock = threading.Lock()
         self._camera_input, self._spacing = CameraInput(), COARSEST // 2
+        self._cost = WITHIN * self._spacing**2  # time of a draft with all pixels, seconds
         self._stepped = time.monotonic()
         self.making: float | None = None
+        self._drawing: Drawing | None = None
+        self._drawn_by: Drawing | None = None
         self._aim: Camera
+        self._drawn: tuple[int, int]
+        self._resolved: Node | None = None  # the scene of the last draft, with its depths
         self._load(source.read(), None)
-        self.first = self.camera
-        self._farthest = FARTHEST * math.dist(self.first.eye, self.first.target)
         self._open = True
         self._failure: BaseException | None = None
         self._thread = threading.Thread(target=self._run, name="fracslice live", daemon=True)
@@ -205,6 +223,12 @@ class Live:
         """Camera that the picture follows."""
         with self._lock:
             return self._aim
+
+    @property
+    def root(self) -> Node:
+        """Scene of the picture, with the depths of its last draft."""
+        assert self._resolved
+        return self._resolved
 
     @property
     def size(self) -> tuple[int, int]:
@@ -248,6 +272,11 @@ class Live:
             self._size = size
             self._refining.cancel.set()
 
+    def draw(self, drawing: Drawing | None) -> None:
+        """Show the scene as a drawing has it from now on; None: by rays. It must not raise."""
+        self._drawing = drawing
+        self._refining.cancel.set()
+
     def wake(self) -> None:
         """Look at the source at once."""
         self._refining.cancel.set()
@@ -272,16 +301,20 @@ class Live:
 
     def _step(self) -> None:
         """Follow the source and the camera; otherwise refine the picture, or wait if it is complete."""
-        self._follow_source()
+        drawing = self._drawing
+        if drawing is None:
+            self._follow_source()
         aim, size = self._flown(), self._size
         try:
-            if aim != self.camera or size != self._drawn:
+            if drawing is not None:
+                self._draw(drawing, aim, size)
+            elif self._drawn_by is not None or aim != self.camera or size != self._drawn:
                 self._draft(self._drafts, aim, size)
-            elif not self._refine():
-                self._refining.cancel.wait(POLL)
-        except SceneError:  # the eye is inside the solid
+            elif self.shown.samples or not self._refining.cancel.wait(REST):
+                self._sharpen()
+        except SceneError:  # the eye is inside the solid, perhaps since a drawing was seen from there
             with self._lock:
-                self._aim = self.camera
+                self._aim = self.first if self._drawn_by is not None else self.camera
             self._refining.cancel.wait(POLL)
         except Cancelled:
             return
@@ -297,25 +330,39 @@ class Live:
                 self._aim = aim
             return self._aim
 
+    def _draw(self, drawing: Drawing, camera: Camera, size: tuple[int, int]) -> None:
+        """Show a drawing, unless it is shown; it may be seen from inside the solid, too."""
+        if drawing is self._drawn_by and camera == self.camera and size == self._drawn:
+            self._refining.cancel.wait(POLL)
+            return
+        value = float(self.root.kernel("cpu", "float64").points(*(np.array([c]) for c in camera.eye))[0])
+        distance = abs(value) / self.root.bounds.lipschitz
+        self.shown = Shown(drawing(camera, size), 1.0, camera, distance, self._problem)
+        self._drawn, self._drawn_by = size, drawing
+
     def _draft(self, drafts: Follower, camera: Camera | None, size: tuple[int, int]) -> None:
         """Show a draft, and choose the spacing of the next one by the time that it took."""
         coarse = max(size[0] // self._spacing, 1), max(size[1] // self._spacing, 1)
         renderer = self._made(drafts, camera, coarse)
         start = time.monotonic()
-        *_, done = renderer.passes(1)
+        draft = renderer.draft()
+        # a GPU has the next frame sooner than this one's noise is gone
+        pixels = draft.smooth if self._spacing > 1 and renderer.device == "cpu" else draft.shown
         seconds = time.monotonic() - start
         seen = camera or renderer.setup.camera
-        self.shown = Shown(done.shown, 0.0, seen, drafts.distance, self._problem)
-        self._drafts, self._drawn, self._passes = drafts, size, self._sharpened()
-        if seconds > 1.5 * WITHIN:
+        self.shown, self._drawn_by = Shown(pixels, 0.0, seen, drafts.distance, self._problem), None
+        self._resolved, self._drawn, self._passes = drafts.root, size, self._sharpened()
+        self._cost += STEADY * (seconds * self._spacing**2 - self._cost)
+        if self._cost > SLOWER * WITHIN * self._spacing**2:
             self._spacing = min(self._spacing + 1, COARSEST)
-        elif seconds < WITHIN / 2:
-            self._spacing = max(self._spacing - 1, 1)
+        elif self._cost < WITHIN * (self._spacing - 1) ** 2:
+            self._spacing -= 1
 
-    def _refine(self) -> bool:
-        """Add a pass to the picture at rest; False if it is complete."""
+    def _sharpen(self) -> None:
+        """Add a pass to the picture at rest, or wait if it is complete."""
         try:
-            return next(self._passes, None) is not None
+            if next(self._passes, None) is None:
+                self._refining.cancel.wait(POLL)
         except Cancelled:  # ends a generator
             self._passes = self._sharpened()
             raise
@@ -336,11 +383,19 @@ class Live:
 
     def _load(self, scene: Scene, camera: Camera | None) -> None:
         """Show a scene from a camera, or from its own; if that fails, the former scene stays."""
-        drafts = Follower(scene.root, scene.view, self._drafting, self._device)
+        # the depths of the scene before do for the first draft; to choose them takes longer than to draw it
+        near = with_depths_of(scene.root, self._resolved) if self._resolved else scene.root
+        drafts = Follower(near, scene.view, self._drafting, self._device)
         self._problem = ""
         self._draft(drafts, camera or scene.view.camera, self._size)
+        if near is not scene.root:
+            drafts = Follower(scene.root, scene.view, self._drafting, self._device)
+        self._drafts = drafts
         self._finals = Follower(scene.root, scene.view, self._refining, self._device)
         self.scene = scene
+        if camera is None:
+            self.first = self.camera
+            self._farthest = FARTHEST * math.dist(self.first.eye, self.first.target)
         with self._lock:
             self._aim = self.camera
 

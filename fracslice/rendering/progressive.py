@@ -4,6 +4,7 @@ a cluster.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -23,7 +24,19 @@ from ..fields.registry import Node
 from ..scene import Scene, reads, to_xml
 from ..scene.view import Camera, Film, View
 from ..work import Work
-from .accumulator import CHANNELS, COARSE, Accumulator, HostAccumulator, PassPlan, SampleRange, grids, picture
+from .accumulator import (
+    CHANNELS,
+    COARSE,
+    Accumulator,
+    HostAccumulator,
+    PassPlan,
+    SampleRange,
+    develop,
+    grids,
+    levels,
+    picture,
+    smoothed,
+)
 from .linking import Frame, link_frame
 from .packets import CpuTracer
 from .setup import clip_scene, optics, prepare
@@ -315,6 +328,19 @@ class Pass:
         """
         return self.crop.within(self._current().shown(self.view))
 
+    @property
+    def smooth(self) -> np.ndarray:
+        """Developed picture with less noise and less detail: each pixel has the light around it.
+
+        Returns
+        -------
+        ndarray of uint8, shape (height, width, 3)
+            sRGB; the picture as it is in a mode other than "light".
+        """
+        if self.view.shading.mode != "light":
+            return self.shown
+        return levels(develop(smoothed(self.mean), self.view))
+
     @cached_property
     def developed(self) -> np.ndarray:
         """Developed picture in floats.
@@ -527,12 +553,33 @@ class Renderer:
         while (plan := self.accumulator.plan(most, tolerance)).samples:
             yield self._pass(plan)
 
-    def _pass(self, plan: PassPlan) -> Pass:
-        start = time.perf_counter()
+    def draft(self) -> Pass:
+        """Take the first sample of every pixel at once, in place of the first passes.
+
+        Returns
+        -------
+        Pass
+            The picture, whose error is unknown.
+
+        Raises
+        ------
+        Cancelled
+            If the work was cancelled.
+        """
+        self.accumulator.passes = len(grids(*self.crop.size)) - 1
+        plan = self.accumulator.plan(1, math.inf)
+        self._trace(plan)
+        return self._seen(1.0, math.inf, plan.samples, 0.0)
+
+    def _trace(self, plan: PassPlan) -> None:
         coarse = len(grids(*self.crop.size)) - 2  # passes with a pixel a block, or less: no prepass pays
         self.prepare(max(self.accumulator.passes - coarse, 0))
         self.tracer.add(self.accumulator.sums, plan, self.work)
         self.accumulator.passes += 1
+
+    def _pass(self, plan: PassPlan) -> Pass:
+        start = time.perf_counter()
+        self._trace(plan)
         samples, error = self.accumulator.statistics()
         return self._seen(samples, error, plan.samples, plan.samples / (time.perf_counter() - start))
 

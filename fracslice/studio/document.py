@@ -7,7 +7,7 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from html import escape
 from pathlib import Path
@@ -16,8 +16,9 @@ from xml.parsers import expat
 from ..common.parameters import REQUIRED, Choice, File, Parameter, printable
 from ..errors import SceneError
 from ..fields.node import FORMULAS
+from ..records import Part
 from ..scene.layout import SCENE, SECTIONS, SOLID, Element
-from ..scene.model import Scene
+from ..scene.model import Scene, part_to_xml
 from ..scene.reader import reads
 
 Place = tuple[int, ...]
@@ -268,16 +269,48 @@ class Document:
         """Add an element: inside another that takes any more, else behind it."""
         tag = self._at(place) if place else self.root
         if not self._takes_more(tag):
-            return self._insert(place[:-1], place[-1] + 1, _empty(name))
-        return self._insert(place, len(tag.children), _empty(name))
+            return self._insert(place[:-1], place[-1] + 1, empty_element(name))
+        return self._insert(place, len(tag.children), empty_element(name))
 
     def wrap(self, place: Place, name: str) -> None:
         """Put an element around another."""
         tag = self._at(place)
         old, indent = self.text[tag.start : tag.end], self._indent(tag)
         inner = f"{indent}{INDENT}{old.replace(chr(10), chr(10) + INDENT)}"
-        new = f"{_empty(name)[:-2]}>\n{inner}\n{indent}</{name}>"
+        new = f"{empty_element(name)[:-2]}>\n{inner}\n{indent}</{name}>"
         self.write(self.text[: tag.start] + new + self.text[tag.end :], place)
+
+    def part(self, name: str) -> Tag | None:
+        """The first element of a name beside the solid."""
+        return next((tag for tag in self.root.children if tag.name == name), None)
+
+    def append(self, line: str) -> None:
+        """Add an element at the end of the scene."""
+        end = self.root.close
+        self.write(f"{self.text[:end]}{INDENT}{line}\n{self.text[end:]}")
+
+    def write_part(self, part: Part) -> None:
+        """Write a record of what a scene has once, such as its camera."""
+        line, tag = part_to_xml(part), self.part(part.element)
+        if tag is None:
+            self.append(line)
+        else:
+            self.write(self.text[: tag.start] + line + self.text[tag.end :])
+
+    @contextmanager
+    def one_edit(self) -> Iterator[None]:
+        """Undo what is edited in a block together; the chosen element stays. If it fails, nothing is done."""
+        before, versions, at = self._now, [*self._versions], self.version.at
+        try:
+            yield
+        except SceneError:
+            self._versions, self._now = versions, before
+            self._look()
+            raise
+        if self._now > before + 1:
+            self._versions[before + 1 :] = [self.version]
+            self._now = before + 1
+        self._versions[self._now] = replace(self.version, at=at)
 
     def unwrap(self, place: Place) -> None:
         """Leave only what is inside an element."""
@@ -397,7 +430,7 @@ def required(name: str) -> dict[str, str]:
     return {a: _starting(kind) for a, kind in element.parameters.items() if kind.default is REQUIRED}
 
 
-def _empty(name: str) -> str:
+def empty_element(name: str) -> str:
     """A new element without children."""
     given = "".join(f' {attribute}="{value}"' for attribute, value in required(name).items())
     return f"<{name}{given}/>"

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-import base64
+import math
 import os
 import secrets
+import time
 import webbrowser
 from collections.abc import Awaitable, Callable
 from typing import Any, Literal
@@ -16,12 +17,16 @@ from trame.ui.vuetify3 import VAppLayout
 from trame.widgets import html, rca
 from trame.widgets import vuetify3 as v
 
+from ..common.messages import format_count
 from ..errors import FracsliceError
 from ..export.images import IMAGES
-from ..formulas import Node
 from ..viewer.viewer import MOVES, PACES, Controls
 from . import panels
-from .session import Studio, command, jpeg
+from .film_page import HEIGHT, FilmPanel
+from .inside_page import InsidePanel
+from .session import FILMS, PRINT_ENDINGS, Studio, jpeg
+from .sheets import SheetPanel, embedded
+from .widgets import named, named_by, number_field
 
 TICK = 1 / 60
 """Interval between two looks at the picture, seconds."""
@@ -32,13 +37,22 @@ QUALITIES = 75, 92
 PENDING = 2
 """Frames that a page may have to fetch still before others are left out."""
 
+SMALL = (
+    f"{{width: '{panels.CELL[0]}px', height: '{panels.CELL[1]}px', flexShrink: 0, borderRadius: '4px', "
+    "background: `url(${thumbnails})`, backgroundPosition: pictures[c.name]}"
+)
+"""Style of the small picture of a row."""
+
 HELP = (
-    ("drag", "turn around the target"),
+    ("drag", "turn around what is under the mouse"),
     ("shift or right drag", "look around"),
-    ("wheel", "come nearer, go away"),
+    ("wheel", "come nearer to what is under the mouse, go away"),
+    ("double click", "walk to what is under the mouse"),
+    ("X", "focus on what is under the mouse"),
     ("W S A D R F, Q E", "fly, roll"),
     ("1 to 9", "pace"),
     ("V", "first view"),
+    (", .", "the view before, after"),
     ("ctrl Z, ctrl Y", "undo, redo"),
     ("?", "this help"),
 )
@@ -46,17 +60,19 @@ HELP = (
 CONTROL = {"z": "undo", "y": "redo"}
 """What keys do with ctrl."""
 
+ACTIONS = ("v", ",", ".", "?")
+"""Keys of the picture that do something once."""
+
+TWICE, NEAR = 0.35, 5.0
+"""Longest time between the clicks of a double click, seconds, and their distance, pixels."""
+
+BAR = 48
+"""Height of the bar above the picture, pixels."""
+
+NARROW = 900
+"""Width of a page below which the text covers the picture, pixels."""
+
 AREA = "picture"
-
-
-def named(label: str, title: str = "") -> list[str]:
-    """Attributes that name a control, for those who see it and those who do not."""
-    return [f'aria-label="{label}"', f'title="{title or label}"']
-
-
-def named_by(expression: str) -> list[str]:
-    """The same of an expression of the page."""
-    return [f':aria-label="{expression}"']
 
 
 class Frames:
@@ -68,8 +84,9 @@ class Frames:
         self._studio, self._act = studio, act
         self._streamer: Any = None
         self._sent: object = None
-        self._grip: tuple[float, float] | None = None
-        self._looking = False
+        self._pressed, self._pressed_at = 0.0, (0.0, 0.0)
+        self._drag: Callable[[float, float], None] | None = None
+        self.mouse = 0.0, 0.0  # pixels from the upper left corner
         self.controls = Controls()
 
     def set_streamer(self, streamer: Any) -> None:
@@ -87,21 +104,44 @@ class Frames:
 
     def on_interaction(self, _: str, event: dict[str, Any]) -> None:
         """Do what an event of the mouse or a key says."""
-        kind = event.get("type", "")
-        at = float(event.get("x", 0)), float(event.get("y", 0))
-        if kind in ("LeftButtonPress", "RightButtonPress", "MiddleButtonPress"):
-            self._grip, self._looking = at, kind != "LeftButtonPress" or bool(event.get("shiftKey"))
-        elif kind.endswith("ButtonRelease"):
-            self._grip = None
-        elif kind == "MouseMove" and self._grip:
-            right, up = at[0] - self._grip[0], at[1] - self._grip[1]
-            self._grip = at
-            turn = self._studio.look_around if self._looking else self._studio.orbit
-            turn(right, -up)
-        elif kind == "MouseWheel":
-            self._studio.approach(1.0 if event.get("spinY", 0) < 0 else -1.0)
-        elif kind in ("KeyDown", "KeyPress", "KeyUp"):
+        kind, views, inside = event.get("type", ""), self._studio.views, self._studio.inside
+        if kind in ("KeyDown", "KeyPress", "KeyUp"):
             self.key(str(event.get("key", "")).lower(), kind != "KeyUp", bool(event.get("controlKey")))
+            return
+        x, y = self.mouse
+        if "x" in event:
+            self.mouse = float(event["x"]), self._studio.live.size[1] - float(event["y"])
+        if kind.endswith("ButtonPress"):
+            self._press(kind == "LeftButtonPress" and not event.get("shiftKey"))
+        elif kind.endswith("ButtonRelease"):
+            self._drag = None
+            if inside.measuring and math.dist(self.mouse, self._pressed_at) < NEAR:
+                inside.pick(self.mouse)
+        elif kind == "MouseMove" and self._drag:
+            self._drag(self.mouse[0] - x, self.mouse[1] - y)
+        elif kind == "MouseMove":
+            inside.hover(self.mouse)
+        elif kind == "MouseWheel":
+            nearer = 1.0 if event.get("spinY", 0) < 0 else -1.0
+            if inside.is_flat:
+                inside.zoom(nearer)
+            else:
+                views.approach(nearer, self.mouse)
+
+    def _press(self, around: bool) -> None:
+        """Begin a drag around the point under the mouse or in place; a second click walks there."""
+        views, inside, now = self._studio.views, self._studio.inside, time.monotonic()
+        still = inside.is_flat or inside.measuring
+        if not still and now - self._pressed < TWICE and math.dist(self.mouse, self._pressed_at) < NEAR:
+            views.walk_to(self.mouse)
+            return
+        self._pressed, self._pressed_at = now, self.mouse
+        if inside.is_flat:
+            self._drag = inside.drag
+            return
+        self._drag = views.orbit if around else views.look_around
+        if around:
+            views.grip(self.mouse)
 
     def key(self, key: str, down: bool, control: bool = False) -> None:
         """Press or release a key."""
@@ -112,19 +152,23 @@ class Frames:
             self.controls.release(key)
         elif key in MOVES or key in PACES:
             self.controls.press(key)
-        elif key in ("v", "?"):
+        elif key == "x":
+            self._studio.focus_on(self.mouse)
+        elif key in ACTIONS:
             self._act(key)
 
     async def send(self) -> None:
         """Send the picture if there is a new one, and a page to send it to."""
-        shown = self._studio.shown
-        if shown is self._sent or self._streamer is None:
+        shown, inside = self._studio.shown, self._studio.inside
+        now = shown, inside.overlay
+        if now == self._sent or self._streamer is None:
             return
-        self._sent = shown
+        self._sent = now
         still = shown.samples > 0
         loop = asyncio.get_running_loop()
-        data = await loop.run_in_executor(None, jpeg, shown.pixels, QUALITIES[still])
-        rows, columns, _ = shown.pixels.shape
+        pixels = await loop.run_in_executor(None, inside.over, shown)
+        data = await loop.run_in_executor(None, jpeg, pixels, QUALITIES[still])
+        rows, columns, _ = pixels.shape
         meta = {"type": "image/jpeg", "codec": "", "w": columns, "h": rows, "st": 0, "key": "key"}
         self._streamer.push_content(AREA, meta, data)
 
@@ -141,6 +185,8 @@ class Page:
         self.state.update(
             {
                 "choices": panels.choices(),
+                "thumbnails": embedded(panels.THUMBNAILS.read_bytes(), "webp"),
+                "pictures": panels.places_of_pictures(),
                 "search": "",
                 "adding": False,
                 "wrapping": False,
@@ -148,9 +194,6 @@ class Page:
                 "helping": False,
                 "making": False,
                 "opening": False,
-                "varying": False,
-                "sheet": [],
-                "spread": 0.3,
                 "axis": "",
                 "share": 0.5,
                 "scenes": studio.scenes,
@@ -162,7 +205,9 @@ class Page:
                 "job": {},
             }
         )
-        self._sheet: list[Node] = []
+        self.sheets = SheetPanel(self)
+        self.film = FilmPanel(self)
+        self.inside = InsidePanel(self)
         self.refresh()
         self.state.change("xml")(self.write)
         self.ctrl.on_server_bind.add(self.guard)
@@ -175,12 +220,13 @@ class Page:
         tag = document.chosen
         with self.state as state:
             state.rows = panels.outline(document)
-            state.panel = panels.controls(tag) if tag else []
+            state.panel = panels.controls(self.studio.at_time(tag)) if tag else []
             state.at = list(document.version.at)
             state.tag = tag.name if tag else ""
             state.xml = document.text
             state.problem = document.problem or self.studio.message
             state.undoes, state.redoes, state.saved = document.undoes, document.redoes, document.is_saved
+            self.film.refresh()
 
     def edit(self, change: Callable[..., None], *arguments: Any) -> None:
         """Change the document and the page."""
@@ -191,7 +237,9 @@ class Page:
         """Do what a key of the picture or of the page means."""
         document = self.studio.document
         if key == "v":
-            self.studio.home()
+            self.studio.views.home()
+        elif key in (",", "."):
+            self.studio.views.back(1 if key == "," else -1)
         elif key == "?":
             with self.state as state:
                 state.helping = not state.helping
@@ -218,6 +266,10 @@ class Page:
         except FracsliceError as error:
             self.studio.message = str(error)
         self.shut("opening")
+        self.renamed()
+
+    def renamed(self) -> None:
+        """Show the name of another scene, and all of it."""
         with self.state as state:
             state.file_name = f"{self.studio.document.path.stem}.3mf"
             state.trame__title = f"{self.studio.document.path.stem} - fracslice"
@@ -228,28 +280,6 @@ class Page:
         with self.state as state:
             state.update(dict.fromkeys(dialogs, False))
             state.dirty(*dialogs)
-
-    async def vary(self) -> None:
-        """Show a sheet of variations of the scene, one after the other."""
-        self._sheet = []
-        with self.state as state:
-            state.varying, state.sheet = True, []
-        made, loop = self.studio.variations(float(self.state.spread)), asyncio.get_running_loop()
-        sheet = self._sheet
-        try:
-            while (one := await loop.run_in_executor(None, next, made, None)) and sheet is self._sheet:
-                sheet.append(one[0])
-                with self.state as state:
-                    data = base64.b64encode(jpeg(one[1], QUALITIES[1])).decode()
-                    state.sheet = [*state.sheet, f"data:image/jpeg;base64,{data}"]
-        except FracsliceError as error:
-            self.studio.message = str(error)
-
-    async def take(self, number: int) -> None:
-        """Go on from a variation of the sheet."""
-        self.studio.take(self._sheet[number])
-        self.refresh()
-        await self.vary()
 
     def cut(self, axis: str, share: Any) -> None:
         """Cut the picture open, or close it."""
@@ -286,8 +316,12 @@ class Page:
 
     def set_text(self, name: str, value: str | None) -> None:
         """Give an attribute of the chosen element a text; none takes it away."""
-        document = self.studio.document
-        self.edit(document.set_value, document.version.at, name, value or None)
+        self.studio.set_value(self.studio.document.version.at, name, value or None)
+        self.refresh()
+
+    def value_of(self, name: str) -> str:
+        """Text of an attribute of the chosen element, as its control shows it."""
+        return str(next(control["text"] for control in self.state.panel if control["name"] == name))
 
     def set_number(self, name: str, index: int, value: Any) -> None:
         """Give a number of an attribute a value."""
@@ -319,10 +353,11 @@ class Page:
     @property
     def options(self) -> dict[str, Any]:
         """Options of the file that the page names."""
-        picture = str(self.state.file_name).lower().endswith(IMAGES)
-        return (
-            {"samples": int(self.state.samples)} if picture else {"resolution": float(self.state.resolution)}
-        )
+        if str(self.state.file_name).lower().endswith((*IMAGES, *FILMS)):
+            return {"samples": int(self.state.samples)}
+        if str(self.state.file_name).lower().endswith(PRINT_ENDINGS):
+            return self.studio.inside.layer_options
+        return {"resolution": float(self.state.resolution)}
 
     def cancel(self) -> None:
         """Cancel what is being made."""
@@ -332,23 +367,28 @@ class Page:
     async def follow(self) -> None:
         """Steer by the keys that are held, send frames, and say how far things are, until the server ends."""
         while True:
-            self.studio.steer(self.frames.controls.input)
+            self.studio.views.steer(self.frames.controls.input)
+            self.studio.advance()
             await self.frames.send()
+            self.film.follow()
             self._say()
+            self.inside.follow()
             await asyncio.sleep(TICK)
 
     def _say(self) -> None:
         """Bring the line below the picture, and that of the job, up to date."""
         shown, job = self.studio.shown, self.studio.job
-        state = "draft" if shown.samples < 1 else f"{shown.samples:.0f} samples a pixel"
+        state = "draft" if shown.samples < 1 else f"{format_count(round(shown.samples), 'sample')} a pixel"
+        state = state if self.studio.inside.mode == "field" else self.studio.inside.mode
         making = "   compiling ..." if self.studio.live.making else ""
         status = f"{state}   surface at {shown.distance:.2g}   pace {self.frames.controls.pace:.2g}{making}"
         told = {}
         if job:
             line = job.result or job.problem or job.stage
             told = {"line": line, "share": round(100 * job.share), "done": job.is_done}
-            told["command"] = command(self.studio.target, job.path.name, self.options)
-        problem = self.studio.document.problem or self.studio.message or shown.problem
+            told["command"] = job.command
+        said = self.studio.inside.message or self.studio.message
+        problem = self.studio.document.problem or said or shown.problem
         changes = {"status": status, "job": told, "problem": problem}
         if any(self.state[name] != value for name, value in changes.items()):
             with self.state as state_now:
@@ -400,10 +440,16 @@ class Page:
                 self._tree()
                 v.VDivider()
                 self._panel()
-            with v.VNavigationDrawer(v_model=("editing",), location="right", width=460):
+            with v.VNavigationDrawer(
+                v_model=("editing",), location="right", width=460, mobile_breakpoint=NARROW
+            ):
                 self._editor()
+            with v.VNavigationDrawer(v_model=("marking",), location="right", width=240):
+                self.sheets.build_bookmarks()
+            self.inside.build()
             with v.VMain(style="height: 100vh"):
                 self._picture()
+                self.film.build()
             self._dialogs()
         self.layout = layout
 
@@ -411,12 +457,21 @@ class Page:
         with v.VAppBar(density="compact"):
             v.VAppBarTitle("{{ trame__title }}{{ saved ? '' : ' *' }}")
             v.VBtn(icon="mdi-folder-open", click="opening = true; search = ''", raw_attrs=named("Open"))
-            v.VBtn(icon="mdi-dice-5", click=self.vary, raw_attrs=named("Vary", "Variations of the numbers"))
+            v.VBtn(
+                icon="mdi-bookmark-multiple", click=self.sheets.toggle_bookmarks, raw_attrs=named("Bookmarks")
+            )
+            v.VBtn(
+                icon="mdi-dice-5",
+                click=self.sheets.vary,
+                raw_attrs=named("Vary", "Variations of the numbers"),
+            )
             for icon, label, act, off in (
                 ("mdi-undo", "Undo", "undo", "undoes == 0"),
                 ("mdi-redo", "Redo", "redo", "redoes == 0"),
                 ("mdi-content-save", "Save", "save", "false"),
                 ("mdi-home", "First view", "v", "false"),
+                ("mdi-arrow-left", "View before", ",", "false"),
+                ("mdi-arrow-right", "View after", ".", "false"),
                 ("mdi-help", "Help", "?", "false"),
             ):
                 v.VBtn(icon=icon, click=(self.act, f"['{act}']"), disabled=(off,), raw_attrs=named(label))
@@ -425,7 +480,13 @@ class Page:
                 click=self.keep_view,
                 raw_attrs=named("Write this view into the scene"),
             )
+            v.VBtn(
+                icon="mdi-layers-search",
+                click="looking_inside = !looking_inside",
+                raw_attrs=named("Inside", "Mesh, layers, check, measures"),
+            )
             v.VBtn(icon="mdi-xml", click="editing = !editing", raw_attrs=named("Text", "Text of the scene"))
+            v.VBtn(icon="mdi-filmstrip", click=self.film.toggle, raw_attrs=named("Film"))
             v.VBtn(icon="mdi-cube-send", click="making = true", raw_attrs=named("Make a file", "Make a file"))
             v.VBtn(
                 icon="mdi-theme-light-dark",
@@ -482,6 +543,14 @@ class Page:
                         click=(self.set_text, "[c.name, null]"),
                         raw_attrs=named_by("'reset ' + c.name"),
                     )
+                    v.VBtn(
+                        v_if="filming",
+                        icon="mdi-rhombus",
+                        size="x-small",
+                        variant="text",
+                        click=(self.film.key_value, "[c.name]"),
+                        raw_attrs=named_by("'keyframe of ' + c.name"),
+                    )
                 with (
                     html.Template(v_if="c.kind == 'slider'"),
                     html.Div(v_for="(value, i) in c.values", key="i", classes="d-flex align-center"),
@@ -496,13 +565,10 @@ class Page:
                         hide_details=True,
                         raw_attrs=named_by("c.name + ' ' + (i + 1)"),
                     )
-                    html.Input(
-                        type="number",
-                        value=("value",),
-                        step="any",
-                        change=(self.set_number, "[c.name, i, $event.target.value]"),
-                        style="width: 84px; color: inherit",
-                        raw_attrs=named_by("c.name + ' ' + (i + 1) + ' as a number'"),
+                    number_field(
+                        "value",
+                        (self.set_number, "[c.name, i, $event.target.value]"),
+                        named_by("c.name + ' ' + (i + 1) + ' as a number'"),
                     )
                 v.VSelect(
                     v_if="c.kind == 'choice'",
@@ -538,7 +604,8 @@ class Page:
         )
 
     def _picture(self) -> None:
-        with html.Div(style="position: relative; height: calc(100vh - 48px); background: #181a1d"):
+        below = f"${{filming ? {BAR + HEIGHT} : {BAR}}}px"
+        with html.Div(style=(f"`position: relative; background: #181a1d; height: calc(100vh - {below})`",)):
             area = rca.RemoteControlledArea(
                 name=AREA,
                 display="image",
@@ -572,6 +639,8 @@ class Page:
                     density="compact",
                     raw_attrs=named("Place of the cut"),
                 )
+            with html.Div(style="position: absolute; left: 8px; top: 8px"):
+                self.inside.modes()
             html.Div(
                 "{{ status }}",
                 style="position: absolute; left: 8px; bottom: 6px; color: #eee; text-shadow: 0 0 3px #000",
@@ -583,7 +652,7 @@ class Page:
                 v_if="problem",
                 type="warning",
                 density="compact",
-                style="position: absolute; left: 8px; right: 8px; top: 8px",
+                style="position: absolute; left: 8px; right: 8px; top: 56px",
             )
             with v.VCard(
                 v_if="job.line",
@@ -598,51 +667,39 @@ class Page:
     def _dialogs(self) -> None:
         found = "choices.filter(c => (c.name + c.doc).includes(search)"
         around = f"{found} && c.kind != 'shape' && c.kind != 'part')"
-        self._list("adding", "Add an element", f"{found})", "c.doc", (self.add, "[c.name, false]"))
-        self._list("wrapping", "Wrap it in", around, "c.doc", (self.add, "[c.name, true]"))
-        scenes = "scenes.filter(name => name.includes(search)).map(name => ({name}))"
-        self._list("opening", "Open a scene", scenes, "''", (self.open, "[c.name]"))
-        with v.VDialog(v_model=("varying",), width=700), v.VCard(title="Variations: click to go on from one"):
-            with html.Div(classes="d-flex flex-wrap justify-center", style="min-height: 480px"):
-                html.Img(
-                    v_for="(image, i) in sheet",
-                    key="i",
-                    src=("image",),
-                    click=(self.take, "[i]"),
-                    style="width: 216px; margin: 3px; cursor: pointer",
-                    raw_attrs=[":alt=\"'variation ' + (i + 1)\""],
-                )
-            with html.Div(classes="d-flex align-center mx-4"):
-                v.VSlider(
-                    v_model=("spread",),
-                    min=0.02,
-                    max=1,
-                    step=0.02,
-                    label="Size of changes",
-                    hide_details=True,
-                )
-                v.VBtn("Others", click=self.vary, variant="text")
+        self._list("adding", "Add an element", f"{found})", (self.add, "[c.name, false]"))
+        self._list("wrapping", "Wrap it in", around, (self.add, "[c.name, true]"))
+        scenes = "scenes.filter(c => (c.name + c.doc).includes(search))"
+        self._list("opening", "Open a scene", scenes, (self.open, "[c.name]"))
+        self.sheets.build_variations()
         with v.VDialog(v_model=("helping",), width=460), v.VCard(title="Help"), v.VTable(), html.Tbody():
             for keys, meaning in HELP:
                 with html.Tr():
                     html.Td(keys)
                     html.Td(meaning)
         with v.VDialog(v_model=("making",), width=460), v.VCard(title="Make a file", classes="pa-3"):
-            v.VTextField(v_model=("file_name",), label="File: .stl .3mf .ply .obj .glb .png .jpg .webp")
+            v.VTextField(
+                v_model=("file_name",), label="File: .stl .3mf .ply .obj .glb .png .jpg .mp4 .goo .sl1 ..."
+            )
             v.VTextField(v_model=("resolution",), type="number", label="Voxels along the longest side")
-            v.VTextField(v_model=("samples",), type="number", label="Samples a pixel, of a picture")
+            v.VTextField(v_model=("samples",), type="number", label="Samples a pixel, of a picture or a film")
             v.VBtn("Make", click=(self.make_and_close,), color="primary")
 
-    def _list(
-        self, flag: str, title: str, rows: str, about: str, click: tuple[Callable[..., None], str]
-    ) -> None:
-        """Dialog with a search and the rows `c` that it leaves, each with its name and what is about it."""
-        with v.VDialog(v_model=(flag,), width=560), v.VCard(title=title):
+    def _list(self, flag: str, title: str, rows: str, click: tuple[Callable[..., None], str]) -> None:
+        """Dialog with a search and the rows `c` that it leaves: picture, name and description."""
+        with v.VDialog(v_model=(flag,), width=720), v.VCard(title=title):
             v.VTextField(v_model=("search",), label="Search", autofocus=True, classes="mx-4")
-            with v.VList(density="compact", style="max-height: 60vh; overflow: auto"):
-                v.VListItem(
-                    v_for=f"c in {rows}", key="c.name", title=("c.name",), subtitle=(about,), click=click
-                )
+            with (
+                v.VList(
+                    density="compact", classes="d-flex flex-wrap", style="max-height: 64vh; overflow: auto"
+                ),
+                v.VListItem(v_for=f"c in {rows}", key="c.name", click=click, style="width: 50%"),
+                html.Div(classes="d-flex align-center"),
+            ):
+                html.Div(v_if="pictures[c.name]", style=(SMALL,), classes="mr-3")
+                with html.Div(style="min-width: 0"):
+                    html.Div("{{ c.name }}")
+                    html.Div("{{ c.doc }}", classes="text-caption text-medium-emphasis")
 
     def make_and_close(self) -> None:
         """Make the file and close the dialog."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from ..common.parameters import REQUIRED, Choice, Count, File, Flag, Length, Number, Parameter, Vector
@@ -20,6 +22,12 @@ SPAN = 2.0
 
 COLOURS = {"colour", "background", "horizon", "ground"}
 """Attributes of three numbers from 0 to 1 that are colours."""
+
+THUMBNAILS = Path(__file__).with_name("thumbnails.webp")
+"""Small pictures of shipped scenes and of shapes, in rows; their names are in the .json file beside it."""
+
+CELL, COLUMNS = (120, 90), 12
+"""Width and height of a picture, pixels, and pictures of a row."""
 
 PARTS = "camera", "light", "film", "shading", "fog", "print"
 """Elements beside the solid that a scene may be given."""
@@ -105,6 +113,16 @@ def outline(document: Document) -> list[dict[str, Any]]:
             }
         )
     return rows
+
+
+def places_of_pictures() -> dict[str, str]:
+    """Where the picture of a scene or a shape is in `THUMBNAILS`, as a CSS background position."""
+    names = json.loads(THUMBNAILS.with_suffix(".json").read_text(encoding="utf-8"))
+    cells = (divmod(number, COLUMNS) for number in range(len(names)))
+    return {
+        name: f"{-column * CELL[0]}px {-row * CELL[1]}px"
+        for name, (row, column) in zip(names, cells, strict=True)
+    }
 
 
 def choices() -> list[dict[str, str]]:

@@ -6,8 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from fracslice.cli.execution import Closing, duration
+from fracslice.cli.execution import Closing
 from fracslice.cli.main import run
+
+from fracslice.common.messages import duration
 
 pytestmark = pytest.mark.once
 

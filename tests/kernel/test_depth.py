@@ -19,6 +19,7 @@ from fracslice.fields.depth import (
     resolve_depths,
     shallower,
     visible,
+    with_depths_of,
 )
 from fracslice.fields.node import FORMULAS
 from fracslice.formulas import (
@@ -184,3 +185,13 @@ def test_dust_that_no_search_meets_is_refused_with_advice() -> None:
     ):
         plan(kifs_tetrahedron(iterations=30), 64)
     assert max(kifs_tetrahedron(iterations=12).bounds.box.hi) > 0.57  # it was 0.004: no sample was inside
+
+
+def test_another_scene_of_the_same_elements_gives_its_depths() -> None:
+    before = union(mandelbulb(), transform(julia(), translate=(3, 0, 0)))
+    known = resolve_depths(before, 0.05)
+    after = union(mandelbulb(power=8.5), transform(julia(iterations=4), translate=(3, 1, 0)))
+    made = with_depths_of(after, known)
+    assert made.children[0]["iterations"] == known.children[0]["iterations"]
+    assert made.children[1] == after.children[1]
+    assert with_depths_of(sphere(), known) == sphere()

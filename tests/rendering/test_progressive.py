@@ -13,7 +13,7 @@ import pytest
 from fracslice.errors import Cancelled, RenderError
 from fracslice.formulas import material, menger, sphere, union
 from fracslice.rendering import Renderer, packets, progressive
-from fracslice.rendering.accumulator import CHANNELS, COUNT, COVER, GOAL
+from fracslice.rendering.accumulator import CHANNELS, COUNT, COVER, GOAL, smoothed
 from fracslice.rendering.units.camera import sample
 from fracslice.scene import library, read
 from fracslice.scene.view import Camera, Film, Light, View
@@ -48,6 +48,26 @@ def test_the_first_pass_shows_something_everywhere_and_the_second_has_every_pixe
     second = next(passes)
     assert second.samples == 1
     assert (of.accumulator.counts == 1).all()
+
+
+def test_a_draft_is_the_first_sample_of_every_pixel_and_smooth_it_is_nearer_to_the_picture() -> None:
+    *_, first = renderer().passes(1)
+    sharp = first.shown
+    draft = renderer().draft()
+    np.testing.assert_array_equal(draft.shown, sharp)
+    *_, last = renderer().passes(256)
+    errors = [np.abs(made.astype(float) - last.shown).mean() for made in (draft.shown, draft.smooth)]
+    assert errors[1] < 0.75 * errors[0]
+
+
+def test_smoothing_leaves_out_what_is_behind_an_edge() -> None:
+    mean = np.zeros((3, 4, 4), np.float32)
+    mean[:, :2] = (1.0, 2.0, 3.0, 1.0)
+    mean[1, 1, :3] = 10.0
+    mean[:, 2:, :3] = 7.0  # missed
+    made = smoothed(mean)
+    np.testing.assert_array_equal(made[:, 2:], mean[:, 2:])
+    np.testing.assert_allclose(made[1, 1, :3], (5 * np.array([1.0, 2.0, 3.0]) + 10) / 6, rtol=1e-6)
 
 
 def test_samples_reduce_the_error_and_clean_pixels_get_no_more() -> None:

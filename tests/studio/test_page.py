@@ -69,11 +69,13 @@ def served(browser: playwright.Browser, tmp_path_factory: pytest.TempPathFactory
     with subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout
         address = process.stdout.readline().strip()
-        page = browser.new_page(viewport={"width": 1000, "height": 640})
+        page = browser.new_page(viewport={"width": 1200, "height": 640})
         page.goto(address)
-        page.get_by_text("sphere").wait_for()
-        yield Served(page, address, folder)
-        process.send_signal(2)
+        try:
+            row(page, "sphere").wait_for()
+            yield Served(page, address, folder)
+        finally:
+            process.send_signal(2)
         assert process.wait(60) in (0, 130)
 
 
@@ -97,7 +99,7 @@ def until(holds: Callable[[], bool], seconds: float = 30) -> None:
 
 def picture(page: playwright.Page) -> bytes:
     """What the page shows as the picture, once it has samples."""
-    until(lambda: "samples" in page.get_by_role("status").inner_text())
+    until(lambda: "sample" in page.get_by_role("status").inner_text())
     return bytes(page.locator(".v-main img").first.screenshot())
 
 
@@ -186,3 +188,26 @@ def test_other_sites_and_those_without_the_token_are_refused(
     time.sleep(2)
     assert row(stranger, "sphere").count() == 0
     stranger.close()
+
+
+def test_a_film_is_made_of_views(served: Served) -> None:
+    page = served.page
+    page.get_by_role("button", name="Film", exact=True).click()
+    panel = page.get_by_role("region", name="Film")
+    panel.get_by_role("button", name="Key view").click()
+    panel.get_by_label("camera.eye at 0 s").wait_for()
+    panel.get_by_label("Length of the film").fill("1")
+    panel.get_by_label("Length of the film").press("Enter")
+    until(lambda: 'duration="1s"' in text(page))
+    panel.locator(".v-slider-thumb").press("End")
+    panel.get_by_text("1.00 s of").wait_for()
+    page.mouse.move(700, 300)
+    page.mouse.down()
+    page.mouse.move(760, 320, steps=4)
+    page.mouse.up()
+    panel.get_by_role("button", name="Key view").click()
+    until(lambda: text(page).count("; 1s:") == 2)
+    panel.get_by_label("Play", exact=True).click()
+    panel.get_by_label("Pause").wait_for()
+    panel.get_by_text("1.00 s of").wait_for()
+    page.get_by_role("button", name="Film", exact=True).click()

@@ -200,10 +200,16 @@ std::vector<int32_t> foremost(const MeshView& mesh, int height, int width) {
         const double *a = mesh.corner(t, 0), *b = mesh.corner(t, 1), *c = mesh.corner(t, 2);
         const double area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
         if (area == 0) continue;
-        auto first = [&](int k) { return std::max(int(std::min({a[k], b[k], c[k]})), 0); };
-        auto end = [&](int k, int most) { return std::min(int(std::max({a[k], b[k], c[k]})) + 1, most); };
-        for (int i = first(1); i < end(1, height); ++i) {
-            for (int j = first(0); j < end(0, width); ++j) {
+        // pixels whose centres lie within the box of the triangle: most small triangles have none
+        auto first = [&](int k, int most) {
+            return int(std::clamp(std::ceil(std::min({a[k], b[k], c[k]}) - 0.5), 0.0, double(most)));
+        };
+        auto end = [&](int k, int most) {
+            return int(std::clamp(std::floor(std::max({a[k], b[k], c[k]}) - 0.5) + 1, 0.0, double(most)));
+        };
+        const int left = first(0, width), right = end(0, width), last = end(1, height);
+        for (int i = first(1, height); i < last; ++i) {
+            for (int j = left; j < right; ++j) {
                 const double x = j + 0.5 - a[0], y = i + 0.5 - a[1];
                 const double v = (x * (c[1] - a[1]) - y * (c[0] - a[0])) / area;
                 const double w = ((b[0] - a[0]) * y - (b[1] - a[1]) * x) / area;

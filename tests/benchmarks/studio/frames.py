@@ -52,7 +52,7 @@ def used(studio: Studio, name: str, size: tuple[int, int], inputs: int, seconds:
     """What a person who uses a studio waits for."""
     studio.live.resize(size)
     wait(lambda: studio.shown.samples >= 1)
-    moved = Spread.of([after(studio, lambda: studio.orbit(9, 4)) for _ in range(inputs)])
+    moved = Spread.of([after(studio, lambda: studio.views.orbit(9, 4)) for _ in range(inputs)])
     changed = Spread.of([after(studio, change(studio, name, k)) for k in range(inputs)])
     frames, spacing = turned(studio, seconds)
     return {"moved, ms": moved, "changed, ms": changed, "frames a second": frames, "spacing": spacing}
@@ -92,7 +92,7 @@ def turned(studio: Studio, seconds: float) -> tuple[float, float]:
     """Frames a second while the camera turns, and the spacing of their pixels."""
     frames, start = 0, time.perf_counter()
     while time.perf_counter() < start + seconds:
-        after(studio, lambda: studio.orbit(3, 0))
+        after(studio, lambda: studio.views.orbit(3, 0))
         frames += 1
     spacing = studio.live.size[0] / studio.shown.pixels.shape[1]
     return frames / (time.perf_counter() - start), spacing

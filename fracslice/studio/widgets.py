@@ -1,0 +1,35 @@
+"""Widgets, and attributes of widgets, that all panels of a page share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from trame.widgets import vuetify3 as v
+
+
+def named(label: str, title: str = "") -> list[str]:
+    """Attributes that name a control, for those who see it and those who do not."""
+    return [f'aria-label="{label}"', f'title="{title or label}"']
+
+
+def named_by(expression: str) -> list[str]:
+    """The same of an expression of the page."""
+    return [f':aria-label="{expression}"']
+
+
+def number_field(value: str, change: tuple[Callable[..., Any], str], label: list[str]) -> None:
+    """Field of a number, an expression of the page, that keeps what is typed until it is entered.
+
+    A plain `<input>` would not: whatever else changes in the page writes its value again.
+    """
+    v.VTextField(
+        model_value=(value,),
+        change=change,
+        type="number",
+        density="compact",
+        variant="plain",
+        hide_details=True,
+        style="flex: 0 0 84px; margin-top: -12px",
+        raw_attrs=[*label, 'step="any"'],
+    )

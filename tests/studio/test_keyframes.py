@@ -1,0 +1,147 @@
+"""The film of a document, made by keyframes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from fracslice.errors import SceneError
+from fracslice.scene.view import Camera
+from fracslice.studio import keyframes
+from fracslice.studio.document import Document
+from fracslice.studio.session import Studio
+from fracslice.work import Work
+
+pytestmark = pytest.mark.once
+
+TEXT = """<scene version="1">
+  <!-- kept -->
+  <solid unit="1mm">
+    <sphere radius="5"/>
+    <sphere radius="3"/>
+  </solid>
+  <film samples="1"/>
+</scene>
+"""
+CAMERA = Camera(eye=(20.0, 0.0, 3.0), target=(0.0, 0.0, 0.0))
+
+
+@pytest.fixture
+def document(tmp_path: Path) -> Document:
+    return Document(TEXT, tmp_path / "two.xml")
+
+
+def test_keys_are_one_edit_with_the_film_that_they_begin(document: Document) -> None:
+    sphere = document.find((0, 1))
+    assert sphere
+    of = keyframes.path_of(document, sphere, "radius")
+    assert of == "sphere[2].radius"
+    keyframes.set_keys(document, 0.0, {of: "3"})
+    keyframes.set_keys(document, 2.0, {of: "5"})
+    assert document.undoes == 2 and not document.problem
+    assert "<!-- kept -->" in document.text
+    assert keyframes.duration(document) == keyframes.LENGTH
+    (row,) = keyframes.rows(document)
+    assert (row["of"], row["times"]) == (of, [0.0, 2.0])
+    document.undo()
+    document.undo()
+    assert document.text == TEXT
+
+
+def test_keys_are_replaced_moved_and_removed(document: Document) -> None:
+    of = "sphere[1].radius"
+    for seconds, value in (0.0, "5"), (1.0, "6"), (1.0, "7"), (2.0, "5"):
+        keyframes.set_keys(document, seconds, {of: value})
+    assert keyframes.keys_of(keyframes.track_of(document, of)) == ((0.0, "5"), (1.0, "7"), (2.0, "5"))
+    keyframes.move_key(document, of, 1.0, 3.0)
+    with pytest.raises(SceneError, match="a keyframe at 2s already"):
+        keyframes.move_key(document, of, 0.0, 2.0)
+    keyframes.set_curve(document, of, "linear")
+    assert keyframes.rows(document)[0]["curve"] == "linear" and document.version.at == (0, 0)
+    assert keyframes.rows(document)[0]["times"] == [0.0, 2.0, 3.0]
+    for seconds in 0.0, 2.0, 3.0:
+        keyframes.remove_key(document, of, seconds)
+    assert keyframes.rows(document) == []
+    with pytest.raises(SceneError, match="no keyframes"):
+        keyframes.remove_key(document, of, 0.0)
+
+
+def test_views_are_keys_of_a_camera_that_the_scene_is_given(document: Document) -> None:
+    keyframes.key_view(document, 0.0, CAMERA)
+    keyframes.key_view(document, 1.0, replace(CAMERA, eye=(0.0, 20.0, 3.0), fov=30.0))
+    assert {row["of"] for row in keyframes.rows(document)} == {"camera.eye", "camera.target", "camera.fov"}
+    assert document.scene.view.camera == CAMERA
+    assert document.undoes == 2
+
+
+def test_what_fails_halfway_is_not_done(document: Document) -> None:
+    def fail() -> None:
+        with document.one_edit():
+            document.append("<fog/>")
+            document.remove(())
+
+    with pytest.raises(SceneError):
+        fail()
+    assert document.text == TEXT and document.undoes == 0
+
+
+@pytest.fixture
+def studio(tmp_path: Path) -> Iterator[Studio]:
+    (tmp_path / "two.xml").write_text(TEXT)
+    studio = Studio(str(tmp_path / "two.xml"), tmp_path, Work(threads=1), "cpu")
+    studio.live.resize((24, 16))
+    yield studio
+    studio.close()
+
+
+def test_a_number_that_moves_is_changed_at_its_time(studio: Studio) -> None:
+    place = (0, 1)
+    keyframes.set_keys(studio.document, 0.0, {"sphere[2].radius": "1"})
+    keyframes.set_keys(studio.document, 2.0, {"sphere[2].radius": "3"})
+    studio.seek(1.0)
+    tag = studio.document.find(place)
+    assert tag and studio.at_time(tag).attributes["radius"] == "2"
+    studio.set_number(place, "radius", 0, 2.5)
+    assert keyframes.rows(studio.document)[0]["times"] == [0.0, 1.0, 2.0]
+    assert studio.document.scene.root.children[1]["radius"] == 3.0
+    assert studio.film and studio.film.at(1.0).root.children[1]["radius"] == 2.5
+    studio.seek(None)
+    studio.set_number(place, "radius", 0, 4.0)
+    assert studio.document.scene.root.children[1]["radius"] == 4.0
+
+
+def test_a_film_plays_to_its_end(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = SimpleNamespace(now=10.0)
+    monkeypatch.setattr(keyframes, "time", SimpleNamespace(monotonic=lambda: clock.now))
+    keyframes.key_view(studio.document, 0.0, CAMERA)
+    keyframes.key_view(studio.document, 4.0, replace(CAMERA, eye=(0.0, 20.0, 3.0)))
+    studio.seek(0.0)
+    studio.player.play(4.0)
+    for clock.now in 11.0, 12.0, 14.5:
+        studio.advance()
+    assert studio.player.seconds == 4.0 and not studio.player.is_playing
+    end = time.monotonic() + 30
+    while studio.live.aim.eye != (0.0, 20.0, 3.0):
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def test_a_flight_becomes_the_film(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = SimpleNamespace(now=0.0)
+    monkeypatch.setattr(keyframes, "time", SimpleNamespace(monotonic=lambda: clock.now))
+    studio.record()
+    for step in range(31):
+        clock.now = 0.1 * step
+        studio.views.look(replace(CAMERA, eye=(20.0 - step / 10, 0.0, 3.0)))
+        studio.advance()
+    studio.record()
+    eye = keyframes.keys_of(keyframes.track_of(studio.document, "camera.eye"))
+    assert [seconds for seconds, _ in eye] == pytest.approx([0, 0.5, 1, 1.5, 2, 2.5, 3])
+    assert eye[2][1] == "19.0 0.0 3.0" or eye[2][1] == "19 0 3"
+    assert keyframes.duration(studio.document) == 3.0
+    assert studio.document.undoes == 1
