@@ -58,11 +58,13 @@ class CalibrateOptions(LayerFileOptions):
 
 @command(CalibrateOptions, short_help="Make an object that shows what a printer and a resin do.")
 def calibrate(given: CalibrateOptions) -> int:
-    """Make an OBJECT to calibrate a printer and a resin by: walls, tolerance, elephant-foot or exposure.
+    """Make an OBJECT to calibrate a printer and a resin by: walls, tolerance, elephant-foot, exposure or
+    depth.
 
     walls has walls, pins, slots and holes of several sizes; tolerance a bar of holes and a peg;
     elephant-foot blocks with slits at the plate, and a cube; exposure pins, holes and squares that meet at
-    corners. All sizes are engraved. OUT is a scene, for all other commands, or a file of layers.
+    corners; depth bridges, which grow as deep as light cures. All sizes are engraved. OUT is a scene, for
+    all other commands, or a file of layers.
 
     Examples
     --------

@@ -277,8 +277,9 @@ class Closing:
     loose: int = 0  # bodies that do not stand on the plate
     bridge: float = 0.0  # minimum diameter of struts
 
-    def lines(self) -> Iterator[str]:
-        """Iterate over the lines, each with the option that mends what it names."""
+    @property
+    def amount(self) -> str:
+        """Volume, weight, time and cost."""
         ml = self.volume / 1000
         amount = [
             f"{self.about}{millilitres(self.volume)}",
@@ -290,7 +291,11 @@ class Closing:
             amount.append(duration(self.seconds))
         if self.cost:
             amount.append(f"cost {self.cost:.2f}")
-        yield ", ".join(amount)
+        return ", ".join(amount)
+
+    def lines(self) -> Iterator[str]:
+        """Iterate over the lines, each with the option that mends what it names."""
+        yield self.amount
         if self.drains:
             places = [place(at, 1) for at in self.drains]
             where = f"{' and '.join(places)} mm"
@@ -336,6 +341,14 @@ def of_mesh(result: Result, material: str, price: float | None) -> Closing:
     )
 
 
+def total(parts: Iterable[Closing]) -> str:
+    """Amount of all meshes of a file."""
+    first, *others = parts
+    volume = sum((part.volume for part in others), first.volume)
+    cost = None if first.cost is None else first.cost * volume / first.volume
+    return replace(first, volume=volume, cost=cost).amount
+
+
 def of_material(report: PrintReport, material: str) -> PrintReport:
     """Report on layers of a key of `DENSITIES`: its weight, and of a filament no problem of resin."""
     from fracslice.checks import checks
@@ -365,7 +378,7 @@ def of_layers(run: SliceRun, price: float | None) -> Closing:
         density=resin.density if resin else DENSITIES["resin"],
         about="about " if len(known) < run.layers else "",
         layers=run.layers,
-        seconds=resin.seconds(run.layers) if resin else None,
+        seconds=resin.seconds(areas) if resin else None,
         cost=None if of is None else volume / 1e6 * of,
         drains=[tuple(p) for p in places.tolist()],
         drain=2 * stack.scale * max((d.radius for d in stack.drains), default=0.0),

@@ -16,7 +16,6 @@ from fracslice.formats import ENDINGS
 from fracslice.records import PartsJob
 
 from .execution import (
-    DENSITIES,
     BadInput,
     check_folder,
     check_targets,
@@ -26,11 +25,13 @@ from .execution import (
     refuse_moved,
     refuse_options,
     summary,
+    total,
 )
 from .options import (
     AMOUNT,
     FOR_SLICERS,
     INTERVAL,
+    MATERIAL,
     SECONDS,
     ClusterOptions,
     MeshOptions,
@@ -41,6 +42,8 @@ from .options import (
     option,
     output,
 )
+from .plate import write_meshes
+from .slice import COPIES, SPACING
 from .sweeps import MOST, TABLE, families, going_on, is_table, with_suffix
 
 if TYPE_CHECKING:
@@ -87,11 +90,7 @@ class MeshFileOptions(ClusterOptions, MeshOptions):
         "The device that evaluates the field; cpu by default. auto: the GPU, if there is one.",
         default="cpu",
     )
-    material: str = option(
-        click.Choice(list(DENSITIES)),
-        "Material of the weight in the summary; resin by default.",
-        default="resin",
-    )
+    material: str = MATERIAL
     price: float | None = option(AMOUNT, "Price of a kilogram.")
 
 
@@ -101,12 +100,16 @@ class WholeOptions(MeshFileOptions):
     records = (PartsJob,)
     bed: Triple | None
     parts: tuple[int, int, int] | str | None
+    plugs: bool
+    copies: int = COPIES
+    spacing: float = SPACING
 
 
 @command(WholeOptions)
 @families("output", "report", "picture")
 def mesh(given: WholeOptions) -> int:
-    """Make a printable mesh of SCENE, and print a summary. With --bed or --parts, make it in parts.
+    """Make a printable mesh of SCENE, and print a summary. With --bed or --parts, make it in parts; with
+    --copies, put several side by side.
 
     Exit status: 1 if the mesh would not print; the file is written. A mesh
     that does not fit in memory is made piece after piece if it goes to an .stl file.
@@ -117,11 +120,52 @@ def mesh(given: WholeOptions) -> int:
     fracslice mesh geode -o geode.3mf --thickness 0.8mm --bridge 1.5mm
     fracslice mesh menger-sponge -o sponge.stl --set menger.level=1..3
     """
+    if given.copies > 1:
+        from fracslice.slicing.packing import Beds
+
+        refuse_options(NO_COPIES, "not with --copies")
+        return write_meshes(given, [given.source] * given.copies, Beds(spacing=given.spacing))
+    refuse_options({"spacing"}, "only for several parts: --copies, or fracslice plate")
+    if given.plugs:
+        return make_plugged(given)
     return make_files(given) if given.bed is None and given.parts is None else make_parted(given)
 
 
 NO_PARTS = frozenset({"implicit", "report", "seconds", "every", "cluster", "shard", "store", *FOR_SLICERS})
 """Options that parts do not have."""
+
+NO_PLUGS = NO_PARTS | {"picture", "cache", "device"}
+"""Options that plugs do not have."""
+
+NO_COPIES = NO_PLUGS | PartsJob.kinds().keys()
+"""Options that copies do not have."""
+
+
+def make_plugged(given: WholeOptions) -> int:
+    """Make the mesh of an object and plugs for its drain holes: in one .3mf file, or each in its own."""
+    from fracslice.jobs.mesh import make_mesh, make_plugs, metadata
+    from fracslice.jobs.plates import lay_out, write_each
+    from fracslice.slicing.packing import Beds
+
+    how, output = PartsJob(**given.values(PartsJob)), Path(given.output)
+    refuse_options(NO_PLUGS, "not with --plugs")
+    check_targets(given.source, given.output)
+    scene = load_scene(given.source, given.settings)
+    about = metadata(scene)
+    with given.working() as work:
+        made = make_mesh(scene, given.oriented(scene, work).mesh_job(scene), work)
+        plugs = make_plugs(scene, made, how.clearance, work)
+        meshes, names = [made.mesh, *plugs], ["", *(f"plug-{n}" for n in range(1, len(plugs) + 1))]
+        if output.suffix.lower() == ".3mf":
+            lay_out(meshes, range(len(names)), names, Beds()).write(output, about, work, names)
+        else:
+            write_each(meshes, names, output, about, work)
+    if not given.quiet:
+        count = format_count(len(plugs), "plug")
+        sizes = ", ".join(f"{mesh.size[0]:.2f} x {mesh.size[2]:.2f} mm" for mesh in plugs)
+        lines = [summary(given.output, made.report), *of_mesh(made, given.material, given.price).lines()]
+        click.echo(os.linesep.join([*lines, f"{count}, wide and high: {sizes}"]))
+    return 1 if made.report.problems else 0
 
 
 def make_parted(given: WholeOptions) -> int:
@@ -146,7 +190,10 @@ def make_parted(given: WholeOptions) -> int:
 
             draw(made.exploded(), given.picture)
     if not given.quiet:
-        click.echo(os.linesep.join(parted_lines(made, [str(file) for file in files])))
+        closing = [
+            of_mesh(m, given.material, given.price) for _, m, count in made.named for _ in range(count)
+        ]
+        click.echo(os.linesep.join([*parted_lines(made, [str(file) for file in files]), total(closing)]))
     return 1 if any(mesh.report.problems for mesh in made.meshes) else 0
 
 
@@ -165,7 +212,7 @@ def parted_lines(made: Parted, files: list[str]) -> Iterator[str]:
     if silent := [str(n) for n, part in enumerate(divided.parts, 1) if part.number is None]:
         yield f"no place for the number of part {', '.join(silent)}"
     if made.bed is not None and len(files) == 1:
-        yield format_count(made.beds, "bed")
+        yield format_count(made.laid_out.beds, "bed")
 
 
 def whole(scene: Scene, _: Work) -> Parts:

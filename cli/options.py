@@ -37,7 +37,7 @@ from fracslice.common.parameters import (
 from fracslice.errors import ClusterError, SceneError, VolumeError
 from fracslice.records import MeshJob, Part, Placed, Print, RasterOptions, SliceJob
 
-from .execution import NOTHING, BadInput, refuse_options, working
+from .execution import DENSITIES, NOTHING, BadInput, refuse_options, working
 
 if TYPE_CHECKING:
     from fracslice.checks.layer_checks import PrintReport
@@ -400,6 +400,11 @@ class PreparationOptions(SceneOptions):
 
 FOR_SLICERS = frozenset({"colour", "palette", "filaments", "bodies", "heights", "paint_supports"})
 """Fields of meshes with colours, and with hints for slicers."""
+
+
+MATERIAL = option(
+    click.Choice(list(DENSITIES)), "Material of the weight in the summary; resin by default.", default="resin"
+)
 
 
 class MeshOptions(PreparationOptions):

@@ -2,49 +2,36 @@
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from fracslice.common.messages import format_count
-from fracslice.common.parameters import parse_length
-from fracslice.errors import SceneError
+from fracslice.common.parameters import Sides
 from fracslice.formats import ENDINGS
 from fracslice.records import MeshJob, Placed, SliceJob
 
-from .execution import check_targets, load_scene, refuse_options, summary
-from .options import MeshOptions, Name, Parsed, argument, command, option
+from .execution import check_targets, load_scene, of_mesh, refuse_options, summary, total
+from .options import AMOUNT, MATERIAL, MeshOptions, Name, argument, command, kind_option, option
 from .slice import COPIES, SPACING, LayerFileOptions, recipe, write_layers
 
 if TYPE_CHECKING:
     from fracslice.export.slice_run import SliceRun
     from fracslice.jobs.report import Result
+    from fracslice.slicing.packing import Beds
     from fracslice.slicing.printers import Resin
     from fracslice.work import Work
 
-    Bed = tuple[float, ...]
+    from .mesh import WholeOptions
 
-OF_MESHES = MeshJob.kinds().keys() - Placed.kinds().keys()
+OF_MESHES = {*(MeshJob.kinds().keys() - Placed.kinds().keys()), "material"}
 OF_LAYERS = {*(SliceJob.kinds().keys() - Placed.kinds().keys()), *("mirror", "exposure", "resin", "preview")}
-OF_LAYERS |= {"address", "price", "html", "form", "cluster", "shard", "store"}
+OF_LAYERS |= {"address", "html", "form", "cluster", "shard", "store"}
 SOLO = {"thickness", "bridge", "hollow"}
-
-
-def parse_bed(text: str) -> Bed:
-    """Width, depth and, if it is given, height of a bed, mm."""
-    words, unit = text.strip().lower().split("x"), ""
-    last = words[-1].strip()
-    while last and not last[-1].isdigit() and last[-1] != ".":
-        last, unit = last[:-1], last[-1] + unit
-    try:
-        if len(words) in (2, 3):
-            return tuple(parse_length(f"{word}{unit}") for word in (*words[:-1], last))
-    except SceneError:
-        pass
-    raise ValueError("width, depth and height, such as 220x220x250mm; or width and depth, 143x89mm")
 
 
 class PlateOptions(LayerFileOptions, MeshOptions):
@@ -62,9 +49,14 @@ class PlateOptions(LayerFileOptions, MeshOptions):
     )
     copies: int = COPIES
     spacing: float = SPACING
-    bed: Bed | None = option(
-        Parsed(parse_bed, "WxD[xH]"),
-        "Size of the bed, such as 220x220x250mm; that of --printer, or without limits, by default.",
+    bed: Sequence[float] | None = kind_option(
+        Sides(None, "size of the bed, such as 220x220x250mm", flat=True),
+        None,
+        "Size of the bed, such as 220x220x250mm; that of --printer, or without limits, by default",
+    )
+    material: str = MATERIAL
+    price: float | None = option(
+        AMOUNT, "Price of a litre of resin, by default the resin's; of meshes, price of a kilogram."
     )
 
     @property
@@ -90,7 +82,13 @@ def plate(given: PlateOptions) -> int:
         raise click.UsageError("--bed and --printer: expected one of them")
     if Path(given.output).suffix.lower() in ENDINGS and given.form is None:
         refuse_options(OF_LAYERS, "only for layers, and meshes are written")
-        return write_meshes(given)
+        from fracslice.slicing.packing import Beds
+
+        (*flat, height), name = [*(given.bed or ()), math.inf][:3], "the bed"
+        if given.machine:
+            (*flat, height), name = given.machine.build_volume, f"the {given.machine.title}"
+        sides = (flat[0], flat[1]) if flat else None
+        return write_meshes(given, given.parts, Beds(sides, given.spacing, name), height)
     refuse_options(OF_MESHES, "only for meshes, and layers are written")
 
     def planned(kind: str, resin: Resin | None) -> Callable[[Work], SliceRun]:
@@ -108,34 +106,32 @@ def plate(given: PlateOptions) -> int:
     return write_layers(given, given.sources, planned)
 
 
-def write_meshes(given: PlateOptions) -> int:
-    """Write the meshes of all parts, and a summary of each."""
-    from fracslice.jobs.mesh import make_mesh
-    from fracslice.jobs.plates import write_meshes
+def write_meshes(
+    given: PlateOptions | WholeOptions, parts: Sequence[str], beds: Beds, height: float = math.inf
+) -> int:
+    """Write the meshes of parts side by side, and a summary of each and of all.
 
-    for source in given.sources:
+    `parts`: source of each part; `height`: that is free above a bed, mm.
+    """
+    from fracslice.jobs.mesh import make_mesh
+    from fracslice.jobs.plates import lay_out
+
+    sources = list(dict.fromkeys(parts))
+    for source in sources:
         check_targets(source, given.output)
-    scenes = {source: load_scene(source, given.settings) for source in dict.fromkeys(given.sources)}
-    bed, where = given.bed, "the bed"
-    if given.machine:
-        bed, where = given.machine.build_volume, f"the {given.machine.title}"
+    scenes = {source: load_scene(source, given.settings) for source in sources}
     with given.working() as work:
-        results: dict[str, Result] = {}
+        made: dict[str, Result] = {}
         for source, scene in scenes.items():
-            results[source] = make_mesh(scene, given.oriented(scene, work).mesh_job(scene), work)
-        write_meshes(
-            list(results.values()),
-            [list(results).index(source) for source in given.parts],
-            given.parts,
-            given.output,
-            {"Title": ", ".join(scene.name for scene in scenes.values())},
-            work,
-            spacing=given.spacing,
-            bed=bed if bed is None or len(bed) == 3 else (bed[0], bed[1], float("inf")),
-            where=where,
-        )
+            made[source] = make_mesh(scene, given.oriented(scene, work).mesh_job(scene), work)
+        places = [sources.index(source) for source in parts]
+        laid = lay_out(list(made.values()), places, parts, beds, height)
+        names = [scene.name for scene in scenes.values()]
+        laid.write(given.output, {"Title": ", ".join(names)}, work, names)
     if not given.quiet:
-        parts = format_count(len(given.parts), "part")
-        lines = [summary(source, result.report) for source, result in results.items()]
-        click.echo(os.linesep.join([f"{given.output}: {parts} on one plate", *lines]))
-    return 1 if any(result.report.problems for result in results.values()) else 0
+        closing = {s: of_mesh(result, given.material, given.price) for s, result in made.items()}
+        lines = [f"{given.output}: {format_count(len(parts), 'part')}, {total(closing[s] for s in parts)}"]
+        for source, result in made.items():
+            lines += [summary(source, result.report), *closing[source].lines()]
+        click.echo(os.linesep.join(lines))
+    return 1 if any(result.report.problems for result in made.values()) else 0

@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
 from fracslice.common.messages import duration, significant
 from fracslice.errors import keeping
+from fracslice.records import MeshJob, PartsJob
 
-from .execution import check_targets, load_scene
-from .options import MeshOptions, Name, argument, command, option, output
+from .execution import check_targets, load_scene, refuse_options
+from .options import FOR_SLICERS, MeshOptions, Name, argument, command, option, output
+from .slice import COPIES, SPACING
+from .sweeps import with_suffix
 
 if TYPE_CHECKING:
-    from fracslice.export.sending import Figures
+    from fracslice.export.sending import Figures, FilamentSlicer
+    from fracslice.fields.box import Triple
+    from fracslice.scene import Scene
+    from fracslice.work import Work
 
 TOLERANCE = 0.02
 """Default tolerance of the simplified mesh, mm."""
@@ -39,7 +45,12 @@ def slicer_printer(context: click.Context, _: click.Parameter, name: str | None)
 class SlicerOptions(MeshOptions):
     """Options of `print`."""
 
-    without = frozenset({"bodies"})
+    records = (PartsJob,)
+    without = frozenset({"bodies", "plugs"})
+    bed: Triple | None
+    parts: tuple[int, int, int] | str | None
+    copies: int = COPIES
+    spacing: float = SPACING
     source: str = argument("SCENE|MODEL")
     output: str = output("OUT", "A .gcode file; .3mf for orca and bambu.")
     slicer: str = option(
@@ -71,7 +82,8 @@ class SlicerOptions(MeshOptions):
 
 @command(SlicerOptions, "print")
 def print_(given: SlicerOptions) -> int:
-    """Mesh SCENE, simplify the mesh within 0.02mm and have a slicer make the printer's file.
+    """Mesh SCENE, simplify the mesh within 0.02mm and have a slicer make the printer's file. With --bed or
+    --parts, make it in parts, and a file for each bed.
 
     The slicer's warnings are passed on, and the time, the weight and the cost that it says.
     Exit status: 1 if the mesh would not print; nothing is sliced.
@@ -82,13 +94,13 @@ def print_(given: SlicerOptions) -> int:
     fracslice print my.xml -o my.gcode --printer "Original Prusa MINI & MINI+" --size 8cm
     """
     from fracslice.common.files import temporary_folder
-    from fracslice.export.sending import SECONDS, SLICERS, printer_address, send
-    from fracslice.jobs.mesh import make_mesh
+    from fracslice.export.sending import SLICERS, printer_address, send
 
     chosen, output, address = SLICERS[given.slicer], given.output, given.address
     if Path(output).suffix.lower() != chosen.output:
         raise click.UsageError(f"{output}: expected a file name that ends in {chosen.output}")
     check_targets(given.source, output)
+    refuse_what_one_has(given)
     if missing := [profile for profile in given.profiles if not Path(profile).is_file()]:
         raise click.UsageError(f"{missing[0]}: no such file")
     if address is not None:
@@ -103,30 +115,107 @@ def print_(given: SlicerOptions) -> int:
     if job.simplify is None and job.faces is None:
         job = replace(job, simplify=TOLERANCE)
     with temporary_folder() as folder, given.working() as work:
-        model = folder / f"{Path(output).stem}{chosen.model}"
-        report = make_mesh(scene, job, work, path=model).report
-        count = report.mesh.triangles
-        if report.problems:
-            click.echo(f"{given.source}: would not print: {', '.join(report.problems)}")
+        made = models(given, scene, job, folder / f"{Path(output).stem}{chosen.model}", work)
+        if made.problems:
+            click.echo(f"{given.source}: would not print: {', '.join(made.problems)}")
             return 1
         if not given.quiet:
-            many = (
-                f"; expected at most {MOST:,}: a larger --voxel or --simplify, or --faces"
-                if count > MOST
-                else ""
-            )
-            click.echo(f"{count:,} triangles: {chosen.title} takes about {duration(count * SECONDS)}{many}")
+            click.echo(expected_time(made.triangles, chosen.title))
         own = chosen.shipped().write(given.machine, folder) if given.machine is not None else []
         profiles = [*map(str, own), *given.profiles]
-        warnings, figures = chosen.slice(model, profiles, Path(output), work)
+        sliced = slice_all(chosen, made.files, profiles, outputs(output, len(made.files)), work)
         with keeping(f"{output} is written"):
             sent = send(output, address, work) if address is not None else None
-    for warning in warnings:
+    for warning in dict.fromkeys(warning for _, warnings, _ in sliced for warning in warnings):
         click.echo(f"{chosen.title}: {warning}", err=True)
     if not given.quiet:
-        made = ", ".join([f"{output}: made by {chosen.title}", *figure_texts(figures)])
-        click.echo(os.linesep.join([made, *([sent] if sent else [])]))
+        made_by = f"made by {chosen.title}"
+        lines = [", ".join([f"{file}: {made_by}", *figure_texts(figures)]) for file, _, figures in sliced]
+        click.echo(os.linesep.join([*lines, *([sent] if sent else [])]))
     return 0
+
+
+def refuse_what_one_has(given: SlicerOptions) -> None:
+    """Raise a usage error for options that copies or parts do not have."""
+    several = given.bed is not None or given.parts is not None
+    if given.copies > 1 and several:
+        raise click.UsageError("--copies: not with parts, --bed or --parts")
+    if given.copies == 1:
+        refuse_options({"spacing"}, "only for --copies")
+    if given.copies > 1 or several:
+        refuse_options(FOR_SLICERS, "not for copies or parts")
+    if several and given.address is not None:
+        raise click.UsageError("--send: expected one file, and parts may have several")
+
+
+class Models(NamedTuple):
+    """What the slicer reads: a file for each bed."""
+
+    files: list[Path]
+    triangles: int
+    problems: list[str]
+
+
+def models(given: SlicerOptions, scene: Scene, job: MeshJob, path: Path, work: Work) -> Models:
+    """Write the model, several of them, or its parts; several beds have a file each."""
+    from fracslice.jobs.divided import make_parts
+    from fracslice.jobs.mesh import make_mesh, metadata
+    from fracslice.jobs.plates import lay_out
+    from fracslice.slicing.packing import Beds
+
+    if given.bed is not None or given.parts is not None:
+        parts = make_parts(scene, job, PartsJob(**given.values(PartsJob)), work)
+        laid, made, names = parts.laid_out, parts.meshes, [name for name, _, _ in parts.named]
+    elif given.copies > 1:
+        one = make_mesh(scene, job, work)
+        sides = Beds(spacing=given.spacing)
+        laid, made, names = (
+            lay_out([one.mesh], [0] * given.copies, [scene.name] * given.copies, sides),
+            [one],
+            [scene.name],
+        )
+    else:
+        report = make_mesh(scene, job, work, path=path).report
+        return Models([path], report.mesh.triangles, list(report.problems))
+    files = outputs(str(path), laid.beds)
+    for bed, file in enumerate(files):
+        laid.on_bed(bed).write(file, metadata(scene), work, names)
+    problems = dict.fromkeys(problem for mesh in made for problem in mesh.report.problems)
+    count = sum(len(laid.meshes[item.mesh].triangles) for item in laid.items)
+    return Models(files, count, list(problems))
+
+
+def outputs(path: str, count: int) -> list[Path]:
+    """Files of several beds: part-1.gcode, part-2.gcode, ...; of one, the file itself."""
+    if count == 1:
+        return [Path(path)]
+    return [Path(with_suffix(path, f"-{bed}")) for bed in range(1, count + 1)]
+
+
+def slice_all(
+    chosen: FilamentSlicer, models: Sequence[Path], profiles: Sequence[str], files: Sequence[Path], work: Work
+) -> list[tuple[Path, list[str], Figures]]:
+    """Slice models, and write all files once all are made: each with its warnings, and what it says."""
+    from fracslice.common.files import check_target, temporary_folder
+
+    with temporary_folder(check_target(files[0]).parent) as folder:
+        made = [
+            (file, *chosen.slice(model, profiles, folder / file.name, work))
+            for model, file in zip(models, files, strict=True)
+        ]
+        for file in files:
+            os.replace(folder / file.name, check_target(file))
+    return made
+
+
+def expected_time(triangles: int, title: str) -> str:
+    """Line on the time that the slicer takes."""
+    from fracslice.export.sending import SECONDS
+
+    many = (
+        f"; expected at most {MOST:,}: a larger --voxel or --simplify, or --faces" if triangles > MOST else ""
+    )
+    return f"{triangles:,} triangles: {title} takes about {duration(triangles * SECONDS)}{many}"
 
 
 def figure_texts(figures: Figures) -> Iterator[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from operator import attrgetter
@@ -73,8 +73,8 @@ class LayerFileOptions(ClusterOptions, LayerOptions):
     )
     form: str | None = option(
         str,
-        "png, sl1, goo, ctb, cbddlp, pwmx, nanodlp, 3mf, svg, slic3r, cli, cli-binary or json; by default, "
-        "that of the extension of OUT.",
+        "png, sl1, goo, ctb, cbddlp, pwmx, pwsz, cxdlpv4, nanodlp, 3mf, svg, slic3r, cli, cli-binary "
+        "or json; by default, that of the extension of OUT.",
         "--format",
         metavar="NAME",
     )
@@ -221,7 +221,7 @@ def describe_layers(run: SliceRun, output: str, complete: Completeness) -> list[
     first = f"{output}: {parts}{format_count(len(stack.z), 'layer')} of {columns} x {rows} pixels, {size} mm"
     other = printers_file(screen.printer, output) if screen.printer else ""
     lost = [f"would not print: {', '.join(complete.problems)}"] if complete.problems else []
-    start = [calibration(run.resin)] if run.resin and slice_format(output) in PRINTS else []
+    exposed = exposure_lines(run) if slice_format(output) in PRINTS else []
     held = [str(stack.supports)] if stack.supports else []
     return [
         first,
@@ -229,22 +229,26 @@ def describe_layers(run: SliceRun, output: str, complete: Completeness) -> list[
         *held,
         *stack.notes,
         *complete.notes,
-        *filter(None, start),
+        *exposed,
         *([other] if other else []),
     ]
 
 
-def calibration(resin: Resin) -> str:
-    """Line on exposures that are no resin's."""
+def exposure_lines(run: SliceRun) -> Iterator[str]:
+    """Lines on exposures that are no resin's, and on how deep they cure."""
     from fracslice.slicing.printers import START
 
+    if run.resin is None:
+        return
     keys = attrgetter("name", "exposure", "bottom_exposure", "bottom_layers", "transition_layers")
-    if keys(resin) != keys(START):
-        return ""
-    times = f"{resin.exposure:g} s a layer and {resin.bottom_exposure:g} s a bottom layer"
-    return (
-        f"exposed for {times}, as UVtools does by default: start here, then calibrate (--exposure, --resin)"
-    )
+    if keys(run.resin) == keys(START):
+        times = f"{START.exposure:g} s a layer and {START.bottom_exposure:g} s a bottom layer"
+        start = "start here, then calibrate (--exposure, --resin)"
+        yield f"exposed for {times}, as UVtools does by default: {start}"
+    depth = run.resin.cured_depth(run.resin.exposure)
+    excess = run.resin.excess(float(run.stack.heights.max()))
+    if depth is not None and excess is not None:
+        yield f"a layer cures {depth:.2f} mm deep, and faces that look down {excess:.2f} mm too deep"
 
 
 def resin_of(given: LayerFileOptions) -> Resin | None:

@@ -433,13 +433,16 @@ class PartsJob(Record):
         words=("auto",),
     )
     clearance: Given[AnyLength, float] = attribute(
-        Length, 0.15, "gap around the pegs that join parts", zero=True
+        Length, 0.15, "gap around the pegs that join parts, and around plugs", zero=True
     )
+    plugs: bool = attribute(Flag, False, "makes a plug for each drain hole, too")
 
     def __post_init__(self) -> None:
         validate(self, SceneError)
         if self.parts == "auto" and self.bed is None:
             raise SceneError("parts auto: expected a bed, too, such as 220x220x250mm")
+        if self.plugs and (self.parts or self.bed):
+            raise SceneError("plugs and parts: expected one of them")
 
     def side(self, axis: int) -> float:
         """Longest part along an axis, mm.

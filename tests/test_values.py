@@ -78,6 +78,7 @@ NUMBERS: dict[str, Callable[[Any], Any]] = {
     "adapted": lambda v: adapted(STACK, v),
     "Limits.speck": lambda v: Limits(speck=v),
     "Limits.cup": lambda v: Limits(cup=v),
+    "Limits.drop": lambda v: Limits(drop=v),
     "Limits.thin": lambda v: Limits(thin=v),
     "Limits.density": lambda v: Limits(density=v),
     "Work.threads": lambda v: Work(threads=v),

@@ -213,7 +213,8 @@ class _Collector:
 
     def shut(self, hollows: Graph, backwards: bool) -> list[Feature]:
         """Large groups of shut nodes, see `Graph.shut`."""
-        return [p for p in self.groups(hollows, hollows.shut(backwards)) if p.area >= self.limits.cup]
+        found = self.groups(hollows, hollows.shut(backwards))
+        return [p for p in found if p.area >= self.limits.cup and p.volume >= self.limits.drop]
 
     def height(self, part: Feature) -> float:
         """Height of a group, mm."""

@@ -100,6 +100,8 @@ class Limits:
     speck: float = attribute(Number, 0.02, "an area", least=0)
     # minimum area of a suction cup, a resin trap or, in layers, a sealed cavity, mm^2
     cup: float = attribute(Number, 1.0, "an area", least=0)
+    # minimum volume of a suction cup or a resin trap, mm^3: less is a film of resin
+    drop: float = attribute(Number, 1.0, "a volume", least=0)
     # minimum diameter of a drain hole, mm: narrower ones may close; this limit is ours
     hole: float = attribute(Length, 0.5, "a diameter", zero=True)
     # minimum height of a suction cup, mm; every hole in the first layers is a shallow one

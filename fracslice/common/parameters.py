@@ -785,30 +785,40 @@ class Heights(Length):
 class Sides(Length):
     """Parameter kind of three lengths, such as 220x220x250mm: a unit is that of the lengths before it, too.
     Its values are in mm.
+
+    Attributes
+    ----------
+    flat : bool
+        True if the last of them may be left out.
     """
 
-    expects = "three lengths such as 220x220x250mm"
+    flat: bool = False
+
+    @property
+    def expects(self) -> str:
+        """Description of the accepted values."""
+        return "three lengths such as 220x220x250mm" + (", or two, 143x89mm" if self.flat else "")
 
     def read(self, text: str) -> Any:
-        """Parse three lengths with x between; see `Parameter.read`."""
+        """Parse lengths with x between; see `Parameter.read`."""
         words = [word.strip() for word in text.split("x")]
         unit = words[-1].lstrip("0123456789.+-eE ")
         return self.check(tuple(word if word[-1:].isalpha() else word + unit for word in words))
 
     def check(self, value: Any) -> Any:
-        """Validate text or three lengths; see `Parameter.check`."""
+        """Validate text or lengths; see `Parameter.check`."""
         if isinstance(value, str):
             return self.read(value)
         try:
             sides = tuple(Length(None, "").check(side) for side in items(value))
         except ValueError:
             sides = ()
-        if len(sides) != 3:
+        if len(sides) != 3 and not (self.flat and len(sides) == 2):
             raise ValueError(self.expects)
         return sides
 
     def text(self, value: Any) -> str:
-        """Format three lengths; see `Parameter.text`."""
+        """Format the lengths; see `Parameter.text`."""
         return f"{'x'.join(f'{side:.6g}' for side in value)}mm"
 
 

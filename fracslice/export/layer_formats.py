@@ -199,7 +199,12 @@ class PrintData:
     @property
     def seconds(self) -> float:
         """Duration, s."""
-        return self.resin.seconds(self.layers)
+        return self.resin.seconds(self.areas)
+
+    @cached_property
+    def resins(self) -> list[Resin]:
+        """Settings of each layer."""
+        return self.resin.of_layers(self.areas)
 
     @property
     def mirrored(self) -> bool:
@@ -233,6 +238,7 @@ class PrintFormat(LayerFormat):
             raise ExportError("a print file needs a printer")
         if run.resin is None:
             raise ExportError("a print file needs an exposure: none is known for this printer")
+        run.resin.check_depth(float(run.stack.heights.max()))
 
         def record(layer: Layer) -> bytes:
             data = self.encode(run, layer)

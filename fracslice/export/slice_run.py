@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import threading
 from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, field, fields
@@ -166,7 +167,7 @@ class SliceRun:
     # renders the object for print files: uint8 [height, width, 3], sRGB
     picture: Callable[[], NDArray[np.uint8]] | None = None
     created: datetime = EPOCH  # date in print files, UTC
-    sections: int = 1  # sections per layer; the grey level of a pixel is the mean of their coverages
+    sections: int = 1  # sections per layer; the grey level of a pixel is their weighted mean
     recipe: Recipe | None = None  # plans the same run in another process; a cluster needs it
 
     def __post_init__(self) -> None:
@@ -180,7 +181,10 @@ class SliceRun:
 
     def slicer_with(self, work: Work) -> Slicer:
         """Slicer of the stack with other threads."""
-        return Slicer(self.stack, work) if self.sections == 1 else MeanSlicer(self.stack, work, self.sections)
+        if self.sections == 1:
+            return Slicer(self.stack, work)
+        penetration = (self.resin and self.resin.penetration) or math.inf
+        return MeanSlicer(self.stack, work, self.sections, penetration)
 
     @property
     def layers(self) -> int:

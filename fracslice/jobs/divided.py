@@ -6,32 +6,37 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import concatenate
-from ..common.files import check_target, replacing
+from ..common.files import check_target
 from ..errors import SceneError
 from ..fields.box import Triple
-from ..formats import check_format, write
-from ..formats._3mf import Built, write_build
+from ..formats import check_format
 from ..mesh import Mesh
+from ..printing.dividing import Divided, divide
 from ..records import SAME, UP, MeshJob, PartsJob
 from ..scene import Print, Scene
-from ..version import APPLICATION
+from ..slicing.packing import Beds
 from ..volume.amount import sizing
-from ..volume.dividing import BED_TO_BED, Divided, divide, laid_out
 from ..work import Work
-from .mesh import make_mesh
-from .report import Result
+from .mesh import make_mesh, mesh_of_part
+from .mesh_steps import apply_edits, plan_mesh
+from .plates import LaidOut, lay_out, write_each
+from .report import Clock, Result
+
+GAP = 5.0
+"""Distance between parts on a bed of a filament printer, mm."""
 
 APART = 0.25
 """How far parts are drawn from each other, by the longest side of the object."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Parted:
     """Meshes of an object in parts."""
 
@@ -46,24 +51,13 @@ class Parted:
         parts = [(str(n), mesh, 1) for n, mesh in enumerate(self.meshes, 1)]
         return parts + ([("peg", self.peg, len(self.divided.pegs))] if self.peg else [])
 
-    def placed(self) -> list[Built]:
-        """Objects with their places on beds, whose first has its corner at the origin."""
-        copies = [(name, mesh.mesh) for name, mesh, count in self.named for _ in range(count)]
-        sizes = [(float(mesh.size[0]), float(mesh.size[1])) for _, mesh in copies]
-        places: dict[str, list[NDArray[np.float64]]] = {}
-        for (name, mesh), (bed, x, y) in zip(copies, laid_out(sizes, self.bed), strict=True):
-            start = bed * BED_TO_BED * self.bed[0] if self.bed else 0.0
-            low = mesh.bounds[0]
-            moved = np.vstack([np.eye(3), [start + x - low[0], y - low[1], 0.0]])
-            places.setdefault(name, []).append(moved)
-        meshes = dict(copies)
-        return [Built(meshes[name], some, name) for name, some in places.items()]
-
-    @property
-    def beds(self) -> int:
-        """Number of beds."""
-        sizes = [tuple(mesh.mesh.size[:2].tolist()) for _, mesh, count in self.named for _ in range(count)]
-        return 1 + max(bed for bed, _, _ in laid_out(sizes, self.bed))
+    @cached_property
+    def laid_out(self) -> LaidOut:
+        """All on beds."""
+        meshes = [mesh.mesh for _, mesh, _ in self.named]
+        places = [k for k, (_, _, count) in enumerate(self.named) for _ in range(count)]
+        names = [f"part {self.named[k][0]}" for k in places]
+        return lay_out(meshes, places, names, Beds(self.bed and self.bed[:2], GAP, most=None))
 
     def exploded(self) -> Mesh:
         """All parts where they belong, moved away from each other, and the pegs between them."""
@@ -91,36 +85,33 @@ def make_parts(
     """Make the meshes of an object in parts.
 
     `path`: file that the meshes are for. Raises what `divide` and `make_mesh` raise, and SceneError for
-    edits.
+    supports and colours.
     """
     work = work or Work()
-    if what.edits(scene) != Print():
-        raise SceneError(
-            "parts: expected no changes for printing, such as a base, of which each part had one"
-        )
+    if what.edits(scene).supports != "none":
+        raise SceneError("parts: expected no supports, as each part lies on the plate by itself")
     if what.colour is not None:
         raise SceneError("parts: expected no colours")
     if path is not None:
         check_format(path)
         check_target(path)
-    size = sizing(scene, what.size, what.scale, work)
-    voxel = size.longest / what.voxels(size.longest)
-    own = replace(what, voxel=voxel, resolution=None, size=None, up=UP, scale=SAME, printing=Print())
-    divided = divide(scene, how, what, work)
-    meshes = [make_mesh(part.scene, own, work) for part in divided.parts]
-    peg = make_mesh(divided.peg, replace(own, voxel=None, resolution=64), work) if divided.pegs else None
+    size, clock = sizing(scene, what.size, what.scale, work), Clock(work)
+    sized = plan_mesh(scene, what, size, clock)
+    if sized.left.sorts:
+        sized = apply_edits(sized.planned, scene, what, size, clock)
+    divided = divide(sized.planned, sized.scale, how, work)
+    voxel = sized.planned.voxel * sized.scale
+    own = replace(what, voxel=voxel, resolution=None, printing=Print())
+    meshes = [mesh_of_part(scene, sized.planned, sized.scale, part.root, own, work) for part in divided.parts]
+    upright = replace(own, voxel=None, resolution=64, size=None, up=UP, scale=SAME)
+    peg = make_mesh(divided.peg, upright, work) if divided.pegs else None
     return Parted(divided, meshes, peg, how.bed)
 
 
 def write_parts(made: Parted, path: str | Path, about: dict[str, str], work: Work) -> list[Path]:
     """Write the parts to one .3mf file, laid on beds, or each to a file of its own. Returns the files."""
-    path = Path(path)
+    path, names = Path(path), [name for name, _, _ in made.named]
     if path.suffix.lower() != ".3mf":
-        names = [path.with_name(f"{path.stem}-{name}{path.suffix}") for name, _, _ in made.named]
-        for name in names:
-            check_target(name)
-        pairs = zip(names, made.named, strict=True)
-        return [write(mesh.mesh, name, about, work) for name, (_, mesh, _) in pairs]
-    with replacing(path) as file:
-        write_build(made.placed(), file, {"Application": APPLICATION} | about, work)
+        return write_each([mesh.mesh for _, mesh, _ in made.named], names, path, about, work)
+    made.laid_out.write(path, about, work, names)
     return [path]

@@ -14,12 +14,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..common.arrays import product
 from ..common.memory import peak_rss_mb
 from ..common.messages import lacking
-from ..errors import SceneError, SharedError, TooLargeError, keeping
+from ..errors import SceneError, SharedError, TooLargeError, VolumeError, keeping
 from ..fields.box import Box
+from ..fields.field import Field
 from ..formulas import Node
-from ..records import MeshJob
+from ..records import SAME, UP, MeshJob
 from ..scene import Print, Scene
 from ..version import __version__
 from ..work import Work, ahead, in_background
@@ -87,6 +89,84 @@ def make_mesh(
     return result if result is first else noted(result, first)
 
 
+def mesh_of_part(scene: Scene, whole: Plan, scale: float, root: Field, what: MeshJob, work: Work) -> Result:
+    """Mesh of a part of an object.
+
+    `whole`: the object, `root`: the part, both of `scale` mm per scene unit; `what`: voxel or resolution, and
+    the bodies that are chosen in the mesh.
+    """
+    from ..volume import extent
+
+    extents = extent(root, work)
+    side = scale * max(extents.box.size)
+    what = replace(what, size=side, scale=SAME, up=UP)
+    planned = replace(
+        whole,
+        root=root,
+        box=extents.box,
+        outer=extents.outer,
+        tips=extents.tips,
+        voxel=side / what.voxels(side) / scale,
+        drains=(),
+        undrilled=None,
+        supports=None,
+    )
+    made, _ = _Job(scene, what, Clock(work), None, Sized(planned, scale, what.edits(scene))).made()
+    return made
+
+
+PLUG = 24
+"""Voxels along the longest side of a plug."""
+
+
+def make_plugs(scene: Scene, whole: Result, clearance: float, work: Work | None = None) -> list[Mesh]:
+    """Make plugs for the drain holes of a mesh: what was cut out there, less a clearance all around.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene of the mesh.
+    whole : Result
+        The mesh.
+    clearance : float
+        Gap around the plugs, mm.
+    work : Work, optional
+        Threads, progress and cancellation.
+
+    Returns
+    -------
+    list of Mesh
+        A plug for each hole, upright on its inner end, mm.
+
+    Raises
+    ------
+    VolumeError
+        If there is no hole, or the clearance leaves nothing.
+    """
+    from ..printing.drains import plugs
+
+    planned, scale = whole.planned, whole.place.scale
+    if not planned.drains:
+        raise VolumeError("plugs: expected drain holes, by drain_at or hollow")
+    made, left = [], Print(keep="largest", cavities="fill")
+    for drain, root in plugs(planned, clearance / scale):
+        chord = max(clearance, scale * drain.radius / 8) / 8
+        what = MeshJob(resolution=PLUG, chord=chord, printing=left)
+        plug = mesh_of_part(scene, planned, scale, root, what, work or Work())
+        made.append(standing_on(plug.mesh, np.array(drain.end) - drain.start))
+    return made
+
+
+def standing_on(mesh: Mesh, up: np.ndarray) -> Mesh:
+    """Mesh, turned so that a direction is up, centred on z = 0."""
+    up = up / np.linalg.norm(up)
+    right = np.cross(up, np.eye(3)[np.abs(up).argmin()])
+    right /= np.linalg.norm(right)
+    turned = replace(mesh, vertices=product(mesh.vertices, np.stack([right, np.cross(up, right), up], 1)))
+    (x0, y0, z0), (x1, y1, _) = turned.bounds.tolist()
+    return turned.translated(np.array([-(x0 + x1) / 2, -(y0 + y1) / 2, -z0]))
+
+
 def noted(result: Result, coarse: Result) -> Result:
     """A result with a note that it was made in place of a coarser one, and why."""
     report, asked = result.report, coarse.report
@@ -125,6 +205,7 @@ class _Job:
     what: MeshJob
     clock: Clock
     path: Path | None
+    given: Sized | None = None  # the field, if it is not that of the scene
 
     @cached_property
     def size(self) -> Sizing:
@@ -194,7 +275,8 @@ class _Job:
 
         Samples of walls thinner than a voxel do not tell bodies from crumbs: the field then chooses.
         """
-        sized, how = plan_mesh(self.scene, self.what, self.size, self.clock), self.what.edits(self.scene)
+        sized = self.given or plan_mesh(self.scene, self.what, self.size, self.clock)
+        how = self.what.edits(self.scene)
         with in_mm(self.size):
             signs = self.signs(sized.planned, False)
         thin = how.sorts and mesh_steps.has_thin_walls(signs)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,13 +19,14 @@ from ..formulas import transform, union
 from ..slicing import Stack
 from ..slicing.packing import (
     SPACING,
+    Beds,
     Spot,
     cell_for,
+    corners,
     outline_of_layers,
     outline_of_mesh,
     packed,
     plate_of,
-    taken,
     turns_for,
 )
 from ..slicing.raster import Screen, check_fits
@@ -89,16 +91,10 @@ class PlateRecipe:
                     check_fits(stack, printer, max(job.compensation, 0.0))
             bed, where = (printer.screen[0] - pixel[0], printer.screen[1] - pixel[1]), f"the {printer.title}"
         cell = cell_for(bed, [max(stacks[part].size[:2]) for part in self.parts])
-        masks = {part: outline_of_layers(stack, cell, work) for part, stack in stacks.items()}
-        spots = packed(
-            [masks[part] for part in self.parts],
-            [part.name for part in self.parts],
-            cell,
-            bed,
-            self.spacing + 2 * max(job.compensation, 0.0),
-            where,
-            turns_for(pixel),
-        )
+        outlines = {part: outline_of_layers(stack, cell, work) for part, stack in stacks.items()}
+        beds = Beds(bed, self.spacing + 2 * max(job.compensation, 0.0), where, turns_for(pixel))
+        names = [part.name for part in self.parts]
+        spots = packed([outlines[part] for part in self.parts], names, cell, beds)
         return plate_of([stacks[part] for part in self.parts], spots)
 
 
@@ -148,21 +144,93 @@ def _moved(mesh: Mesh, part: Standing, plate: tuple[int, int]) -> Mesh:
     return replace(mesh, vertices=np.column_stack([flat, mesh.vertices[:, 2]]))
 
 
-def write_meshes(
-    meshes: Sequence[Mesh],
-    places: Sequence[int],
-    names: Sequence[str],
-    path: str | Path,
-    about: Mapping[str, str],
-    work: Work,
-    *,
-    spacing: float = SPACING,
-    bed: tuple[float, float, float] | None = None,
-    where: str = "the bed",
-) -> list[Spot]:
-    """Place meshes, each standing on z = 0 and centred, and write them to one file.
+BED_TO_BED = 1.2
+"""Distance of beds by their width, as in Bambu Studio and OrcaSlicer."""
 
-    A .3mf file holds each mesh once, and an item of the build for each place; other files hold triangles.
+
+class Item(NamedTuple):
+    """A mesh on a bed."""
+
+    mesh: int  # number of the mesh
+    bed: int
+    place: NDArray[np.float64]  # how it is moved from the corner of the bed; see `Built`
+
+
+@dataclass(frozen=True, eq=False)
+class LaidOut:
+    """Meshes on beds, the first of which has its corner at the origin."""
+
+    meshes: Sequence[Mesh]  # each once, mm
+    items: Sequence[Item]
+    width: float = 0.0  # of a bed, mm; 0 without limits
+
+    @property
+    def beds(self) -> int:
+        """Number of beds."""
+        return 1 + max(item.bed for item in self.items)
+
+    def on_bed(self, bed: int) -> LaidOut:
+        """What lies on one bed."""
+        here = [item._replace(bed=0) for item in self.items if item.bed == bed]
+        return LaidOut(self.meshes, here, self.width)
+
+    def places(self, mesh: int) -> list[NDArray[np.float64]]:
+        """Places of a mesh on all beds, side by side."""
+        step = np.array([[0.0] * 3] * 3 + [[BED_TO_BED * self.width, 0.0, 0.0]])
+        return [item.place + item.bed * step for item in self.items if item.mesh == mesh]
+
+    @property
+    def whole(self) -> Mesh:
+        """All as one mesh."""
+        from ..common.arrays import concatenate, product
+        from ..mesh import Mesh
+
+        return concatenate(
+            [
+                Mesh(product(mesh.vertices, place[:3]) + place[3], mesh.triangles)
+                for number, mesh in enumerate(self.meshes)
+                for place in self.places(number)
+            ]
+        )
+
+    def write(self, path: str | Path, about: Mapping[str, str], work: Work, names: Sequence[str]) -> None:
+        """Write all to one file.
+
+        A .3mf file holds each mesh once, and an item of the build for each place; other files hold triangles.
+
+        `about`: metadata; `names`: of the meshes, in a .3mf file.
+        """
+        from ..common.files import replacing
+        from ..formats import write
+        from ..formats._3mf import Built, write_build
+        from ..version import APPLICATION
+
+        if Path(path).suffix.lower() != ".3mf":
+            write(self.whole, path, about, work)
+            return
+        named = enumerate(zip(self.meshes, names, strict=True))
+        built = [Built(mesh, places, name) for k, (mesh, name) in named if (places := self.places(k))]
+        with replacing(path) as file:
+            write_build(built, file, {"Application": APPLICATION, **about}, work, self.whole.thumbnail())
+
+
+def write_each(
+    meshes: Sequence[Mesh], names: Sequence[str], path: Path, about: Mapping[str, str], work: Work
+) -> list[Path]:
+    """Write each mesh to a file of its own, whose name ends in its name. Returns the files."""
+    from ..common.files import check_target
+    from ..formats import write
+
+    files = [path.with_name("-".join(filter(None, (path.stem, name))) + path.suffix) for name in names]
+    for file in files:
+        check_target(file)
+    return [write(mesh, file, about, work) for mesh, file in zip(meshes, files, strict=True)]
+
+
+def lay_out(
+    meshes: Sequence[Mesh], places: Sequence[int], names: Sequence[str], beds: Beds, height: float = math.inf
+) -> LaidOut:
+    """Place meshes, each standing on z = 0 and centred.
 
     Parameters
     ----------
@@ -172,73 +240,38 @@ def write_meshes(
         Number of the mesh of each part.
     names : sequence of str
         Name of each part, for errors.
-    path : str or Path
-        The file to write; its extension selects the format.
-    about : mapping of str to str
-        Metadata of the file.
-    work : Work
-        Threads and cancellation.
-    spacing : float
-        Distance between parts, mm.
-    bed : tuple of float, optional
-        Width, depth and height that are free, mm; no limits without it.
-    where : str
-        What the bed is called in errors.
+    beds : Beds
+        Beds for them.
+    height : float
+        Height that is free above a bed, mm.
 
     Returns
     -------
-    list of Spot
-        Where each part stands.
+    LaidOut
+        The meshes at their places.
 
     Raises
     ------
     SliceError
-        If the parts do not fit on the bed.
+        If the parts do not fit.
     """
-    from ..common.files import replacing
-    from ..formats import write
-    from ..formats._3mf import Built, write_build
-    from ..version import APPLICATION
-
-    sides = [mesh.vertices.max(0) - mesh.vertices.min(0) for mesh in meshes]
+    sides = [np.ptp(mesh.vertices, 0) for mesh in meshes]
     for k, name in zip(places, names, strict=True):
-        if bed and sides[k][2] > bed[2] * (1 + 1e-6):
-            raise SliceError(f"{name}: {sides[k][2]:.6g} mm high, {where} has {bed[2]:.6g} mm")
-    flat = bed and (bed[0], bed[1])
-    cell = cell_for(flat, [float(sides[k][:2].max()) for k in places])
-    masks = [outline_of_mesh(mesh, cell) for mesh in meshes]
-    spots = packed([masks[k] for k in places], names, cell, flat, spacing, where)
-    corner = (
-        np.array(flat) / 2 if flat else taken(zip([masks[k] for k in places], spots, strict=True), cell)[1]
-    )
-    items = [(k, _transform(spot, corner)) for k, spot in zip(places, spots, strict=True)]
-    if Path(path).suffix.lower() == ".3mf":
-        with replacing(path) as file:
-            whole = _laid_out(meshes, items)
-            built = [
-                Built(mesh, [place for number, place in items if number == k])
-                for k, mesh in enumerate(meshes)
-            ]
-            write_build(built, file, {"Application": APPLICATION, **about}, work, whole.thumbnail())
-    else:
-        write(_laid_out(meshes, items), path, about, work)
-    return spots
+        if sides[k][2] > height * (1 + 1e-6):
+            raise SliceError(f"{name}: {sides[k][2]:.6g} mm high, {beds.name} has {height:.6g} mm")
+    cell = cell_for(beds.sides, [float(sides[k][:2].max()) for k in places])
+    outlines = [outline_of_mesh(mesh, cell) for mesh in meshes]
+    placed = [outlines[k] for k in places]
+    spots = packed(placed, names, cell, beds)
+    middle = np.array(beds.sides) / 2 if beds.sides else corners(placed, spots)[1]
+    items = [Item(k, spot.bed, _transform(spot, middle)) for k, spot in zip(places, spots, strict=True)]
+    return LaidOut(meshes, items, beds.sides[0] if beds.sides else 0.0)
 
 
-def _transform(spot: Spot, corner: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Four rows by which points, as rows, are moved to a spot; as 3MF has them, from the corner of the bed.
+def _transform(spot: Spot, middle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Four rows by which points, as rows, are moved to a spot, as 3MF has them.
 
-    `corner`: the middle of the plate from there, mm.
+    `middle`: of the bed, mm.
     """
     cosine, sine = ((1, 0), (0, 1), (-1, 0), (0, -1))[spot.turns]
-    return np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1], [*(corner + spot.middle), 0]], float)
-
-
-def _laid_out(meshes: Sequence[Mesh], items: Sequence[tuple[int, NDArray[np.float64]]]) -> Mesh:
-    """All parts as one mesh."""
-    from ..common.arrays import concatenate, product
-    from ..mesh import Mesh
-
-    return concatenate(
-        [Mesh(product(meshes[k].vertices, m[:3]) + m[3], meshes[k].triangles) for k, m in items]
-    )
+    return np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1], [*(middle + spot.middle), 0]], float)

@@ -21,7 +21,7 @@ from ..common.messages import format_count, place, significant
 from ..errors import VolumeError
 from ..fields.box import Box, Triple
 from ..fields.field import Field
-from ..formulas import Node, cylinder, transform, union
+from ..formulas import Node, cylinder, intersection, plane, transform, union
 from ..records import Print
 from ..volume import Drain, Plan
 from ..work import Work
@@ -285,7 +285,27 @@ def drained(planned: Plan, how: Print, scale: float, work: Work) -> Plan:
         root = edited_field(root, "cut", union(*map(_cut, drains)))
         drainage = Drainage.of(root, planned.box, cell, work)
     notes = tuple(_note(drainage.pockets(), middle, scale))
-    return replace(planned, root=root, drains=(*planned.drains, *drains), notes=(*planned.notes, *notes))
+    made, undrilled = (*planned.drains, *drains), planned.undrilled or (planned.root if drains else None)
+    return replace(planned, root=root, drains=made, undrilled=undrilled, notes=(*planned.notes, *notes))
+
+
+def plugs(planned: Plan, clearance: float) -> Iterator[tuple[Drain, Field]]:
+    """Each drain hole of an object, and what it cut out of that, less a clearance all around.
+
+    `clearance` in scene units.
+
+    Raises
+    ------
+    VolumeError
+        If the clearance leaves nothing.
+    """
+    for drain in planned.drains:
+        if clearance >= drain.radius:
+            raise VolumeError("clearance: expected less than half of the diameter of the drain holes")
+        assert planned.undrilled is not None
+        pin = _cut(replace(drain, radius=drain.radius - clearance))
+        above = plane(normal=(0, 0, -1), offset=-planned.box.lo[2])
+        yield drain, edited_field(planned.undrilled, "keep", intersection(pin, above))
 
 
 def _needed(drill: Drill, radius: float) -> list[Drain]:

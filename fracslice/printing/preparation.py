@@ -402,9 +402,9 @@ class _Edits(Preparation):
         cuts, drains = hollows(samples, how.hollow / self.scale, drain, self.planned.outer)
         if not cuts:
             raise VolumeError(f"walls of {how.hollow:g} mm leave nothing to hollow out")
-        self.planned = replace(self.planned, drains=drains)
         for cut in cuts:
-            root = edited_field(root, "cut", cut)
+            before, root = root, edited_field(root, "cut", cut)
+        self.planned = replace(self.planned, drains=drains, undrilled=before if drains else None)
         return root
 
 

@@ -43,19 +43,29 @@ FINEST, LARGEST = 0.02, 3.0
 """Limits of a size."""
 
 
-def number(text: str, x: float, y: float, top: float) -> Node:
-    """Number to cut out of a face, centred at x and y, as deep as `DEPTH` below `top`."""
-    wide = HEIGHT / 2
-    widths = [STROKE if sign == "." else wide for sign in text]
-    left = x - (sum(widths) + 2 * STROKE * (len(text) - 1)) / 2
-    boxes = list[Node]()
+def bars(text: str, height: float, stroke: float) -> Iterator[tuple[float, float, float, float]]:
+    """Middles along x and y and sizes of the lines of a number, centred.
+
+    `height`: between the middles of its lowest and highest lines; `stroke`: width of lines.
+    """
+    wide = height / 2
+    widths = [stroke if sign == "." else wide for sign in text]
+    left = -(sum(widths) + 2 * stroke * (len(text) - 1)) / 2
     for sign, width in zip(text, widths, strict=True):
         for across, along, dx, dy in map(_segment, SEGMENTS[sign]):
-            size = across * width + STROKE, along * HEIGHT / 2 + STROKE, 2 * DEPTH
-            at = left + width / 2 + dx * width, y + dy * HEIGHT / 2, top
-            boxes.append(transform(box(size=size), translate=at))
-        left += width + 2 * STROKE
-    return union(*boxes)
+            sides = across * width + stroke, along * wide + stroke
+            yield (left + width / 2 + dx * width, dy * wide, *sides)
+        left += width + 2 * stroke
+
+
+def number(text: str, x: float, y: float, top: float) -> Node:
+    """Number to cut out of a face, centred at x and y, as deep as `DEPTH` below `top`."""
+    return union(
+        *(
+            transform(box(size=(across, along, 2 * DEPTH)), translate=(x + u, y + v, top))
+            for u, v, across, along in bars(text, HEIGHT, STROKE)
+        )
+    )
 
 
 def _segment(name: str) -> tuple[float, float, float, float]:
@@ -136,6 +146,17 @@ def exposure(sizes: Sequence[float], label: str) -> Node:
     return difference(union(*added, tab), *cut, *_labelled(label, 0, -15, PLATE))
 
 
+def depth(sizes: Sequence[float], label: str) -> Node:
+    """Bridges of several thicknesses, 6 mm long, which grow downwards by the light that passes them."""
+    wide = PITCH * len(sizes) + 2
+    walls = [_block(0, y, PLATE, wide, 2, 2) for y in (5, 13)]
+    added, cut = [_plate(sizes, 30.0), *walls], list[Node]()
+    for size, x in _columns(sizes):
+        added.append(_block(x, 9, PLATE + 2, 5, 10, size))
+        cut.append(number(f"{size:g}", x, -5, PLATE))
+    return difference(union(*added), *cut, *_labelled(label, 0, -11, PLATE))
+
+
 def _cut(solid: Node, cuts: Sequence[Node]) -> Node:
     return difference(solid, *cuts) if cuts else solid
 
@@ -145,6 +166,7 @@ def _labelled(label: str, x: float, y: float, top: float) -> list[Node]:
 
 
 OBJECTS: dict[str, tuple[Callable[[Sequence[float], str], Node], tuple[float, ...]]] = {
+    "depth": (depth, (1.0, 1.5, 2.0)),
     "elephant-foot": (elephant_foot, (0.1, 0.2, 0.3, 0.4, 0.6)),
     "exposure": (exposure, (0.2, 0.3, 0.4, 0.5, 0.6, 0.8)),
     "tolerance": (tolerance, (0.05, 0.1, 0.15, 0.2, 0.3, 0.4)),

@@ -19,11 +19,13 @@ to the distance on both sides: there, and where a scene mixes fractals with othe
 dropped by `MIXED` of the bound.
 
 A section in the middle of a layer gives stairs on a slope. The mean of n sections, by the midpoint rule, is
-the share of a pixel's volume in the layer that is inside, to 1/2n.
+the share of a pixel's volume in the layer that is inside, to 1/2n; of a resin whose penetration depth is
+known, sections are weighted by the light that they need.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -552,6 +554,7 @@ class MeanSlicer(Slicer):
     """Slicer whose layers have the mean coverage of several sections."""
 
     sections: int = 1  # sections per layer, one of `SECTIONS`
+    penetration: float = math.inf  # depth at which 1/e of the light is left, mm; infinity: all of it
 
     def map(
         self,
@@ -564,21 +567,50 @@ class MeanSlicer(Slicer):
         """
         n, sums = self.sections, dict[int, tuple[np.ndarray, float]]()
         chosen = range(len(self.stack.z)) if layers is None else layers
+        weights = {height: section_weights(height, n, self.penetration) for height in set(self._heights)}
 
         def section(layer: Layer) -> list[T]:
             index, k = divmod(layer.index, n)
             coverage, area = sums.pop(index, (0, 0.0))
-            total = coverage + layer.coverage.astype(np.uint16), area + layer.area
+            weight = np.uint32(weights[self._heights[index]][k])
+            total = coverage + weight * layer.coverage, area + layer.area
             if k < n - 1:
                 sums[index] = total
                 return []
             self.areas[index] = total[1] / n
-            mean = ((total[0] + n // 2) // n).astype(np.uint8)
+            mean = ((total[0] + WHOLE // 2) // WHOLE).astype(np.uint8)
             return [make(replace(layer, stack=self.stack, index=index, mean=(mean, self.areas[index])))]
 
         sections = [n * index + k for index in chosen for k in range(n)]
         for made in Slicer(_sections(self.stack, n), self.work).map(section, sections):
             yield from made
+
+    @cached_property
+    def _heights(self) -> list[float]:
+        """Heights of the layers, mm."""
+        return list(np.round(self.stack.heights, 9).tolist())
+
+
+WHOLE = 1 << 16
+"""Sum of the weights of the sections of a layer."""
+
+CLEAR = 1e-6
+"""Height of a layer by the penetration depth below which all sections have the same weight."""
+
+
+def section_weights(height: float, n: int, penetration: float) -> list[int]:
+    """Weights of the sections of a layer, from its lower face to the screen, with the sum `WHOLE`.
+
+    The dose falls to 1/e within the penetration depth on its way from the screen (Jacobs 1992), and those of
+    all layers above add up. So a face that looks down is cured where it should be, but for the same offset of
+    all such faces, if (exp(d / p) - 1) / (exp(h / p) - 1) of a whole dose is for a share d / h of the layer.
+
+    `height`: h, mm; `penetration`: p, mm, or infinity.
+    """
+    share = np.arange(n + 1) / n
+    if height > CLEAR * penetration:
+        share = np.expm1(share * height / penetration) / math.expm1(height / penetration)
+    return list(np.diff(np.rint(WHOLE * share).astype(int))[::-1].tolist())
 
 
 def _sections(stack: Stack, n: int) -> Stack:

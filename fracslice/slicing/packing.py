@@ -1,16 +1,16 @@
 """Plates of many parts: their outlines from above, a place for each, and one stack of layers of all.
 
 Outlines are cells that a part covers at any height. Parts are placed one after the other, the largest first,
-as far in front and then as far to the left as there is room (bottom-left filling: Baker, Coffman and Rivest
-1980, "Orthogonal packings in two dimensions"). All places of a part are tried at once: the correlation of its
-outline with what is taken is zero where it fits.
+on the first bed with room, as far in front and then as far to the left as there is room (bottom-left filling:
+Baker, Coffman and Rivest 1980, "Orthogonal packings in two dimensions"). All places of a part are tried at
+once: the correlation of its outline with what is taken is zero where it fits.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -33,6 +33,9 @@ CELL = 0.25
 ACROSS = 640
 """Most cells along a side of the bed."""
 
+AT_ONCE = 1 << 20
+"""Points of triangles that are looked up together."""
+
 MARGIN = 1
 """Cells by which outlines reach beyond their parts: what is thinner than a cell may lie between samples."""
 
@@ -47,106 +50,162 @@ SQUARE = 1e-3
 
 
 @dataclass(frozen=True)
+class Beds:
+    """Beds for parts."""
+
+    sides: tuple[float, float] | None = None  # width and depth, mm; None for no limits
+    spacing: float = SPACING  # distance between parts, mm
+    name: str = "the bed"  # what they are called in errors
+    turns: Sequence[int] = (0, 1, 2, 3)  # quarter turns of parts that are tried
+    most: int | None = 1  # number of beds; None for as many as are needed
+
+
+@dataclass(frozen=True, eq=False)
+class Footprint:
+    """A part as it is seen from above; copies share it."""
+
+    mask: NDArray[np.bool_]  # cells that it covers, [rows, columns], the first row in front
+    size: tuple[float, float]  # width and depth of what it covers, around the middle of the mask, mm
+
+    def turned(self, turns: int) -> Footprint:
+        """The outline, turned counter-clockwise, as its first row is in front."""
+        return Footprint(np.rot90(self.mask, -turns), self.size[::-1] if turns % 2 else self.size)
+
+
+@dataclass(frozen=True)
 class Spot:
     """Where a part stands."""
 
     turns: int  # quarter turns counter-clockwise
-    middle: tuple[float, float]  # middle of its outline, mm from the middle of the plate
+    middle: tuple[float, float]  # middle of its outline, mm from the middle of the bed
+    bed: int = 0  # number of the bed
 
 
-@dataclass(frozen=True)
-class Outlines:
-    """Parts as they are seen from above, and the bed for them."""
+def packed(outlines: Sequence[Footprint], names: Sequence[str], cell: float, beds: Beds) -> list[Spot]:
+    """Places of all parts, as close as they go together, in the middle of their beds.
 
-    masks: Sequence[NDArray[np.bool_]]  # cells that a part covers, [rows, columns], the first row in front
-    cell: float  # side of a cell, mm
-    bed: tuple[float, float] | None = None  # width and depth, mm; None for no limits
-    spacing: float = SPACING  # distance between parts, mm
-    turns: Sequence[int] = (0, 1, 2, 3)  # quarter turns that are tried
+    `cell`: side of the cells of the outlines, mm; `names`: of the parts, for errors.
 
-    def places(self) -> list[Spot | None]:
-        """Places of all parts, as close as they go together; None for those without room."""
-        if self.bed:
-            return self._centred(self._packed(self.bed))
-        sides = np.array([mask.shape for mask in self.masks]) * self.cell + self.spacing
-        side = max(math.sqrt(float(sides.prod(1).sum())), float(sides.max()))
-        while None in (found := self._packed((side, side))):
-            side *= ROOM
-        return self._centred(found)
-
-    @property
-    def _reach(self) -> int:
-        """Cells by which outlines grow, of which two then keep the distance between parts."""
-        return math.ceil(self.spacing / self.cell / 2)
-
-    def _packed(self, bed: tuple[float, float]) -> list[Spot | None]:
-        """Places on a bed, mm from its corner."""
-        reach = self._reach
-        columns, rows = (int(side / self.cell + 1e-6) + 2 * (reach + MARGIN) for side in bed)
-        full = np.zeros((rows, columns))
-        views = {id(mask): self._views(mask) for mask in self.masks}
-        spots: list[Spot | None] = [None] * len(self.masks)
-        for k in sorted(range(len(self.masks)), key=lambda k: (-self.masks[k].size, k)):
-            spectrum, choices = np.fft.rfft2(full), views[id(self.masks[k])]
-            found = [
-                (place, grown) for t, grown in choices if (place := _first_place(spectrum, full, grown, t))
-            ]
-            if not found:
-                choices.clear()  # nor is there room for another of these
-                continue
-            (end, left, turns), grown = min(found, key=lambda one: one[0])
-            height, width = grown.shape
-            full[end - height : end, left : left + width] += grown
-            middle = left + width / 2 - reach, end - height / 2 - reach
-            spots[k] = Spot(turns, (middle[0] * self.cell, middle[1] * self.cell))
-        return spots
-
-    def _views(self, mask: NDArray[np.bool_]) -> list[tuple[int, NDArray[np.bool_]]]:
-        """Grown outlines of an outline that is turned, without those that are like another."""
-        views = list[tuple[int, NDArray[np.bool_]]]()
-        for turns in self.turns:
-            grown = _grown(_turned(mask, turns), self._reach)
-            if not any(np.array_equal(grown, other) for _, other in views):
-                views.append((turns, grown))
-        return views
-
-    def _centred(self, spots: list[Spot | None]) -> list[Spot | None]:
-        """Places from the middle of what they take together."""
-        if not any(spots):
-            return spots
-        found = [(mask, spot) for mask, spot in zip(self.masks, spots, strict=True) if spot]
-        low, high = taken(found, self.cell)
-        middle = (low + high) / 2
-        return [spot and Spot(spot.turns, tuple((np.array(spot.middle) - middle).tolist())) for spot in spots]
-
-
-def _first_place(
-    spectrum: NDArray[np.complex128], full: NDArray[np.float64], grown: NDArray[np.bool_], turns: int
-) -> tuple[int, int, int] | None:
-    """Row behind the foremost place that is free for an outline, its first column, and the turns of that.
-
-    `spectrum`: of what is taken, `full`. None if there is no such place.
+    Raises
+    ------
+    SliceError
+        If they do not fit: which part does not, and how many do.
     """
-    rows, columns = (whole - own + 1 for whole, own in zip(full.shape, grown.shape, strict=True))
-    if rows < 1 or columns < 1:
-        return None
-    touched = np.fft.irfft2(spectrum * np.fft.rfft2(grown, full.shape).conj(), full.shape)
-    free = np.flatnonzero(touched[:rows, :columns] < 0.5)
-    return (int(free[0]) // columns + grown.shape[0], int(free[0]) % columns, turns) if len(free) else None
+    if beds.sides:
+        spots = _placed(outlines, cell, beds, beds.sides)
+    else:
+        sides = np.array([outline.mask.shape for outline in outlines]) * cell + beds.spacing
+        side = max(math.sqrt(float(sides.prod(1).sum())), float(sides.max()))
+        while None in (spots := _placed(outlines, cell, beds, (side, side))):
+            side *= ROOM
+    found = [spot for spot in spots if spot]
+    if len(found) < len(spots):
+        name = names[spots.index(None)]
+        raise SliceError(
+            f"{name}: no room for it on {beds.name} {beds.spacing:g} mm beside the others; {len(found)} of "
+            f"{len(spots)} parts fit: expected fewer parts, or a smaller size or spacing"
+        )
+    return _centred(outlines, found)
 
 
-def taken(
-    parts: Iterable[tuple[NDArray[np.bool_], Spot]], cell: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Opposite corners of what parts with these outlines take together, mm."""
-    sides = [(np.array(spot.middle), np.array(_turned(mask, spot.turns).shape[::-1])) for mask, spot in parts]
-    low = np.min([middle - cell * half / 2 for middle, half in sides], 0)
-    return low, np.max([middle + cell * half / 2 for middle, half in sides], 0)
+def _placed(
+    outlines: Sequence[Footprint], cell: float, beds: Beds, sides: tuple[float, float]
+) -> list[Spot | None]:
+    """Places on beds with sides, mm; None for parts without room."""
+    filled, spots = list[_Filled](), list[Spot | None]([None] * len(outlines))
+    views = {outline: _views(outline, cell, beds) for outline in dict.fromkeys(outlines)}
+    for k in sorted(range(len(outlines)), key=lambda k: (-outlines[k].mask.size, k)):
+        for number in range(len(filled) + 1):
+            if number == len(filled):
+                if number == beds.most:
+                    break
+                filled.append(_Filled.empty(sides, cell, _reach(cell, beds) + MARGIN))
+            if found := filled[number].put(views[outlines[k]]):
+                spots[k] = replace(found, bed=number)
+                break
+    return spots
 
 
-def _turned(mask: NDArray[np.bool_], turns: int) -> NDArray[np.bool_]:
-    """Outline turned counter-clockwise, as its first row is in front."""
-    return np.rot90(mask, -turns)
+def _reach(cell: float, beds: Beds) -> int:
+    """Cells by which outlines grow, of which two then keep the distance between parts."""
+    return math.ceil(beds.spacing / cell / 2)
+
+
+def _views(outline: Footprint, cell: float, beds: Beds) -> list[tuple[int, Footprint]]:
+    """Turns of an outline that are unlike each other, and its grown outlines."""
+    views = list[tuple[int, Footprint]]()
+    for turns in beds.turns:
+        turned = outline.turned(turns)
+        grown = Footprint(_grown(turned.mask, _reach(cell, beds)), turned.size)
+        if not any(np.array_equal(grown.mask, other.mask) for _, other in views):
+            views.append((turns, grown))
+    return views
+
+
+@dataclass(eq=False)
+class _Filled:
+    """A bed with what is taken on it."""
+
+    sides: tuple[float, float]  # mm
+    cell: float  # mm
+    taken: NDArray[np.float64]  # 1 where a grown outline is, [rows, columns]
+    spectrum: NDArray[np.complex128] | None = None  # of that; None if it is another by now
+    refused: set[int] = field(default_factory=set)  # identities of the views of parts without room
+
+    @classmethod
+    def empty(cls, sides: tuple[float, float], cell: float, beyond: int) -> _Filled:
+        """An empty bed, with cells beyond its edges on which only the space between parts may be."""
+        columns, rows = (2 * (math.ceil(side / cell / 2 - 1e-6) + beyond) for side in sides)
+        return cls(sides, cell, np.zeros((rows, columns)))
+
+    def put(self, views: list[tuple[int, Footprint]]) -> Spot | None:
+        """Place a part, turned as it gets farthest in front; None without room."""
+        if id(views) in self.refused:
+            return None
+        places = [(*at, turns, grown) for turns, grown in views if (at := self._first_place(grown.mask))]
+        if not places:
+            self.refused.add(id(views))
+            return None
+        end, left, turns, grown = min(places, key=lambda one: one[:3])
+        height, width = grown.mask.shape
+        self.taken[end - height : end, left : left + width] += grown.mask
+        self.spectrum = None
+        rows, columns = self.taken.shape
+        middle = (left + (width - columns) / 2) * self.cell, (end - (height + rows) / 2) * self.cell
+        room = [max(whole - own, 0.0) / 2 for whole, own in zip(self.sides, grown.size, strict=True)]
+        x, y = np.clip(middle, np.negative(room), room).tolist()  # a cell may reach beyond the edge
+        return Spot(turns, (x, y))
+
+    def _first_place(self, grown: NDArray[np.bool_]) -> tuple[int, int] | None:
+        """Row behind the foremost free place for an outline, and its first column; None without one."""
+        rows, columns = (whole - own + 1 for whole, own in zip(self.taken.shape, grown.shape, strict=True))
+        if rows < 1 or columns < 1:
+            return None
+        if self.spectrum is None:
+            self.spectrum = np.fft.rfft2(self.taken)
+        touched = np.fft.irfft2(
+            self.spectrum * np.fft.rfft2(grown, self.taken.shape).conj(), self.taken.shape
+        )
+        free = np.flatnonzero(touched[:rows, :columns] < 0.5)
+        return (int(free[0]) // columns + grown.shape[0], int(free[0]) % columns) if len(free) else None
+
+
+def _centred(outlines: Sequence[Footprint], spots: list[Spot]) -> list[Spot]:
+    """Places from the middle of what is taken on each bed."""
+    middles = {}
+    for bed in {spot.bed for spot in spots}:
+        here = [(outline, spot) for outline, spot in zip(outlines, spots, strict=True) if spot.bed == bed]
+        middles[bed] = np.mean(corners(*zip(*here, strict=True)), 0)
+    return [replace(s, middle=tuple((np.array(s.middle) - middles[s.bed]).tolist())) for s in spots]
+
+
+def corners(outlines: Sequence[Footprint], spots: Sequence[Spot]) -> NDArray[np.float64]:
+    """Opposite corners of what parts of a bed cover together, mm, float64 [2, 2]."""
+    halves = np.array(
+        [outline.turned(spot.turns).size for outline, spot in zip(outlines, spots, strict=True)]
+    )
+    middles = np.array([spot.middle for spot in spots])
+    return np.array([(middles - halves / 2).min(0), (middles + halves / 2).max(0)])
 
 
 def _grown(mask: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
@@ -163,10 +222,10 @@ def cell_for(bed: tuple[float, float] | None, sizes: Sequence[float]) -> float:
     return max(CELL, longest / ACROSS)
 
 
-def outline_of_layers(stack: Stack, cell: float, work: Work) -> NDArray[np.bool_]:
+def outline_of_layers(stack: Stack, cell: float, work: Work) -> Footprint:
     """Cells that any layer of an object covers, symmetric about the middle of its lattice, with a margin.
 
-    `cell` in mm. Returns bool [rows, columns].
+    `cell` in mm.
     """
     shape = [
         2 * math.ceil(n * side / cell / 2) + 2 for n, side in zip(stack.shape, stack.pixel[::-1], strict=True)
@@ -178,13 +237,13 @@ def outline_of_layers(stack: Stack, cell: float, work: Work) -> NDArray[np.bool_
     covered = np.zeros(shape, bool)
     for layer in Slicer(coarse, work).map(lambda layer: layer.coverage > 0, range(0, len(stack.z), every)):
         covered |= layer
-    return _cropped(covered)
+    return Footprint(_cropped(covered), stack.size[:2])
 
 
-def outline_of_mesh(mesh: Triangles, cell: float) -> NDArray[np.bool_]:
+def outline_of_mesh(mesh: Triangles, cell: float) -> Footprint:
     """Cells below the triangles of a mesh, symmetric about x = y = 0, with a margin.
 
-    `mesh`, `cell` in mm. Returns bool [rows, columns].
+    `mesh`, `cell` in mm.
     """
     corners = mesh.vertices[mesh.triangles][:, :, :2]
     half = np.abs(mesh.vertices[:, :2]).max(0)
@@ -194,13 +253,14 @@ def outline_of_mesh(mesh: Triangles, cell: float) -> NDArray[np.bool_]:
     parts = np.maximum(np.ceil(2 * longest / cell), 1).astype(int)
     for count in np.unique(parts):
         u, v = (grid.ravel() for grid in np.meshgrid(*2 * [np.arange(count + 1) / count]))
-        u, v = u[u + v <= 1 + 1e-9], v[u + v <= 1 + 1e-9]
-        of = corners[parts == count]
-        for a, b in zip(u.tolist(), v.tolist(), strict=True):
-            at = (1 - a - b) * of[:, 0] + a * of[:, 1] + b * of[:, 2]
-            column, row = (np.floor(at / cell) + (columns // 2, rows // 2)).astype(int).T
+        within, of = u + v <= 1 + 1e-9, corners[parts == count]
+        weights = np.stack([1 - u - v, u, v], 1)[within]
+        for some in np.array_split(weights, math.ceil(len(weights) * len(of) / AT_ONCE)):
+            at = sum(some[:, k, None, None] * of[:, k] for k in range(3))
+            column, row = (np.floor(at / cell) + (columns // 2, rows // 2)).astype(int).reshape(-1, 2).T
             covered[np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)] = True
-    return _cropped(covered)
+    width, depth = (2 * half).tolist()
+    return Footprint(_cropped(covered), (width, depth))
 
 
 def _cropped(covered: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -232,11 +292,11 @@ def plate_of(stacks: Sequence[Stack], spots: Sequence[Spot]) -> Stack:
     parts = tuple(replace(s, at=(s.at[0] + half_rows, s.at[1] + half_columns)) for s in standing)
     highest = max(stacks, key=lambda stack: len(stack.z))
     shape = 2 * half_rows, 2 * half_columns
-    field = PlateField(parts, shape)
+    whole = PlateField(parts, shape)
     heights = highest.heights
     size = 2 * max(-low[0], high[0]), 2 * max(-low[1], high[1]), max(stack.size[2] for stack in stacks)
     return Stack(
-        root=field,
+        root=whole,
         scale=1.0,
         corner=(-half_columns * across, -half_rows * along),
         pixel=(across, along),
@@ -244,12 +304,17 @@ def plate_of(stacks: Sequence[Stack], spots: Sequence[Spot]) -> Stack:
         z=highest.tops - heights / 2,
         tops=highest.tops,
         size=size,
-        outer=field.bounds.box,
-        notes=tuple(dict.fromkeys(note for stack in stacks for note in stack.notes)),
+        outer=whole.bounds.box,
+        notes=tuple(dict.fromkeys(note for stack in stacks for note in _notes(stack))),
         drains=tuple(drain for part in parts for drain in _drains(part, shape)),
         parts=parts,
         side=max(size),
     )
+
+
+def _notes(stack: Stack) -> tuple[str, ...]:
+    """Notes of a part, one on its supports among them."""
+    return (str(stack.supports), *stack.notes) if stack.supports else stack.notes
 
 
 def _drains(part: Standing, shape: tuple[int, int]) -> list[Drain]:
@@ -328,32 +393,3 @@ class _PlateKernel(Kernel):
             ]
             values = np.minimum(values, kernel.points(*own) * self.dtype.type(stack.scale))
         return values
-
-
-def packed(
-    masks: Sequence[NDArray[np.bool_]],
-    names: Sequence[str],
-    cell: float,
-    bed: tuple[float, float] | None,
-    spacing: float,
-    where: str,
-    turns: Sequence[int] = (0, 1, 2, 3),
-) -> list[Spot]:
-    """Places of all parts on a bed.
-
-    `masks`, `cell`, `bed`, `spacing`: as in `Outlines`; `where`: what the bed is called.
-
-    Raises
-    ------
-    SliceError
-        If they do not fit: which part does not, and how many do.
-    """
-    spots = Outlines(masks, cell, bed, spacing, turns).places()
-    found = [spot for spot in spots if spot]
-    if len(found) < len(spots):
-        name = names[spots.index(None)]
-        raise SliceError(
-            f"{name}: no room for it on {where} {spacing:g} mm beside the others; {len(found)} of "
-            f"{len(spots)} parts fit: expected fewer parts, or a smaller size or spacing"
-        )
-    return found

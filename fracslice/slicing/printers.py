@@ -5,7 +5,9 @@ sources.
 from __future__ import annotations
 
 import csv
+import math
 import re
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
@@ -145,6 +147,10 @@ class Resin:
     lift: float = attribute(Number, 5.0, "mm after each layer", above=0, most=100)
     lift_speed: float = attribute(Number, 65.0, "mm/min", above=0, most=10_000)  # speeds up and down, mm/min
     retract_speed: float = attribute(Number, 150.0, "mm/min", above=0, most=10_000)
+    # the first two of the layers with the least area; those with more have more of the former and less of the
+    # latter, down to the largest; 0 for the same of all
+    small_lift: float = attribute(Number, 0.0, "mm after the smallest layer", least=0, most=100)
+    small_lift_speed: float = attribute(Number, 0.0, "mm/min", least=0, most=10_000)
     # second stage of the lift, mm, and its speed, mm/min; none by default
     lift_2: float = attribute(Number, 0.0, "mm after each layer, behind lift", least=0, most=100)
     lift_speed_2: float = attribute(Number, 180.0, "mm/min", above=0, most=10_000)
@@ -155,14 +161,27 @@ class Resin:
     wait: float = attribute(Number, 0.5, "seconds before each layer", least=0, most=1000)
     wait_after: float = attribute(Number, 0.0, "seconds after each layer", least=0, most=1000)
     wait_lifted: float = attribute(Number, 0.0, "seconds after the lift", least=0, most=1000)
+    # working curve (Jacobs 1992): depth at which 1/e of the light is left, mm, and the exposure at which
+    # resin begins to cure, s; 0 for what was not measured
+    penetration: float = attribute(
+        Number, 0.0, "mm, depth at which 1/e of the light is left", least=0, most=10
+    )
+    critical: float = attribute(Number, 0.0, "seconds until resin begins to cure", least=0, most=1000)
     density: float = attribute(Number, 1.1, "g/ml", above=0, most=100)  # g/ml
     price: float = attribute(Number, 0.0, "of a litre", least=0)  # price of a litre
 
     def __post_init__(self) -> None:
         validate(self, ExportError)
-        if self.retract_2 > self.whole_lift:
-            most = f"at most the whole lift, {self.whole_lift:g} mm"
-            raise ExportError(f"retract_2 = {self.retract_2:g}: expected {most}")
+        least = (min(self.small_lift, self.lift) or self.lift) + self.lift_2
+        if self.retract_2 > least:
+            raise ExportError(
+                f"retract_2 = {self.retract_2:g}: expected at most the whole lift, {least:g} mm"
+            )
+        if self.small_lift > self.lift:
+            raise ExportError(f"small_lift = {self.small_lift:g}: expected at most lift, {self.lift:g} mm")
+        if 0 < self.small_lift_speed < self.lift_speed:
+            slowest = f"at least lift_speed, {self.lift_speed:g} mm/min"
+            raise ExportError(f"small_lift_speed = {self.small_lift_speed:g}: expected {slowest}")
 
     def overexposure(self, layers: int) -> tuple[float, ...]:
         """Share that the first layers have of what bottom layers are exposed longer than others, 1 to 0."""
@@ -185,6 +204,30 @@ class Resin:
         """All rests of a layer, s: what stands before a layer in formats without the others."""
         return self.wait + self.wait_after + self.wait_lifted
 
+    def cured_depth(self, exposure: float) -> float | None:
+        """Depth to which an exposure, s, cures, mm; None if the working curve is not known."""
+        if not self.penetration or not self.critical:
+            return None
+        return self.penetration * math.log(exposure / self.critical)
+
+    def excess(self, layer: float) -> float | None:
+        """Distance by which faces that look down are cured too deep, mm; None as for `cured_depth`.
+
+        It is that of a face below many layers, `layer` mm high, whose doses add up.
+        """
+        depth = self.cured_depth(self.exposure)
+        return depth and depth - self.penetration * math.log(math.expm1(layer / self.penetration))
+
+    def check_depth(self, layer: float) -> None:
+        """Raise `ExportError` for an exposure that does not reach through a layer, mm."""
+        depth = self.cured_depth(self.exposure)
+        if depth is not None and depth < layer:
+            least = self.critical * math.exp(layer / self.penetration)
+            raise ExportError(
+                f"an exposure of {self.exposure:g} s cures {max(depth, 0):.2g} mm, a layer is {layer:g} mm: "
+                f"expected at least {least:.3g} s"
+            )
+
     def exposures(self, layers: int) -> NDArray[np.float64]:
         """Exposure of each layer.
 
@@ -194,16 +237,44 @@ class Resin:
         share = np.clip(above / (self.transition_layers + 1), 0, 1)
         return self.bottom_exposure + share * (self.exposure - self.bottom_exposure)
 
-    def seconds(self, layers: int) -> float:
-        """Duration of a print, without the motion of a vat that tilts by itself."""
+    def of_layers(self, areas: NDArray[np.float64]) -> list[Resin]:
+        """Settings of each layer, by its area and that of the one before, mm2, float64 [layers].
+
+        Larger layers hold on to the film: they are lifted farther and more slowly (UVtools, "Dynamic lifts",
+        by the full range of areas). Bottom layers are lifted as the largest.
+        """
+        normal = areas[self.bottom_layers :]
+        if not (self.small_lift or self.small_lift_speed) or not len(normal):
+            return [self] * len(areas)
+        least, most = float(normal.min()), float(normal.max())
+        share = np.maximum(areas, np.concatenate([areas[:1], areas[:-1]]))
+        share = np.clip((share - least) / max(most - least, 1e-9), 0, 1)
+        share[: self.bottom_layers] = 1
+        lift, speed = self.small_lift or self.lift, self.small_lift_speed or self.lift_speed
+        ways = np.round(lift + share * (self.lift - lift), 1).tolist()
+        speeds = np.round(speed + share * (self.lift_speed - speed)).tolist()
+        known = {
+            both: replace(self, lift=both[0], lift_speed=both[1])
+            for both in set(zip(ways, speeds, strict=True))
+        }
+        return [known[both] for both in zip(ways, speeds, strict=True)]
+
+    @property
+    def motion(self) -> float:
+        """Duration of the motion after a layer, s; 0 for that of a vat that tilts by itself."""
         ways = (
             (self.lift, self.lift_speed),
             (self.lift_2, self.lift_speed_2),
             (self.retract, self.retract_speed),
             (self.retract_2, self.retract_speed_2),
         )
-        motion = sum(60 * way / speed for way, speed in ways) if self.lift > TILT else 0.0
-        return float(self.exposures(layers).sum() + layers * (motion + self.rest))
+        return sum(60 * way / speed for way, speed in ways) if self.lift > TILT else 0.0
+
+    def seconds(self, areas: NDArray[np.float64]) -> float:
+        """Duration of a print of layers with these areas, mm2, float64 [layers]."""
+        settings = Counter(self.of_layers(areas))
+        moved = sum(count * (own.motion + own.rest) for own, count in settings.items())
+        return float(self.exposures(len(areas)).sum() + moved)
 
 
 def resin(name: str, printer: Printer | None, layer: float) -> Resin:

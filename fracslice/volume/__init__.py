@@ -159,6 +159,8 @@ class Plan:
         Automatic depths, such as "mandelbulb 5".
     drains
         Drain holes.
+    undrilled
+        The object without its drain holes, if there are any.
     supports
         Supports, if there are any.
     proved
@@ -173,6 +175,7 @@ class Plan:
     notes: tuple[str, ...] = ()
     depths: tuple[str, ...] = ()
     drains: tuple[Drain, ...] = ()
+    undrilled: Field | None = None
     supports: Supports | None = None
     proved: bool = False
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import zipfile
 from pathlib import Path
 
@@ -78,6 +79,18 @@ def test_lib3mf_reads_a_plate_in_strict_mode(ball: Path, tmp_path: Path) -> None
     assert model.HasPackageThumbnailAttachment()
 
 
+def test_copies_of_a_mesh(ball: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Their amounts add up in the summary."""
+    path, given = tmp_path / "four.3mf", ["--material", "pla", "--price", "100", "--resolution", "16"]
+    assert run(["mesh", str(ball), "-o", str(path), "--copies", "4", "--threads", "1", *given]) == 0
+    first, _, _, one, *_ = capsys.readouterr().out.splitlines()
+    assert first.startswith(f"{path}: 4 parts, ")
+    volumes = [float(v) for v in re.findall(r"(\S+) ml", f"{first} {one}")]
+    assert volumes[0] == pytest.approx(4 * volumes[1], rel=1e-2)
+    assert float(first.split()[-1]) == pytest.approx(volumes[0] * 0.124, abs=0.02)
+    assert zipfile.ZipFile(path).read("3D/3dmodel.model").count(b"<item ") == 4
+
+
 @pytest.mark.parametrize(
     ("options", "reported"),
     [
@@ -86,7 +99,10 @@ def test_lib3mf_reads_a_plate_in_strict_mode(ball: Path, tmp_path: Path) -> None
         (["-o", "p.goo", *MARS, "--voxel", "1mm"], "--voxel: only for meshes"),
         (["-o", "p.goo", *MARS, "--layer", "0.1mm..0.5mm"], "layers of one height"),
         (["-o", "p.stl", "--layer", "1mm"], "--layer: only for layers"),
-        (["-o", "p.stl", "--bed", "60"], "'60': expected width, depth and height, such as 220x220x250mm"),
+        (
+            ["-o", "p.stl", "--bed", "60"],
+            "'60': expected three lengths such as 220x220x250mm, or",
+        ),
         (["-o", "p.stl", "--bed", "19x50mm"], "no room for it on the bed"),
         (["-o", "p.stl", "--bed", "50x50x10mm", "--resolution", "24"], " mm high, the bed has 10 mm"),
         (["-o", "p.stl", "--copies", "0"], "0 is not in the range"),

@@ -85,6 +85,39 @@ def test_a_slicer_gets_a_simplified_mesh_and_its_warnings_are_passed_on(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="programs are scripts")
+def test_each_bed_of_parts_has_a_file(ball: Path, installed: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Two halves that fill a bed each, without room for the pegs beside them; or copies on one bed."""
+    install(installed, "prusa-slicer", "--output", "model.3mf")
+    out = ball.with_name("ball.gcode")
+    coarse = "--voxel", "2.5mm", "--simplify", "0.5mm", "--threads", "1"
+    assert printed(ball, "-o", out, "--size", "40mm", "--bed", "42x21x42mm", *coarse) == 0
+    files = sorted(path.name for path in ball.parent.glob("*.gcode"))
+    assert files[:2] == ["ball-1.gcode", "ball-2.gcode"] and not out.exists()
+    shown = capfd.readouterr().out.splitlines()
+    assert [line.split(": ")[0].rpartition("/")[2] for line in shown[1:]] == files
+    assert printed(ball, "-o", out, "--copies", "3", *coarse) == 0
+    mesh = read_mesh(str(installed / "model.3mf"))
+    assert out.exists() and mesh.to_trimesh().body_count == 3
+
+
+@pytest.mark.parametrize(
+    ("options", "reported"),
+    [
+        (["--copies", "2", "--parts", "2x1x1"], "--copies: not with parts"),
+        (["--parts", "2x1x1", "--send", "prusalink://host"], "--send: expected one file"),
+        (["--parts", "2x1x1", "--heights", "0.1mm..0.2mm"], "--heights: not for copies or parts"),
+        (["--spacing", "1mm"], "--spacing: only for --copies"),
+    ],
+)
+def test_what_copies_and_parts_have_not_is_one_line(
+    options: list[str], reported: str, ball: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert printed(ball, "-o", ball.with_name("ball.gcode"), *options) == 2
+    error = capfd.readouterr().err
+    assert reported in error and error.count("\n") == 1
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="programs are scripts")
 def test_curaengine_reads_definitions_before_the_model(ball: Path, installed: Path) -> None:
     log = install(installed, "CuraEngine", "-o", "model.stl")
     profile, out = ball.with_name("my.json"), ball.with_name("x.gcode")

@@ -29,6 +29,7 @@ class Read:
     exposures: list[float]
     previews: list[np.ndarray] = field(default_factory=list)
     about: dict[str, Any] = field(default_factory=dict)
+    lifts: list[tuple[float, ...]] = field(default_factory=list)  # and speeds, of layers, mm and mm/min
 
 
 class Bytes:
@@ -81,6 +82,7 @@ def goo(data: bytes) -> Read:
     for _ in range(layers):
         _, _, top, seconds = file.get("H3f")
         read.about["layers"].append(file.get("12f"))
+        read.lifts.append(read.about["layers"][-1][4:6])
         file.get("H")
         file.expect(b"\r\n")
         (size,) = file.get("I")
@@ -131,7 +133,9 @@ def ctb(data: bytes) -> Read:
             if extra:
                 assert extra == 84
                 assert file.get("3f6I") == entries[number * layers + k]
-                assert file.get("I11f")[0] == extra + size
+                length, *moved = file.get("I11f")
+                assert length == extra + size
+                read.lifts.append((moved[0], moved[1]))
             data = file.raw(size)
             decode = decoders.rle7 if magic == 0x12FD0086 else decoders.rle1
             try:
@@ -175,6 +179,7 @@ def cxdlp(data: bytes) -> Read:
     for top, exposure, _, begin, size, *_ in entries:
         file.at = begin
         read.about["motion"] = file.get("11f")
+        read.lifts.append(read.about["motion"][:2])
         read.pictures.append(decoders.picture(decoders.rle7(file.raw(size - 44)), (rows, columns)))
         read.tops.append(top)
         read.exposures.append(exposure)
@@ -242,8 +247,9 @@ def photon(data: bytes) -> Read:
         assert (length, supports) == (48, 0)
     assert entries[0][0] == images == file.at
     top = 0.0
-    for begin, size, _, _, seconds, height, _, _ in entries:
+    for begin, size, lift, speed, seconds, height, _, _ in entries:
         file.at, top = begin, top + height
+        read.lifts.append((lift, 60 * speed))
         try:
             read.pictures.append(decoders.picture(decoders.rle4(file.raw(size)), (rows, columns)))
         except (AssertionError, IndexError):
@@ -271,6 +277,45 @@ def nanodlp(data: bytes) -> Read:
     tops = np.cumsum([layer["LayerHeight"] for layer in info]) / 1000
     about = {"volume": plate["TotalSolidArea"] / 1e6}
     return Read(pictures, tops.tolist(), plate["CureTimes"], [preview], about)
+
+
+def pwsz(data: bytes) -> Read:
+    """UVtools' description, as far as it reads: AnycubicZipFile.cs."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            if archive.testzip() is not None:
+                raise DamagedError
+            settings, layers, amounts = (
+                json.loads(archive.read(name))
+                for name in ("anycubic_photon_resins.pwsp", "layers_controller.conf", "print_info.json")
+            )
+            machine, resins = settings["machine_type"], settings["machine_extern"]
+            (active,) = (
+                one for one in resins["user_resins"] if one["property"]["name"] == resins["active_resins"][0]
+            )
+            shape = machine["res_y"], machine["res_x"]
+            coded = [archive.read(f"layer_images/layer_{k}.pw0Img") for k in range(layers["count"])]
+            scene = Bytes(archive.read("scene.slice"), "<")
+            previews = []
+            for k in range(3):
+                with Image.open(io.BytesIO(archive.read(f"preview_images/preview_{k}.png"))) as image:
+                    previews.append(np.asarray(image) >> 3)
+    except zipfile.BadZipFile:
+        raise DamagedError from None
+    pictures = [decoders.picture(decoders.rle4(one), shape) for one in coded]
+    assert scene.raw(16).rstrip(b"\0") == b"ANYCUBIC-PWSZ"
+    scene.raw(64)
+    assert scene.get("4IfI")[-1] == layers["count"]
+    box = scene.get("6f")
+    scene.raw(4 + 256)
+    scene.expect(b"<---")
+    extents = [scene.get("6fIf8I")[:8] for _ in range(*scene.get("I"))]
+    scene.expect(b"--->")
+    rows = layers["paras"]
+    tops = np.cumsum([row["layer_thickness"] for row in rows]).tolist()
+    about = {"volume": amounts["volume"], "resin": active, "box": box, "extents": extents}
+    lifts = [(row["zup_height"], 60 * row["zup_speed"]) for row in rows]
+    return Read(pictures, tops, [row["exposure_time"] for row in rows], previews, about, lifts)
 
 
 def sl1(data: bytes) -> Read:

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.ndimage import label
 
 from fracslice.errors import ExportError
 from fracslice.export.layers import (
@@ -28,7 +29,7 @@ from fracslice.export.layers import (
     write_slices,
 )
 from fracslice.export.slice_run import SliceRun
-from fracslice.formulas import difference, menger, sphere
+from fracslice.formulas import difference, menger, sphere, transform
 from fracslice.jobs.slices import StackModel
 from fracslice.scene import scene
 from fracslice.slicing import SliceJob, Slicer, adapted, plan_stack
@@ -59,6 +60,7 @@ READERS = {
     "pwmx": (readers.photon, quantised(4)),
     "nanodlp": (readers.nanodlp, lambda image: image),
     "cxdlpv4": (readers.cxdlp, lambda image: image >> 1),
+    "pwsz": (readers.pwsz, quantised(4)),
 }
 """Readers of the formats of known printers, and what a format keeps of a grey level."""
 
@@ -84,6 +86,7 @@ CASES = {
     "pm5 517": ("part.pm5", readers.photon, quantised(4)),
     "cxdlpv4": ("part.cxdlpv4", readers.cxdlp, lambda image: image >> 1),
     "nanodlp": ("part.nanodlp", readers.nanodlp, lambda image: image),
+    "pwsz": ("part.pwsz", readers.pwsz, quantised(4)),
 }
 
 
@@ -189,9 +192,54 @@ def test_a_lift_in_two_stages_and_all_rests(tmp_path: Path) -> None:
     for layer in about["layers"]:
         assert layer == pytest.approx((0, 0.5, 0.25, 1, 2, 40, 4, 180, *back, 1.5, 30)[: len(layer)])
     motion = 60 * (2 / 40 + 4 / 180 + 4.5 / slow.retract_speed + 1.5 / 30) + 1.75
-    assert slow.seconds(10) == pytest.approx(float(slow.exposures(10).sum()) + 10 * motion)
+    assert slow.seconds(np.ones(10)) == pytest.approx(float(slow.exposures(10).sum()) + 10 * motion)
     with pytest.raises(ExportError, match="retract_2 = 7: expected at most the whole lift, 6 mm"):
         replace(slow, retract_2=7)
+
+
+def test_larger_layers_are_lifted_farther_and_more_slowly(tmp_path: Path) -> None:
+    """By UVtools' full range, in files with a lift for each layer; the time is that of all lifts."""
+    resin = replace(
+        RESIN, bottom_layers=1, transition_layers=0, lift=6, lift_speed=40, small_lift=3, small_lift_speed=160
+    )
+    lifts = [(own.lift, own.lift_speed) for own in resin.of_layers(np.array([9, 4, 4, 1, 1, 3, 5.0]))]
+    assert lifts == [(6, 40), (6, 40), (5.2, 70), (5.2, 70), (3, 160), (4.5, 100), (6, 40)]
+    assert resin.of_layers(np.array([2.0, 2, 2]))[1:] == [replace(resin, lift=3, lift_speed=160)] * 2
+    for name in ("goo", "ctb 3", "pwma 516", "cxdlpv4", "pwsz"):
+        path, read, _ = CASES[name]
+        job = replace(run(int((name.split() + ["1"])[1])), resin=resin)
+        found = read(write_slices(job, tmp_path / path).read_bytes()).lifts
+        expected = [(own.lift, own.lift_speed) for own in resin.of_layers(_areas(job))]
+        assert np.array(found) == pytest.approx(np.array(expected)) and len(set(expected)) > 2
+    for values, reported in (
+        ({"small_lift": 7}, "small_lift = 7: expected at most lift, 6 mm"),
+        ({"small_lift_speed": 9}, "small_lift_speed = 9: expected at least lift_speed"),
+    ):
+        with pytest.raises(ExportError, match=reported):
+            replace(resin, **values)
+
+
+def _areas(job: SliceRun) -> np.ndarray:
+    return np.array([job.slicer.areas[k] for k in range(job.layers)])
+
+
+@pytest.mark.parametrize(("portrait", "mirror"), [(False, False), (False, True), (True, False), (True, True)])
+def test_extents_of_layers_in_a_pwsz_file(portrait: bool, mirror: bool, tmp_path: Path) -> None:
+    """As the pictures have them: places of their lit pixels, and the number of components."""
+    stack = plan_stack(difference(ROOT, transform(ROOT, translate=(0.3, 0.7, 0))), JOB)
+    machine = replace(MACHINE, portrait=portrait, mirror=mirror)
+    job = SliceRun(stack, Screen(stack, printer=machine), resin=RESIN, picture=picture)
+    about = readers.pwsz(write_slices(job, tmp_path / "part.pwsz").read_bytes())
+    assert len(about.pictures) == len(about.about["extents"]) == job.layers
+    for shown, (_, area, *corners, count, largest) in zip(
+        about.pictures, about.about["extents"], strict=True
+    ):
+        rows, columns = np.nonzero(shown >= 8)
+        found = [columns.min(), rows.min(), columns.max() + 1, rows.max() + 1]
+        middle = np.array(shown.shape[::-1]) / 2
+        assert np.array(corners) == pytest.approx((np.array(found) - [*middle, *middle]) * 0.25)
+        assert count == label(shown >= 8, np.ones((3, 3)))[1]
+        assert 0 < largest <= 1.5 * area
 
 
 def test_pictures_that_are_compensated(tmp_path: Path) -> None:
@@ -273,7 +321,7 @@ def test_photon_by_pyphotonfile(tmp_path: Path) -> None:
 def test_archives_are_those_of_zipfile() -> None:
     members = [("config.ini", b"a = 1\n"), ("thumbnail/a.png", bytes(range(256))), ("empty", b"")]
     ours, expected = io.BytesIO(), io.BytesIO()
-    archives._archive(ours, iter(members))
+    archives.write_archive(ours, iter(members))
     with zipfile.ZipFile(expected, "w") as archive:
         for name, data in members:
             archive.writestr(zipfile.ZipInfo(name), data)

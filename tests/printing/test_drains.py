@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fracslice.cli.main import run
 from scipy.ndimage import label
 
 from fracslice.errors import SceneError, VolumeError
 from fracslice.formulas import Node, box, cylinder, difference, gyroid, infill, sphere, transform
+from fracslice.mesh.models import read_mesh
 from fracslice.records import Print
 from fracslice.scene import read
 from fracslice.slicing import SliceJob, Slicer, Stack, plan_layers
@@ -104,6 +106,56 @@ def test_what_cannot_drain_is_noted() -> None:
     assert notes[0].startswith("1 space of 2.")
     assert "--drain-at auto" in notes[0]
     assert not planned(box(size=(SIDE,) * 3), hollow=2).notes
+
+
+def test_a_plug_is_what_a_hole_removed_less_the_clearance(tmp_path: Path) -> None:
+    """Of a shell, a pin between two spheres, upright, whichever way the hole leads; each in its file."""
+    shell = '<difference><sphere radius="12"/><sphere radius="9"/></difference>'
+    (tmp_path / "a.xml").write_text(f'<scene version="1"><solid unit="1mm">{shell}</solid></scene>')
+    given = [
+        "--drain",
+        "4mm",
+        "--plugs",
+        "--clearance",
+        "0.2mm",
+        "--resolution",
+        "24",
+        "--threads",
+        "1",
+        "-q",
+    ]
+    holes = ["--drain-at", "0,0,23,0,0,1", "--drain-at", "6.4,6.4,18,1,1,1"]
+    run(["mesh", str(tmp_path / "a.xml"), "-o", str(tmp_path / "a.stl"), *holes, *given])
+    caps = [(2 * np.pi / 3) * (r**3 - (r**2 - 1.8**2) ** 1.5) for r in (12, 9)]
+    for n in (1, 2):
+        plug = read_mesh(tmp_path / f"a-plug-{n}.stl")
+        assert plug.to_trimesh().is_watertight
+        assert plug.volume == pytest.approx(caps[0] - caps[1], rel=5e-3)
+        across = np.hypot(*plug.vertices[:, :2].T).max()
+        assert across == pytest.approx(1.8, abs=0.02) and plug.bounds[0][2] == pytest.approx(0, abs=1e-6)
+    assert not (tmp_path / "a-plug-3.stl").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "reported"),
+    [
+        ([], "plugs: expected drain holes, by drain_at or hollow"),
+        (["--drain-at", "auto", "--clearance", "1.5mm"], "less than half of the diameter of the drain holes"),
+        (["--hollow", "1mm", "--parts", "2x1x1"], "plugs and parts: expected one of them"),
+        (["--hollow", "1mm", "--picture", "a.png"], "--picture: not with --plugs"),
+    ],
+)
+def test_plugs_without_holes_are_refused(
+    options: list[str], reported: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    source = tmp_path / "a.xml"
+    shell = '<difference><sphere radius="6"/><sphere radius="4"/></difference>'
+    source.write_text(f'<scene version="1"><solid unit="1mm">{shell}</solid></scene>')
+    given = ["--plugs", "--resolution", "16", "--threads", "1", *options]
+    assert run(["mesh", str(source), "-o", str(tmp_path / "a.stl"), *given]) == 2
+    error = capfd.readouterr().err
+    assert reported in error and error.count("\n") == 1
+    assert list(tmp_path.iterdir()) == [source]
 
 
 @pytest.mark.parametrize(

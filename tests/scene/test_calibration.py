@@ -33,7 +33,7 @@ def layer_at(kind: str, z: float, pixel: float, *sizes: float) -> np.ndarray:
 def test_they_print_without_supports(kind: str) -> None:
     scene = calibration(kind, label="-2.5")
     assert reads(to_xml(scene)) == scene
-    job = SliceJob(layer=0.2, pixel=0.1)
+    job = SliceJob(layer=0.2, pixel=0.2)
     report = check_layers(plan_layers(scene.root, job, Work(1), sizing(scene)), work=Work(1))
     assert not [problem.kind for problem in report.problems]
 
@@ -68,6 +68,13 @@ def test_squares_meet_at_a_corner() -> None:
     assert made.sum() * 0.05**2 == pytest.approx(8 + np.pi * 0.1**2, rel=0.01)
 
 
+def test_bridges_are_as_thick_as_is_engraved() -> None:
+    """Areas of a section through the middle of the gap below, and of one through all bridges."""
+    low, high = (layer_at("depth", z, 0.1, 1.0, 1.5).sum() * 0.1**2 for z in (3.0, 4.5))
+    walls = 2 * 2 * (2 * 8 + 2)
+    assert (low, high) == pytest.approx((walls, 2 * 5 * 10), rel=0.01)
+
+
 def test_all_signs_of_a_display_differ() -> None:
     assert len({frozenset(segments) for segments in SEGMENTS.values()}) == len(SEGMENTS)
 
@@ -94,7 +101,7 @@ def test_the_command_writes_scenes_and_layers(
     coarse = ["--pixel", "0.2mm", "--layer", "0.5mm", "--threads", "1"]
     assert run(["calibrate", "exposure", "-o", "exposure.json", *coarse]) == 0
     for words, reported in (
-        (["wall", "-o", "w.xml"], "'wall': expected elephant-foot, exposure, tolerance, walls"),
+        (["wall", "-o", "w.xml"], "'wall': expected depth, elephant-foot, exposure, tolerance, walls"),
         (["walls", "-o", "w.xml", "--layer", "1mm"], "--layer: only for layers"),
         (["walls", "-o", "w.goo"], "needs --printer"),
     ):

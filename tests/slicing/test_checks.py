@@ -127,6 +127,14 @@ def test_cup_that_is_open_above_and_trap_that_is_open_below() -> None:
     assert trap.traps[0].area == pytest.approx(25, rel=0.03)
 
 
+@pytest.mark.parametrize(("depth", "count"), [(0.04, 0), (0.2, 1)])
+def test_a_film_of_resin_is_no_trap(depth: float, count: int) -> None:
+    """Two mm2 above the plate hold 0.8 or 4 mm3, for a limit of one."""
+    side = 0.1 * 2**0.5
+    report = checked(difference(CUBE, at(box(size=(side, side, 2 * depth)), 0, 0, -0.5)))
+    assert len(report.traps) == count
+
+
 @pytest.mark.parametrize(("depth", "count"), [(0.4, 0), (0.6, 1)])
 def test_cups_on_the_plate_count_when_they_are_deep(depth: float, count: int) -> None:
     """A hole through all, with a way out to the sides `depth` mm above the plate."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import zlib
 from dataclasses import replace
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 import pytest
@@ -19,7 +20,15 @@ from fracslice.scene import scene
 from fracslice.scene.model import to_xml
 from fracslice.slicing import SliceJob, Slicer, Stack, plan_layers
 from fracslice.slicing.layers import MeanSlicer
-from fracslice.slicing.packing import Spot, outline_of_layers, outline_of_mesh, packed, plate_of
+from fracslice.slicing.packing import (
+    Beds,
+    Footprint,
+    Spot,
+    outline_of_layers,
+    outline_of_mesh,
+    packed,
+    plate_of,
+)
 from fracslice.slicing.printers import PRINTERS, Printer
 from fracslice.slicing.raster import Screen
 from fracslice.work import Work
@@ -88,8 +97,8 @@ def test_a_mean_of_sections_is_that_of_the_parts() -> None:
 def test_parts_are_packed_apart_and_on_the_bed() -> None:
     """Measured on outlines finer than the cells of the packing."""
     part, work = stack_of(L_SHAPE), Work(1)
-    mask = outline_of_layers(part, 0.25, work)
-    spots = packed([mask] * 5, ["l"] * 5, 0.25, (22.0, 20.0), 1.5, "the bed")
+    outline = outline_of_layers(part, 0.25, work)
+    spots = packed([outline] * 5, ["l"] * 5, 0.25, Beds((22.0, 20.0), 1.5))
     whole = plate_of([part] * 5, spots)
     assert whole.size[0] <= 22
     assert whole.size[1] <= 20
@@ -103,11 +112,31 @@ def test_parts_are_packed_apart_and_on_the_bed() -> None:
         assert away.min() * 0.1 >= 1.5
 
 
+def test_beds_hold_what_lies_on_them() -> None:
+    """Rectangles of whose sizes no cell is a divisor, one as large as a bed."""
+    rng = np.random.default_rng(4)
+    sizes = [(110.3, 100.1), *map(tuple, rng.uniform(5, 60, (24, 2)).tolist())]
+    cell, bed = 0.5, (110.3, 100.1)
+    cells = [[2 * math.ceil(side / cell / 2 - 1e-9) + 2 for side in size] for size in sizes]
+    outlines = [Footprint(np.ones(n[::-1], bool), size) for n, size in zip(cells, sizes, strict=True)]
+    spots = packed(outlines, ["r"] * len(sizes), cell, Beds(bed, 3.0, most=None))
+    taken = []
+    for outline, spot in zip(outlines, spots, strict=True):
+        half = np.array(outline.turned(spot.turns).size) / 2
+        taken.append((spot.bed, spot.middle - half, spot.middle + half))
+        assert (abs(np.array(spot.middle)) + half <= np.array(bed) / 2 + 1e-9).all()
+    for (n, low, high), (m, lower, higher) in combinations(taken, 2):
+        assert n != m or max((lower - high).max(), (low - higher).max()) >= 3 - 1e-9
+    area = sum(w * d for w, d in sizes[1:])
+    assert 1 + max(spot.bed for spot in spots) <= 2 + math.ceil(1.6 * area / math.prod(bed))
+
+
 def test_outlines_of_meshes_are_those_of_layers() -> None:
     from fracslice import make_mesh
 
-    mask = outline_of_layers(stack_of(L_SHAPE), 0.25, Work(1))
-    mesh = outline_of_mesh(make_mesh(L_SHAPE, size=8, resolution=32, threads=1, chord="0.01mm"), 0.25)
+    mask = outline_of_layers(stack_of(L_SHAPE), 0.25, Work(1)).mask
+    made = make_mesh(L_SHAPE, size=8, resolution=32, threads=1, chord="0.01mm")
+    mesh = outline_of_mesh(made, 0.25).mask
     assert abs(np.array(mask.shape) - mesh.shape).max() <= 2
     assert abs(int(mask.sum()) - int(mesh.sum())) < 0.15 * mask.sum()
 

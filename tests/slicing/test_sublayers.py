@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,8 @@ from fracslice.export.layers import write_slices
 from fracslice.export.slice_run import SliceRun
 from fracslice.formulas import Node, box, intersection, transform
 from fracslice.slicing import SliceJob, Slicer, Stack, adapted, plan_stack
-from fracslice.slicing.layers import MeanSlicer
+from fracslice.slicing.layers import WHOLE, MeanSlicer, section_weights
+from fracslice.slicing.printers import PRINTERS, Resin
 from fracslice.slicing.raster import Screen
 from fracslice.work import Work
 
@@ -75,6 +77,57 @@ def test_chosen_layers_of_any_height_on_any_number_of_threads(stack: Stack) -> N
         some = list(slicer.map(screen.picture, [1, 3]))
         assert all((a == b).all() for a, b in zip(some, (made[-1][1], made[-1][3]), strict=True))
     assert all((a == b).all() for a, b in zip(*made, strict=True))
+
+
+def cured(doses: np.ndarray, layer: float, penetration: float, critical: float) -> np.ndarray:
+    """Height at which resin begins to be cured in columns, mm, by summed doses of layers of one height.
+
+    doses: of each layer from the lowest, by a whole one, [n, columns]; the light comes from above.
+    """
+    z = np.arange(0, len(doses) * layer, 1e-3)
+    total = np.zeros((len(z), doses.shape[1]))
+    for k, dose in enumerate(doses):
+        depth = (k + 1) * layer - z[:, None]
+        total += np.where(depth > 0, dose * np.exp(-np.maximum(depth, 0) / penetration), 0)
+    return z[(total >= critical).argmax(0)]
+
+
+def test_a_face_that_looks_down_is_cured_without_stairs() -> None:
+    """By the working curve of Jacobs 1992, within half a section; the offset of the face is the resin's."""
+    layer, n, resin = 0.1, 8, Resin(4.0, 30.0, penetration=0.08, critical=0.5)
+    face = np.linspace(0.9, 1.1, 81)  # its height in each column, among 30 layers
+    middles = (np.arange(30)[:, None] + (np.arange(n) + 0.5) / n) * layer
+    solid = middles[..., None] > face
+    errors = {}
+    for penetration in (resin.penetration, math.inf):
+        weights = np.array(section_weights(layer, n, penetration)) / WHOLE
+        doses = np.einsum("lsx,s->lx", solid, weights)
+        made = cured(doses, layer, resin.penetration, resin.critical / resin.exposure)
+        errors[penetration] = face - made - resin.excess(layer)
+    assert np.abs(errors[resin.penetration]).max() < layer / n / 2 + 2e-3
+    assert np.ptp(errors[math.inf]) > 1.5 * np.ptp(errors[resin.penetration])
+    assert sum(section_weights(layer, n, 0.08)) == sum(section_weights(layer, n, math.inf)) == WHOLE
+    assert section_weights(layer, 4, math.inf) == [WHOLE // 4] * 4
+
+
+def test_a_working_curve_weights_the_sections_of_layers(stack: Stack) -> None:
+    """Of a face that looks up, grey pixels get more light, walls the same."""
+    plain, more = (
+        list(MeanSlicer(stack, Work(), 4, p).map(lambda one: one.coverage)) for p in (math.inf, 0.5)
+    )
+    grey = [(a > 0) & (a < 255) for a in plain]
+    difference = np.concatenate([(b.astype(int) - a)[g] for a, b, g in zip(plain, more, grey, strict=True)])
+    assert difference.min() >= 0 and difference.max() > 20
+    assert all((b[a == v] == v).all() for a, b in zip(plain, more, strict=True) for v in (0, 255))
+
+
+def test_too_short_an_exposure_is_refused(stack: Stack, tmp_path: Path) -> None:
+    resin = Resin(1.0, 30.0, penetration=0.2, critical=0.5)
+    assert resin.cured_depth(resin.exposure) == pytest.approx(0.2 * np.log(2))
+    run = SliceRun(stack, Screen(stack, printer=PRINTERS["mars-5"]), resin=resin)
+    with pytest.raises(ExportError, match=r"1 s cures 0.14 mm, a layer is 0.5 mm: expected at least 6.09 s"):
+        write_slices(run, tmp_path / "a.goo")
+    assert not list(tmp_path.iterdir())
 
 
 def test_other_numbers_are_refused(stack: Stack) -> None:

@@ -85,10 +85,11 @@ def _preview(job: PrintData, wide: bool) -> bytes:
 
 def _layers(job: PrintData, first: int) -> bytes:
     places = accumulate(job.sizes, initial=first)
-    how = job.resin.whole_lift, job.resin.lift_speed / 60
     return b"".join(
-        _LAYER.pack(place, size, *how, float(exposure), float(height))
-        for place, size, exposure, height in zip(places, job.sizes, job.exposures, job.heights, strict=False)
+        _LAYER.pack(place, size, own.whole_lift, own.lift_speed / 60, float(exposure), float(height))
+        for place, size, own, exposure, height in zip(
+            places, job.sizes, job.resins, job.exposures, job.heights, strict=False
+        )
     )
 
 

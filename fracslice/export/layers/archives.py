@@ -53,21 +53,21 @@ def _assemble_sl1(job: PrintData, file: BinaryIO) -> None:
         "prusaslicer.ini": _ini(_settings(job)),
     }
     previews = {
-        f"thumbnail/thumbnail{width}x{height}.png": _preview(job, width, height)
+        f"thumbnail/thumbnail{width}x{height}.png": preview_png(job, width, height)
         for width, height in SL1_PREVIEWS
     }
     layers = ((f"{job.name}{k:05d}.png", data) for k, data in enumerate(job))
-    _archive(file, chain(about.items(), previews.items(), layers))
+    write_archive(file, chain(about.items(), previews.items(), layers))
 
 
 def _assemble_nanodlp(job: PrintData, file: BinaryIO) -> None:
     """Write the members that docs.nanodlp.com/manual/format lists."""
     about = {f"{name}.json": _json(values) for name, values in _plate(job).items()}
-    about["3d.png"] = _preview(job, *NANODLP_PREVIEW)
-    _archive(file, chain(about.items(), ((f"{k}.png", data) for k, data in enumerate(job, 1))))
+    about["3d.png"] = preview_png(job, *NANODLP_PREVIEW)
+    write_archive(file, chain(about.items(), ((f"{k}.png", data) for k, data in enumerate(job, 1))))
 
 
-def _archive(file: BinaryIO, members: Iterator[tuple[str, bytes]]) -> None:
+def write_archive(file: BinaryIO, members: Iterator[tuple[str, bytes]]) -> None:
     """Write members that are not compressed and carry no time.
 
     ZipFile.writestr gives the same bytes; its checksum is slower, and it goes back to each header.
@@ -84,7 +84,8 @@ def _archive(file: BinaryIO, members: Iterator[tuple[str, bytes]]) -> None:
             archive.start_dir += len(header) + len(data)
 
 
-def _preview(job: PrintData, width: int, height: int) -> bytes:
+def preview_png(job: PrintData, width: int, height: int) -> bytes:
+    """Picture of the object, as PNG."""
     file = io.BytesIO()
     write_png(file, (height, width, 3), [job.preview(width, height)], 8, {}, job.run.work, level=1)
     return file.getvalue()

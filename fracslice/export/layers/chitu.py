@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..._slices import Encoding
 from ...slicing import Layer
+from ...slicing.printers import Resin
 from ..layer_formats import ADDRESSED, PrintData, PrintFormat, pixel_format, rgb15_runs
 from ..slice_run import SliceRun
 
@@ -88,9 +89,9 @@ def _write(
         file.write(_PREVIEW.pack(width, height, at + _PREVIEW.size, len(preview)) + preview)
     file.write(_motion(job) + _slicer(job, magic, version, len(sizes), machine, len(name)) + name)
     file.writelines(entries)
-    for entry, picture in zip(entries, data, strict=False):
+    for index, (entry, picture) in enumerate(zip(entries, data, strict=False)):
         if extra:
-            file.write(entry + _layer_motion(job, extra + len(picture)))
+            file.write(entry + _layer_motion(job.resins[index], extra + len(picture)))
         file.write(picture)
 
 
@@ -122,8 +123,7 @@ def _timing(job: PrintData, layer: int) -> tuple[float, float, float]:
     return float(job.tops[layer]), float(job.exposures[layer]), job.resin.rest
 
 
-def _layer_motion(job: PrintData, size: int) -> bytes:
-    resin = job.resin
+def _layer_motion(resin: Resin, size: int) -> bytes:
     return _LAYER_MOTION.pack(
         size, resin.whole_lift, resin.lift_speed, 0, 0, resin.retract_speed, *(0,) * 5, 255
     )

@@ -13,6 +13,7 @@ from typing import BinaryIO
 from isal.isal_zlib import crc32
 
 from ..._slices import Encoding
+from ...slicing.printers import Resin
 from ..layer_formats import ADDRESSED, PrintData, pixel_format, rgb15_runs, second_stages
 
 MAGIC = b"CXSW3DV2\0"
@@ -41,9 +42,8 @@ def _assemble(job: PrintData, file: BinaryIO) -> None:
         file.write(data)
 
     write(_before_pictures(job))
-    motion = _layer_motion(job)
-    for picture in job:
-        write(motion + picture)
+    for own, picture in zip(job.resins, job, strict=True):
+        write(_layer_motion(own) + picture)
     file.write(struct.pack(">I", checksum ^ 0xFFFFFFFF))
 
 
@@ -106,9 +106,8 @@ def _layers(job: PrintData, first: int) -> bytes:
     )
 
 
-def _layer_motion(job: PrintData) -> bytes:
+def _layer_motion(resin: Resin) -> bytes:
     """Motion of a layer, before its picture."""
-    resin = job.resin
     up, up_speed, down, down_speed = second_stages(resin)
     lift = resin.whole_lift, resin.lift_speed, up, up_speed
     rests = resin.wait_after, resin.wait_lifted, resin.wait

@@ -66,7 +66,7 @@ def _settings(job: PrintData) -> bytes:
 
 
 def _layer(job: PrintData, index: int, size: int) -> bytes:
-    resin = job.resin
+    resin = job.resins[index]
     return _LAYER.pack(
         *(0, 0, float(job.tops[index]), float(job.exposures[index]), 0, *_rests(resin)),
         *(resin.lift, resin.lift_speed, *second_stages(resin)[:2]),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise, product
 from typing import TYPE_CHECKING
@@ -19,15 +19,15 @@ from numpy.typing import NDArray
 from ..common.parameters import Sides
 from ..errors import SceneError
 from ..fields.box import Box, Triple
+from ..fields.field import Field
 from ..fields.registry import Node
 from ..formulas import box as cuboid
-from ..formulas import cylinder, difference, intersection, plane, transform, union
-from ..records import PartsJob, Placed
-from ..scene.calibration import SEGMENTS
+from ..formulas import cylinder, intersection, plane, transform, union
+from ..records import PartsJob
+from ..scene.calibration import bars
+from ..volume import Plan
 from ..work import Work
-from . import with_depths
-from .amount import orient_field, sizing
-from .extent import extent
+from .edits import edited_field
 
 if TYPE_CHECKING:
     from ..scene import Scene
@@ -62,7 +62,7 @@ Mask = NDArray[np.bool_]
 class CutPart:
     """A part of a divided object."""
 
-    scene: Scene
+    root: Field
     cell: tuple[int, int, int]  # where it is along each axis
     number: int | None  # engraved in it; None if there is no place for that
 
@@ -96,17 +96,17 @@ class Divided:
         return scene(cylinder(radius=self.diameter / 2, height=self.length), unit=1.0, name="peg")
 
 
-def divide(scene: Scene, how: PartsJob, placed: Placed, work: Work | None = None) -> Divided:
+def divide(planned: Plan, scale: float, how: PartsJob, work: Work | None = None) -> Divided:
     """Divide an object into parts.
 
     Parameters
     ----------
-    scene
-        The scene.
+    planned
+        The object.
+    scale
+        mm per scene unit.
     how
         The bed, the number of parts, and the clearance around pegs.
-    placed
-        Size and orientation of the whole object.
     work
         Execution settings.
 
@@ -114,15 +114,8 @@ def divide(scene: Scene, how: PartsJob, placed: Placed, work: Work | None = None
     ------
     SceneError
         If the parts do not fit the bed, or are too many.
-    VolumeError
-        For an empty solid, or one without an end.
     """
-    work = work or Work()
-    sized = sizing(scene, placed.size, placed.scale, work)
-    root = orient_field(with_depths(scene.root, work), placed.up, sized.stretch, work).tree
-    assert root is not None
-    box = extent(root, work).box
-    whole = _Whole(root, box, sized.scale(box), work)
+    whole = _Whole(planned.root, planned.box, scale, work or Work())
     counts = _counts(whole.sides, how)
     step = max(whole.sides) / ACROSS
     solid = whole.inside(*(np.arange(step / 2, side, step) for side in whole.sides))
@@ -131,14 +124,14 @@ def divide(scene: Scene, how: PartsJob, placed: Placed, work: Work | None = None
         for axis in range(3)
     ]
     joints = [_Joint(whole, axis, n, cuts) for axis in range(3) for n in range(len(cuts[axis]))]
-    return _Division(scene, whole, cuts, joints, how.clearance, _filled(solid, step, cuts)).made()
+    return _Division(whole, cuts, joints, how.clearance, _filled(solid, step, cuts)).made()
 
 
 @dataclass(frozen=True)
 class _Whole:
     """The object that is divided."""
 
-    root: Node
+    root: Field
     box: Box  # scene units
     unit: float  # mm per scene unit
     work: Work
@@ -383,7 +376,6 @@ def _spread(
 class _Division:
     """What the parts are made of."""
 
-    of: Scene
     whole: _Whole
     cuts: Sequence[Sequence[float]]
     joints: list[_Joint]
@@ -411,7 +403,7 @@ class _Division:
         self, cell: tuple[int, int, int], number: int, pegs: list[Peg], diameter: float, length: float
     ) -> CutPart:
         """A cell of the object, with holes and its number."""
-        whole, unit = self.whole, self.whole.unit
+        whole = self.whole
         own = [peg for peg in pegs if cell in peg.cells]
         holes = [self.hole(peg, diameter, length) for peg in own]
         spot = self.number(cell, number, own, diameter / 2 + self.clearance + WALL)
@@ -422,11 +414,10 @@ class _Division:
             for axis in range(3)
             for sign, at in self.limits(axis, cell[axis])
         ]
-        solid = intersection(whole.root, *limits) if limits else whole.root
-        cut = [*holes, *(spot or [])]
-        root = difference(solid, union(*cut) if len(cut) > 1 else cut[0]) if cut else solid
-        made = replace(self.of, root=root, size_mm=None, unit_mm=unit)
-        return CutPart(made, cell, number if spot else None)
+        root = edited_field(whole.root, "keep", intersection(*limits)) if limits else whole.root
+        if cut := [*holes, *(spot or [])]:
+            root = edited_field(root, "cut", union(*cut))
+        return CutPart(root, cell, number if spot else None)
 
     def limits(self, axis: int, index: int) -> Iterator[tuple[int, float]]:
         """Signs and places of the planes around a cell."""
@@ -466,56 +457,9 @@ class _Division:
         up = np.eye(3)[1 if axis == 2 else 2]
         normal = outward * np.eye(3)[axis]
         right = np.cross(up, normal)
-        wide, bar, pitch = 0.5 * height, height / 7, 0.8 * height
-        for n, digit in enumerate(text):
-            start = (n - (len(text) - 1) / 2) * pitch
-            for segment in SEGMENTS[digit]:
-                u, v, across, along = _bar(segment, wide, height, bar)
-                size = np.abs(right) * across + np.abs(up) * along + np.abs(normal) * (DEPTH + OVER)
-                at = middle + (start + u) * right + v * up - (DEPTH - OVER) / 2 * normal
-                made = cuboid(size=(size / self.whole.unit).tolist())
-                yield transform(made, translate=self.whole.scene_point(at.tolist()))
-
-
-def _bar(segment: str, wide: float, height: float, bar: float) -> tuple[float, float, float, float]:
-    """Middle and sizes of a segment of a digit."""
-    if segment in "adg":
-        return 0.0, {"a": 1, "d": -1, "g": 0}[segment] * (height - bar) / 2, wide, bar
-    side = 1 if segment in "bc" else -1
-    half = (height + bar) / 2
-    return side * (wide - bar) / 2, (1 if segment in "bf" else -1) * (height - half) / 2, bar, half
-
-
-GAP, BED_TO_BED = 5.0, 1.2
-"""Distance between parts on a bed, and of beds by their width, as in Bambu Studio and OrcaSlicer."""
-
-
-def laid_out(sizes: Sequence[tuple[float, float]], bed: Triple | None) -> list[tuple[int, float, float]]:
-    """Bed of each part, and its low corner there: in rows, the deepest first. Without a bed, one row.
-
-    `sizes`: along x and y.
-    """
-    width, depth = bed[:2] if bed else (math.inf, math.inf)
-    places: list[tuple[int, float, float]] = [(0, 0.0, 0.0)] * len(sizes)
-    rows, ends = list[_Row](), list[float]()
-    for index in sorted(range(len(sizes)), key=lambda k: (-sizes[k][1], -sizes[k][0], k)):
-        across, along = sizes[index]
-        row = next((row for row in rows if row.end + across <= width), None)
-        if row is None:
-            number = next((n for n, end in enumerate(ends) if end + along <= depth), len(ends))
-            ends += [0.0] * (number == len(ends))
-            row = _Row(number, ends[number])
-            rows.append(row)
-            ends[number] += along + GAP
-        places[index] = row.bed, row.end, row.start
-        row.end += across + GAP
-    return places
-
-
-@dataclass
-class _Row:
-    """A row of parts on a bed, of which the first is the deepest."""
-
-    bed: int
-    start: float  # along y
-    end: float = 0.0  # along x
+        stroke = height / 7
+        for u, v, across, along in bars(text, height - stroke, stroke):
+            size = np.abs(right) * across + np.abs(up) * along + np.abs(normal) * (DEPTH + OVER)
+            at = middle + u * right + v * up - (DEPTH - OVER) / 2 * normal
+            made = cuboid(size=(size / self.whole.unit).tolist())
+            yield transform(made, translate=self.whole.scene_point(at.tolist()))

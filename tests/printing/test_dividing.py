@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -10,20 +9,21 @@ import pytest
 from fracslice.cli.main import run
 
 from fracslice.errors import SceneError
-from fracslice.formulas import box, cylinder, difference, transform, union
+from fracslice.formulas import Node, box, cylinder, difference, transform, union
 from fracslice.jobs.divided import make_parts, write_parts
+from fracslice.jobs.plates import BED_TO_BED
 from fracslice.mesh.models import read_mesh
-from fracslice.records import MeshJob, PartsJob
-from fracslice.scene import Scene, scene
-from fracslice.volume.dividing import (
-    BED_TO_BED,
+from fracslice.printing.dividing import (
     DEPTH,
     SPARE,
+    Divided,
     _Division,
     _Whole,
     divide,
-    laid_out,
 )
+from fracslice.records import MeshJob, PartsJob, Print
+from fracslice.scene import scene
+from fracslice.volume import plan
 from fracslice.work import Work
 
 pytestmark = pytest.mark.once
@@ -31,14 +31,15 @@ pytestmark = pytest.mark.once
 BLOCK = difference(box(size=(120, 60, 40)), cylinder(radius=15, height=100))
 
 
-def block() -> Scene:
-    return scene(BLOCK, unit=1.0)
+def divided(root: Node, how: PartsJob) -> Divided:
+    """Parts of a scene in mm."""
+    return divide(plan(root, 128), 1.0, how)
 
 
 def test_parts_are_solids_that_add_up(tmp_path: Path) -> None:
     """But for the holes of pegs, of which two are chosen, and for the numbers."""
     solid = scene(box(size=(60, 30, 20)), unit=1.0)
-    made = make_parts(solid, MeshJob(voxel="0.8mm", chord="0.005mm"), PartsJob(parts="2x1x1", clearance=0.2))
+    made = make_parts(solid, MeshJob(voxel="1.2mm", chord="0.01mm"), PartsJob(parts="2x1x1", clearance=0.2))
     divided = made.divided
     assert len(divided.pegs) == 2 and divided.diameter == 8 and divided.bare == 0
     assert [(part.cell, part.number) for part in divided.parts] == [((0, 0, 0), 1), ((1, 0, 0), 2)]
@@ -48,7 +49,7 @@ def test_parts_are_solids_that_add_up(tmp_path: Path) -> None:
     bar, wide = height / 7, height / 2
     one, two = bar * height, 3 * wide * bar + 2 * bar * ((height + bar) / 2 - 1.5 * bar)
     made_of = sum(mesh.volume for mesh in made.meshes)
-    assert made_of == pytest.approx(60 * 30 * 20 - holes - DEPTH * (one + two), abs=4.0)
+    assert made_of == pytest.approx(60 * 30 * 20 - holes - DEPTH * (one + two), abs=6.0)
     ends = sorted(float(mesh.size[0]) for mesh in made.meshes)
     assert sum(ends) == pytest.approx(60, rel=1e-6)
     write_parts(made, tmp_path / "a.3mf", {}, Work())
@@ -58,16 +59,27 @@ def test_parts_are_solids_that_add_up(tmp_path: Path) -> None:
     assert made.peg.volume == pytest.approx(np.pi * 16 * divided.length, rel=2e-3)
 
 
+def test_the_whole_is_changed_for_printing_before_it_is_cut() -> None:
+    """A bar whose base is cut off: its parts add up to it, but for the holes of pegs."""
+    solid = scene(box(size=(24, 24, 61)), unit=1.0)
+    made = make_parts(solid, MeshJob(voxel="3mm", printing=Print(base=1.0)), PartsJob(parts="1x1x2"))
+    pegs = made.divided.pegs
+    holes = len(pegs) * np.pi * (made.divided.diameter / 2 + 0.15) ** 2 * (made.divided.length + 2 * SPARE)
+    assert sum(mesh.volume for mesh in made.meshes) == pytest.approx(24 * 24 * 60 - holes, rel=2e-3)
+    assert sum(float(mesh.size[2]) for mesh in made.meshes) == pytest.approx(60, abs=1e-3)
+
+
 def test_pegs_have_holes_with_their_clearance_on_both_sides() -> None:
-    divided = divide(block(), PartsJob(parts="2x1x1", clearance="0.2mm"), MeshJob())
-    for part in divided.parts:
-        side = 1 if part.cell[0] else -1
-        for peg in divided.pegs:
-            middle = np.array(peg.middle) + divided.low
+    made = divided(BLOCK, PartsJob(parts="2x1x1", clearance="0.2mm"))
+    for part in made.parts:
+        side, solid = 1 if part.cell[0] else -1, part.root.tree
+        assert solid is not None
+        for peg in made.pegs:
+            middle = np.array(peg.middle) + made.low
             within, around = (middle + np.array([side * 8, r, 0]) for r in (4.15, 4.25))
-            assert part.scene.root.distance(within) > 0 > part.scene.root.distance(around)
+            assert solid.distance(within) > 0 > solid.distance(around)
             deep = [middle + np.array([side * x, 0, 0]) for x in (10.4, 10.6)]
-            assert part.scene.root.distance(deep[0]) > 0 > part.scene.root.distance(deep[1])
+            assert solid.distance(deep[0]) > 0 > solid.distance(deep[1])
 
 
 def test_a_plane_passes_thin_things_by() -> None:
@@ -76,8 +88,7 @@ def test_a_plane_passes_thin_things_by() -> None:
     blocks = [transform(box(size=(30, 50, 30)), translate=(x, 0, 0)) for x in (-25, 35)]
     bar = transform(box(size=(20, 12, 12)), translate=(10, 0, 0))
     bridge = transform(box(size=(12, 12, 12)), translate=(-4, 0, 0))
-    shape = scene(union(*rods, *blocks, bar, bridge), unit=1.0)
-    (peg, *_) = divide(shape, PartsJob(parts="2x1x1"), MeshJob()).pegs
+    (peg, *_) = divided(union(*rods, *blocks, bar, bridge), PartsJob(parts="2x1x1")).pegs
     at = peg.middle[0] - 40  # from the middle of the box, in scene units
     assert -40 < at < -13 or 23 < at < 50
 
@@ -86,7 +97,7 @@ def test_a_plane_passes_thin_things_by() -> None:
 @pytest.mark.parametrize("above", [False, True])
 def test_numbers_are_read_from_outside(axis: int, above: bool) -> None:
     whole = _Whole(BLOCK, BLOCK.bounds.box, 1.0, Work())
-    division = _Division(block(), whole, [[], [], []], [], 0.15, [])
+    division = _Division(whole, [[], [], []], [], 0.15, [])
     middle = (60.0, 30.0, 20.0)
     bars = union(*division.digits("2", middle, axis, above, 7.0))
     outward = (-1.0 if above else 1.0) * np.eye(3)[axis]
@@ -102,17 +113,6 @@ def test_numbers_are_read_from_outside(axis: int, above: bool) -> None:
     assert found == set("abed")
 
 
-def test_beds_hold_what_lies_on_them() -> None:
-    rng = np.random.default_rng(4)
-    sizes = [tuple(size) for size in rng.uniform(5, 110, (60, 2)).tolist()]
-    places = laid_out(sizes, (220.0, 200.0, 50.0))
-    for (number, x, y), (w, d) in zip(places, sizes, strict=True):
-        assert 0 <= x <= 220 - w and 0 <= y <= 200 - d and number >= 0
-    for ((n, x, y), (w, d)), ((m, u, v), (a, b)) in combinations(zip(places, sizes, strict=True), 2):
-        assert n != m or x + w < u or u + a < x or y + d < v or v + b < y
-    assert max(n for n, _, _ in places) + 1 < 1.5 * sum(w * d for w, d in sizes) / (220 * 200) + 1
-
-
 def test_the_command_writes_beds_or_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -120,7 +120,7 @@ def test_the_command_writes_beds_or_files(
     Path("a.xml").write_text('<scene version="1"><solid unit="1mm"><box size="50 30 20"/></solid></scene>')
     assert run(["mesh", "a.xml", "-o", "a.3mf", "--bed", "30x35x25mm", "--voxel", "1mm"]) == 0
     shown = capfd.readouterr().out.splitlines()
-    assert shown[0].startswith("a.3mf, part 1: ") and shown[-2:] == [
+    assert shown[0].startswith("a.3mf, part 1: ") and shown[-3:-1] == [
         "2 pegs, 8 mm thick, 20 mm long",
         "3 beds",
     ]
@@ -148,7 +148,7 @@ def test_the_command_writes_beds_or_files(
         ("--parts 2x2", "'2x2': expected auto or parts along x, y and z, such as 2x1x1"),
         ("--parts 8x1x1", "8 parts along x, each 6.25 mm long: expected at least 10 mm, for pegs"),
         ("--parts 5x5x5", "5 x 5 x 5 parts: expected at most 64"),
-        ("--parts 2x1x1 --base 1mm", "parts: expected no changes for printing"),
+        ("--parts 2x1x1 --supports light", "parts: expected no supports"),
         ("--parts 2x1x1 --colour material", "--colour: not for an object in parts"),
     ],
 )
