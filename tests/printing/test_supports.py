@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 import zlib
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from scipy.ndimage import distance_transform_edt, label
 
 from fracslice import MeshJob, make_mesh, slice_layers
@@ -26,7 +28,8 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.jobs.mesh import make_implicit
+from fracslice.jobs.mesh import make_apart, make_implicit
+from fracslice.jobs.plates import write_bodies
 from fracslice.printing.pillars import Object, Room, steps_from
 from fracslice.scene import Print, scene
 from fracslice.slicing import SliceJob, Slicer, Stack, plan_stack
@@ -194,6 +197,24 @@ def test_mesh_is_one_solid() -> None:
     coarse = make_mesh(scene(MUSHROOM, unit=1), MeshJob(voxel=0.4, printing=job.printing), Work(threads=1))
     assert any("tips of 0.8 mm" in note for note in coarse.report.notes)  # two voxels
     assert coarse.report.mesh.components == 1
+
+
+def test_a_body_of_its_own_stands_where_it_belongs(tmp_path: Path) -> None:
+    solid, job = scene(MUSHROOM, unit=1), MeshJob(voxel=0.4, printing=Print(supports="heavy"))
+    made = make_apart(solid, job, Work(threads=1))
+    whole = make_mesh(solid, job, Work(threads=1)).mesh
+    assert [note.startswith("supports: ") for one in made for note in one.report.notes[:1]] == [True]
+    (file,) = write_bodies(made, ("object", "supports"), tmp_path / "o.3mf", {}, Work(threads=1))
+    bodies = trimesh.load(file)
+    assert list(bodies.geometry) == ["object", "supports"]
+    parts = bodies.dump()
+    assert all(part.is_watertight for part in parts)
+    joined = trimesh.boolean.union(parts, engine="manifold")
+    assert joined.volume == pytest.approx(whole.volume, rel=2e-3)
+    assert joined.bounds[:, 2] == pytest.approx(whole.bounds[:, 2], abs=1e-3)
+    assert len(write_bodies(made, ("object", "supports"), tmp_path / "o.stl", {}, Work(threads=1))) == 2
+    with pytest.raises(SceneError, match="expected supports"):
+        make_apart(solid, MeshJob(voxel=0.4), Work(threads=1))
 
 
 def test_the_same_with_any_number_of_threads() -> None:
