@@ -367,7 +367,7 @@ def make_and_write(scene: Scene, given: MeshFileOptions, work: Work) -> Result:
     if picture is not None:
         from fracslice.viewer import picture as draw
 
-        shown = result.mesh
+        shown = result.shown
         if shown.filaments is not None:
             from fracslice.mesh.filaments import painted_mesh
 

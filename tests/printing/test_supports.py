@@ -122,8 +122,15 @@ def test_a_cone_on_its_tip_is_held_beside_it() -> None:
 
 
 def test_a_mesh_has_the_size_of_object_and_supports() -> None:
-    report = make_mesh(MUSHROOM, resolution=96, supports="medium", threads=1).report
+    made = make_mesh(MUSHROOM, resolution=96, supports="medium", threads=1)
+    report, high = made.report, made.vertices[:, 2] > 10.0
     assert not [note for note in report.notes if "finer than the samples" in note] and report.problems == ()
+    colours = made.shown.colours
+    assert colours is not None and made.colours is None
+    assert (
+        len(np.unique(colours[high], axis=0)) == 2
+        and len(np.unique(colours[made.vertices[:, 2] < 1], axis=0)) == 1
+    )
 
 
 def test_what_hangs_in_a_cavity_is_caught() -> None:
