@@ -168,12 +168,8 @@ def models(given: SlicerOptions, scene: Scene, job: MeshJob, path: Path, work: W
         laid, made, names = parts.laid_out, parts.meshes, [name for name, _, _ in parts.named]
     elif given.copies > 1:
         one = make_mesh(scene, job, work)
-        sides = Beds(spacing=given.spacing)
-        laid, made, names = (
-            lay_out([one.mesh], [0] * given.copies, [scene.name] * given.copies, sides),
-            [one],
-            [scene.name],
-        )
+        made, names = [one], [scene.name]
+        laid = lay_out([one.mesh], [0] * given.copies, names * given.copies, Beds(spacing=given.spacing))
     else:
         report = make_mesh(scene, job, work, path=path).report
         return Models([path], report.mesh.triangles, list(report.problems))
@@ -212,10 +208,10 @@ def expected_time(triangles: int, title: str) -> str:
     """Line on the time that the slicer takes."""
     from fracslice.export.sending import SECONDS
 
-    many = (
-        f"; expected at most {MOST:,}: a larger --voxel or --simplify, or --faces" if triangles > MOST else ""
-    )
-    return f"{triangles:,} triangles: {title} takes about {duration(triangles * SECONDS)}{many}"
+    line = f"{triangles:,} triangles: {title} takes about {duration(triangles * SECONDS)}"
+    if triangles > MOST:
+        line += f"; expected at most {MOST:,}: a larger --voxel or --simplify, or --faces"
+    return line
 
 
 def figure_texts(figures: Figures) -> Iterator[str]:

@@ -44,12 +44,12 @@ def studio(given: StudioOptions) -> None:
     if reason := lacking("trame", "the studio needs"):
         raise RenderError(reason)
     from fracslice.studio.page import Page
-    from fracslice.studio.session import Studio
+    from fracslice.studio.session import Session
 
     if given.host not in ("127.0.0.1", "localhost", "::1"):
         click.echo(f"anyone who reaches {given.host} and knows the token can use this studio", err=True)
     with given.working() as work:
-        made = Studio(given.source, Path.cwd(), work, given.device, given.allow_files_outside)
+        made = Session(given.source, Path.cwd(), work, given.device, given.allow_files_outside)
         try:
             Page(made).serve(given.host, given.port, given.browser, click.echo)
         finally:

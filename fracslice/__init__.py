@@ -82,6 +82,7 @@ _WHERE = {
     "Result": "jobs.report",
     "Scene": "scene",
     "Slices": "api.calls",
+    "Studio": "studio.notebook",
     "Work": "work",
     "__version__": "version",
     "from_function": "volume.level_sets",

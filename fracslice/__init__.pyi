@@ -99,6 +99,7 @@ from .scene import reads as reads
 from .scene import to_xml as to_xml
 from .scene.view import Camera as Camera
 from .scene.view import Light as Light
+from .studio.notebook import Studio as Studio
 from .version import __version__ as __version__
 from .volume.level_sets import from_function as from_function
 from .volume.level_sets import from_grid as from_grid

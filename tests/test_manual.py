@@ -149,7 +149,7 @@ def test_commands_are_understood(line: str, folder: Path, monkeypatch, capfd) ->
     ):
         monkeypatch.setattr(f"fracslice.{work}", begin)
     monkeypatch.setattr("fracslice.viewer.show", begin)
-    monkeypatch.setattr("fracslice.studio.session.Studio", begin)
+    monkeypatch.setattr("fracslice.studio.session.Session", begin)
     monkeypatch.setattr("shutil.which", lambda name: name)
     monkeypatch.setattr("fracslice.export.slicer_profiles.Shipped.write", lambda *_: [])
     monkeypatch.setattr("fracslice.viewer.need_screen", lambda: None)

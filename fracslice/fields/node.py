@@ -396,6 +396,19 @@ class Operators:
 
         return normals(cast("Node", self), *points)
 
+    def show(self) -> Any:
+        """Show the shape in a notebook, with sliders for all of its numbers.
+
+        Returns
+        -------
+        Studio or Node
+            `fracslice.Studio` of the shape; the shape itself, which is shown as a picture, where the extra
+            `studio` is not installed.
+        """
+        from ..studio.notebook import show
+
+        return show(cast("Node", self))
+
     def _repr_html_(self) -> str:
         """Picture and elements, for a notebook."""
         from ..api.calls import page

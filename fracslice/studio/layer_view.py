@@ -138,20 +138,19 @@ class PrintLayers:
 
     def _print(self, report: PrintReport | None) -> list[tuple[str, str]]:
         """Resin, time and cost."""
-        volume, about = (report.volume, "") if report else (self._estimate(), "about ")
-        resin, ml = self.resin or START, volume / 1000
+        areas, about = (np.array(report.areas), "") if report else (self._estimate(), "about ")
+        resin, ml = self.resin or START, float(areas @ self.stack.heights) / 1000
         rows = [("resin", f"{about}{significant(ml)} ml, {significant(ml * resin.density)} g")]
         if self.resin:
-            rows.append(("time", duration(resin.seconds(len(self)))))
+            rows.append(("time", duration(resin.seconds(areas))))
         if resin.price:
             rows.append(("cost", f"{about}{ml / 1000 * resin.price:.2f}"))
         return rows
 
-    def _estimate(self) -> float:
-        """Volume by the layers that were looked at, mm3."""
+    def _estimate(self) -> NDArray[np.float64]:
+        """Areas of the layers, by those that were looked at, mm2."""
         known = sorted(self.areas)
-        areas = np.interp(np.arange(len(self)), known, [self.areas[k] for k in known])
-        return float(areas @ self.stack.heights)
+        return np.interp(np.arange(len(self)), known, [self.areas[k] for k in known])
 
     def picture(
         self, seen: LayerImage, window: Window, size: Size, at: tuple[float, float] | None = None

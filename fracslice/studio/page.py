@@ -6,6 +6,7 @@ import asyncio
 import math
 import os
 import secrets
+import threading
 import time
 import webbrowser
 from collections.abc import Awaitable, Callable
@@ -24,7 +25,7 @@ from ..viewer.viewer import MOVES, PACES, Controls
 from . import panels
 from .film_page import HEIGHT, FilmPanel
 from .inside_page import InsidePanel
-from .session import FILMS, PRINT_ENDINGS, Studio, jpeg
+from .session import FILMS, PRINT_ENDINGS, Session, jpeg
 from .sheets import SheetPanel, embedded
 from .widgets import named, named_by, number_field
 
@@ -80,7 +81,7 @@ class Frames:
 
     area_name = AREA
 
-    def __init__(self, studio: Studio, act: Callable[[str], None]) -> None:
+    def __init__(self, studio: Session, act: Callable[[str], None]) -> None:
         self._studio, self._act = studio, act
         self._streamer: Any = None
         self._sent: object = None
@@ -176,7 +177,7 @@ class Frames:
 class Page:
     """The page and what it does."""
 
-    def __init__(self, studio: Studio) -> None:
+    def __init__(self, studio: Session) -> None:
         self.studio, self.token = studio, secrets.token_urlsafe(24)
         self.server = get_server(f"fracslice-{self.token[:8]}", client_type="vue3")
         self.state, self.ctrl = self.server.state, self.server.controller
@@ -414,22 +415,43 @@ class Page:
         """Serve the page until it is interrupted; `say` is given its address."""
 
         def ready(**_: Any) -> None:
-            name = "127.0.0.1" if host in ("localhost", "0.0.0.0", "::") else host
-            address = f"http://{name}:{self.server.port}/index.html?secret={self.token}"
+            address = self._address(host)
             say(address)
             if browser:
                 webbrowser.open(address)
 
         self.ctrl.on_server_ready.add(ready)
+        self._start(host, port)
+
+    def serve_in_background(self, host: str = "127.0.0.1") -> str:
+        """Serve the page in a thread while the program runs; return its address."""
+        ready = threading.Event()
+        self.ctrl.on_server_ready.add(lambda **_: ready.set())
+
+        async def serve() -> None:
+            await self._start(host, 0, exec_mode="coroutine", thread=True)
+
+        # the loop of a notebook is not ours to wait in
+        thread = threading.Thread(target=asyncio.run, args=(serve(),), name="fracslice studio", daemon=True)
+        thread.start()
+        ready.wait()
+        return self._address(host)
+
+    def _address(self, host: str) -> str:
+        name = "127.0.0.1" if host in ("localhost", "0.0.0.0", "::") else host
+        return f"http://{name}:{self.server.port}/index.html?secret={self.token}"
+
+    def _start(self, host: str, port: int, **how: Any) -> Any:
         os.environ["TRAME_ARGS"] = f"--authKey={self.token}"  # instead of this program's own arguments
         os.environ["WSLINK_READY_MSG"] = ""
-        self.server.start(
+        return self.server.start(
             port=port,
             host=host,
             open_browser=False,
             show_connection_info=False,
             disable_logging=True,
             timeout=0,
+            **how,
         )
 
     def build(self) -> None:

@@ -151,13 +151,13 @@ class Job:
         self.stage, self.share = stage, share
 
 
-class Studio:
+class Session:
     """A scene that is looked at, changed and made. Call `close` at the end.
 
     Parameters
     ----------
-    source : str
-        Scene file, model file, or name of a shipped scene.
+    source : str or Document
+        Scene file, model file, or name of a shipped scene; or a document.
     folder : Path
         Folder below which files are written.
     work : Work, optional
@@ -175,7 +175,7 @@ class Studio:
 
     def __init__(
         self,
-        source: str,
+        source: str | Document,
         folder: Path,
         work: Work | None = None,
         device: str = "auto",
@@ -183,7 +183,12 @@ class Studio:
     ) -> None:
         self.folder, self._work, self._files_outside = folder, work or Work(), files_outside
         self._seed, self._drawn, self._device = secrets.randbits(32), 0, device
-        self.document, self.target = opened(source, folder, files_outside)
+        if isinstance(source, Document):
+            self.document, self.target = source, folder / source.path.name
+        else:
+            self.document, self.target = opened(source, folder, files_outside)
+        self.listeners: list[Callable[[Scene], object]] = []
+        self._told = self.document.scene
         self.bookmarks = Bookmarks(self.target)
         self._scene = Latest(self.document.scene)
         self.live = Live(self._scene, work=self._work, device=device)
@@ -328,7 +333,15 @@ class Studio:
             change(*arguments)
         except SceneError as error:
             self.message = str(error)
+        self._tell()
         self._show()
+
+    def _tell(self) -> None:
+        """Tell those who listen of another scene."""
+        if self.document.scene is not self._told:
+            self._told = self.document.scene
+            for act in self.listeners:
+                act(self._told)
 
     def _show(self) -> None:
         """Show the scene as it is now, at the time of its film, cut open if it is to be."""

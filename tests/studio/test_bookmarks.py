@@ -13,7 +13,7 @@ from fracslice.errors import SceneError
 from fracslice.formulas import Node, box, mandelbulb, menger, sphere, transform, union
 from fracslice.scene import read
 from fracslice.studio.bookmarks import between, is_worth_a_look
-from fracslice.studio.session import Studio
+from fracslice.studio.session import Session
 from fracslice.work import Work
 
 pytestmark = pytest.mark.once
@@ -29,9 +29,9 @@ BALL = (0, 0)
 
 
 @pytest.fixture
-def studio(tmp_path: Path) -> Iterator[Studio]:
+def studio(tmp_path: Path) -> Iterator[Session]:
     (tmp_path / "ball.xml").write_text(TEXT)
-    studio = Studio(str(tmp_path / "ball.xml"), tmp_path, Work(threads=1), "cpu")
+    studio = Session(str(tmp_path / "ball.xml"), tmp_path, Work(threads=1), "cpu")
     studio.live.resize((24, 16))
     yield studio
     studio.close()
@@ -45,7 +45,7 @@ def within(holds: Callable[[], bool], seconds: float = 60) -> None:
         time.sleep(0.01)
 
 
-def test_a_bookmark_is_a_scene_that_is_returned_to(studio: Studio, tmp_path: Path) -> None:
+def test_a_bookmark_is_a_scene_that_is_returned_to(studio: Session, tmp_path: Path) -> None:
     seen = studio.live.camera
     studio.bookmark()
     assert studio.bookmarks.names == ["001"]
@@ -65,7 +65,7 @@ def test_a_bookmark_is_a_scene_that_is_returned_to(studio: Studio, tmp_path: Pat
     assert "expected one of the bookmarks (none)" in studio.message
 
 
-def test_numbers_are_mixed_in_the_text(studio: Studio) -> None:
+def test_numbers_are_mixed_in_the_text(studio: Session) -> None:
     studio.bookmark()
     studio.set_number(BALL, "radius", 0, 3)
     first = replace(studio.document.scene, view=replace(studio.document.scene.view, camera=studio.live.aim))
@@ -105,7 +105,7 @@ def test_a_ball_and_a_block_are_no_surprise(root: Node, worth: bool) -> None:
     assert is_worth_a_look(root) == worth
 
 
-def test_a_surprise_is_opened(studio: Studio) -> None:
+def test_a_surprise_is_opened(studio: Session) -> None:
     studio.surprise()
     assert studio.document.path.stem != "ball" and not studio.document.problem
     assert is_worth_a_look(studio.document.scene.root)

@@ -18,7 +18,7 @@ from fracslice.studio.inside import Inside
 from fracslice.studio.layer_view import HANGS, ISLAND
 from fracslice.studio.measuring import Mark, Overlay, Tracer, angle, circle, readout
 from fracslice.studio.measuring import sphere as best_sphere
-from fracslice.studio.session import Studio
+from fracslice.studio.session import Session
 from fracslice.studio.solid import MEASURES, SceneSolid, legend
 from fracslice.work import Work
 
@@ -40,21 +40,21 @@ WORK = Work(threads=1)
 
 
 @pytest.fixture
-def studio(tmp_path: Path) -> Iterator[Studio]:
+def studio(tmp_path: Path) -> Iterator[Session]:
     (tmp_path / "two.xml").write_text(SCENE)
-    studio = Studio(str(tmp_path / "two.xml"), tmp_path, WORK, "cpu")
+    studio = Session(str(tmp_path / "two.xml"), tmp_path, WORK, "cpu")
     studio.live.resize((96, 64))
     yield studio
     studio.close()
 
 
 @pytest.fixture
-def inside(studio: Studio) -> Inside:
+def inside(studio: Session) -> Inside:
     studio.inside.fineness = 24.0
     return studio.inside
 
 
-def done(studio: Studio) -> str:
+def done(studio: Session) -> str:
     """What the last job says, once it is done."""
     within(lambda: studio.job is not None and studio.job.is_done)
     assert studio.job
@@ -65,7 +65,7 @@ def rows(pairs: list[tuple[str, str]]) -> dict[str, str]:
     return dict(pairs)
 
 
-def test_the_mesh_is_shown_and_cut_open(studio: Studio, inside: Inside) -> None:
+def test_the_mesh_is_shown_and_cut_open(studio: Session, inside: Inside) -> None:
     inside.show("mesh")
     assert "triangles" in done(studio)
     figures = rows(inside.told["figures"])
@@ -79,7 +79,7 @@ def test_the_mesh_is_shown_and_cut_open(studio: Studio, inside: Inside) -> None:
     within(lambda: not (studio.shown.pixels == SECTION).all(2).any())
 
 
-def test_a_mesh_of_an_earlier_scene_is_said_to_be(studio: Studio, inside: Inside) -> None:
+def test_a_mesh_of_an_earlier_scene_is_said_to_be(studio: Session, inside: Inside) -> None:
     inside.show("mesh")
     done(studio)
     assert not inside.told["stale"]
@@ -87,7 +87,7 @@ def test_a_mesh_of_an_earlier_scene_is_said_to_be(studio: Studio, inside: Inside
     assert inside.told["stale"]
 
 
-def test_print_edits_are_written_and_compared(studio: Studio, inside: Inside) -> None:
+def test_print_edits_are_written_and_compared(studio: Session, inside: Inside) -> None:
     inside.edit("base", "1mm")
     inside.edit("drain", "2mm")
     assert '<print base="1mm" drain="2mm"/>' in studio.document.text
@@ -107,7 +107,7 @@ def test_print_edits_are_written_and_compared(studio: Studio, inside: Inside) ->
     assert before == pytest.approx(0.472, rel=0.02) and after < 0.9 * before
 
 
-def test_layers_show_islands_in_the_pixels_of_a_printer(studio: Studio, inside: Inside) -> None:
+def test_layers_show_islands_in_the_pixels_of_a_printer(studio: Session, inside: Inside) -> None:
     inside.printer = "sl1s"
     inside.show("layers")
     inside.plan("sl1s", 0.5)
@@ -131,7 +131,7 @@ def test_layers_show_islands_in_the_pixels_of_a_printer(studio: Studio, inside: 
     within(lambda: not (studio.shown.pixels > 100).all(2).any())
 
 
-def test_layers_are_written_for_the_printer(studio: Studio, inside: Inside, tmp_path: Path) -> None:
+def test_layers_are_written_for_the_printer(studio: Session, inside: Inside, tmp_path: Path) -> None:
     with pytest.raises(SceneError, match=r"two\.sl1: choose the printer"):
         studio.start("two.sl1", {})
     inside.printer, inside.layer = "sl1s", 0.5
@@ -144,7 +144,7 @@ def test_layers_are_written_for_the_printer(studio: Studio, inside: Inside, tmp_
         assert sum(name.endswith(".png") and "thumbnail" not in name for name in file.namelist()) == 18
 
 
-def test_a_check_lists_problems_and_flies_to_them(studio: Studio, inside: Inside) -> None:
+def test_a_check_lists_problems_and_flies_to_them(studio: Session, inside: Inside) -> None:
     inside.layer = 0.5
     inside.check()
     assert done(studio) == "would not print"
@@ -166,7 +166,7 @@ def test_a_check_lists_problems_and_flies_to_them(studio: Studio, inside: Inside
     assert f'{name}="{value}"' in studio.document.text
 
 
-def test_points_of_the_field_are_measured(studio: Studio, inside: Inside) -> None:
+def test_points_of_the_field_are_measured(studio: Session, inside: Inside) -> None:
     studio.live.look(Camera(eye=(0.0, -40.0, 0.0), target=(0.0, 0.0, 0.0), fov=30))
     within(lambda: studio.shown.camera.eye == (0.0, -40.0, 0.0))
     inside.pick((48, 32))
@@ -184,7 +184,7 @@ def test_points_of_the_field_are_measured(studio: Studio, inside: Inside) -> Non
     assert (inside.over(studio.shown) != marked).any() and len(inside.overlay.marks) == 12
 
 
-def test_points_of_a_mesh_are_measured(studio: Studio, inside: Inside) -> None:
+def test_points_of_a_mesh_are_measured(studio: Session, inside: Inside) -> None:
     inside.show("mesh")
     done(studio)
     studio.live.look(Camera(eye=(0.0, -40.0, 0.0), target=(0.0, 0.0, 0.0), fov=30))
@@ -196,7 +196,7 @@ def test_points_of_a_mesh_are_measured(studio: Studio, inside: Inside) -> None:
     assert inside.hovered.endswith("mm") and "-5.0" in inside.hovered
 
 
-def test_all_is_forgotten(studio: Studio, inside: Inside) -> None:
+def test_all_is_forgotten(studio: Session, inside: Inside) -> None:
     inside.show("mesh")
     done(studio)
     inside.release()

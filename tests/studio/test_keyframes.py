@@ -14,7 +14,7 @@ from fracslice.errors import SceneError
 from fracslice.scene.view import Camera
 from fracslice.studio import keyframes
 from fracslice.studio.document import Document
-from fracslice.studio.session import Studio
+from fracslice.studio.session import Session
 from fracslice.work import Work
 
 pytestmark = pytest.mark.once
@@ -91,15 +91,15 @@ def test_what_fails_halfway_is_not_done(document: Document) -> None:
 
 
 @pytest.fixture
-def studio(tmp_path: Path) -> Iterator[Studio]:
+def studio(tmp_path: Path) -> Iterator[Session]:
     (tmp_path / "two.xml").write_text(TEXT)
-    studio = Studio(str(tmp_path / "two.xml"), tmp_path, Work(threads=1), "cpu")
+    studio = Session(str(tmp_path / "two.xml"), tmp_path, Work(threads=1), "cpu")
     studio.live.resize((24, 16))
     yield studio
     studio.close()
 
 
-def test_a_number_that_moves_is_changed_at_its_time(studio: Studio) -> None:
+def test_a_number_that_moves_is_changed_at_its_time(studio: Session) -> None:
     place = (0, 1)
     keyframes.set_keys(studio.document, 0.0, {"sphere[2].radius": "1"})
     keyframes.set_keys(studio.document, 2.0, {"sphere[2].radius": "3"})
@@ -115,7 +115,7 @@ def test_a_number_that_moves_is_changed_at_its_time(studio: Studio) -> None:
     assert studio.document.scene.root.children[1]["radius"] == 4.0
 
 
-def test_a_film_plays_to_its_end(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_film_plays_to_its_end(studio: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     clock = SimpleNamespace(now=10.0)
     monkeypatch.setattr(keyframes, "time", SimpleNamespace(monotonic=lambda: clock.now))
     keyframes.key_view(studio.document, 0.0, CAMERA)
@@ -131,7 +131,7 @@ def test_a_film_plays_to_its_end(studio: Studio, monkeypatch: pytest.MonkeyPatch
         time.sleep(0.01)
 
 
-def test_a_flight_becomes_the_film(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_flight_becomes_the_film(studio: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     clock = SimpleNamespace(now=0.0)
     monkeypatch.setattr(keyframes, "time", SimpleNamespace(monotonic=lambda: clock.now))
     studio.record()

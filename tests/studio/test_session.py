@@ -20,7 +20,7 @@ from fracslice.scene import read
 from fracslice.scene.layout import registered_formulas
 from fracslice.studio import panels
 from fracslice.studio.document import required
-from fracslice.studio.session import Studio, loosened
+from fracslice.studio.session import Session, loosened
 from fracslice.work import Work
 
 pytestmark = pytest.mark.once
@@ -36,9 +36,9 @@ BALL = (0, 0)
 
 
 @pytest.fixture
-def studio(tmp_path: Path) -> Iterator[Studio]:
+def studio(tmp_path: Path) -> Iterator[Session]:
     (tmp_path / "ball.xml").write_text(TEXT)
-    studio = Studio(str(tmp_path / "ball.xml"), tmp_path, Work(threads=1), "cpu")
+    studio = Session(str(tmp_path / "ball.xml"), tmp_path, Work(threads=1), "cpu")
     studio.live.resize((48, 32))
     yield studio
     studio.close()
@@ -52,13 +52,13 @@ def within(holds: Callable[[], bool], seconds: float = 60) -> None:
         time.sleep(0.01)
 
 
-def rest(studio: Studio) -> np.ndarray:
+def rest(studio: Session) -> np.ndarray:
     """The picture with all of its samples."""
     within(lambda: studio.shown.samples == 2 and studio.shown.camera == studio.live.aim)
     return studio.shown.pixels
 
 
-def test_an_edit_is_seen_and_undone(studio: Studio) -> None:
+def test_an_edit_is_seen_and_undone(studio: Session) -> None:
     before = rest(studio)
     studio.set_number(BALL, "radius", 0, 3)
     within(lambda: studio.live.scene.root == sphere(radius=3.0))
@@ -69,14 +69,14 @@ def test_an_edit_is_seen_and_undone(studio: Studio) -> None:
     np.testing.assert_array_equal(rest(studio), before)
 
 
-def test_what_cannot_be_done_is_said(studio: Studio) -> None:
+def test_what_cannot_be_done_is_said(studio: Session) -> None:
     studio.edit(studio.document.remove, ())
     assert "expected an element" in studio.message
     studio.edit(studio.document.set_value, BALL, "radius", "x")
     assert "radius" in studio.document.problem and studio.document.scene.root == sphere(radius=5.0)
 
 
-def test_the_camera_turns_around_its_target_and_is_kept(studio: Studio) -> None:
+def test_the_camera_turns_around_its_target_and_is_kept(studio: Session) -> None:
     first = studio.live.aim
     studio.views.orbit(120, 40)
     studio.views.approach(3)
@@ -93,7 +93,7 @@ def test_the_camera_turns_around_its_target_and_is_kept(studio: Studio) -> None:
     assert studio.document.is_saved and studio.document.text.count("<camera") == 1
 
 
-def test_files_are_made_in_the_folder_alone(studio: Studio, tmp_path: Path) -> None:
+def test_files_are_made_in_the_folder_alone(studio: Session, tmp_path: Path) -> None:
     studio.start("ball.stl", {"resolution": 24.0})
     within(lambda: studio.job is not None and studio.job.is_done)
     assert studio.job and studio.job.result.startswith("ball.stl")
@@ -106,7 +106,7 @@ def test_files_are_made_in_the_folder_alone(studio: Studio, tmp_path: Path) -> N
             studio.start(name, {})
 
 
-def test_a_job_is_cancelled_without_a_file(studio: Studio, tmp_path: Path) -> None:
+def test_a_job_is_cancelled_without_a_file(studio: Session, tmp_path: Path) -> None:
     studio.start("ball.stl", {"resolution": 900.0})
     assert studio.job
     studio.start("other.stl", {})
@@ -118,7 +118,7 @@ def test_a_job_is_cancelled_without_a_file(studio: Studio, tmp_path: Path) -> No
 
 def test_a_model_is_a_scene_of_its_own(tmp_path: Path) -> None:
     trimesh.creation.box((4, 5, 6)).export(tmp_path / "block.stl")
-    studio = Studio(str(tmp_path / "block.stl"), tmp_path, Work(threads=1), "cpu")
+    studio = Session(str(tmp_path / "block.stl"), tmp_path, Work(threads=1), "cpu")
     try:
         assert studio.document.scene.root.formula.name == "model" and studio.document.scene.name == "block"
         studio.edit(studio.document.wrap, BALL, "shell")
@@ -129,7 +129,7 @@ def test_a_model_is_a_scene_of_its_own(tmp_path: Path) -> None:
         studio.close()
 
 
-def test_random_numbers_keep_the_text(studio: Studio) -> None:
+def test_random_numbers_keep_the_text(studio: Session) -> None:
     for root, picture in studio.variations(0.5, 3):
         assert picture.shape == (150, 200, 3) and np.ptp(picture) > 50
         studio.take(root)
@@ -138,7 +138,7 @@ def test_random_numbers_keep_the_text(studio: Studio) -> None:
     assert studio.document.text == TEXT.replace('"5"', f'"{radius}"')
 
 
-def test_a_section_cuts_the_picture_and_not_the_file(studio: Studio) -> None:
+def test_a_section_cuts_the_picture_and_not_the_file(studio: Session) -> None:
     whole = rest(studio)
     studio.cut("z", 0.5)
     within(lambda: studio.live.scene.root.formula.name == "intersection")
@@ -167,7 +167,7 @@ def test_no_power_is_compiled_by_itself() -> None:
     assert loosened(sphere(radius=2.0)) == sphere(radius=2.0)
 
 
-def test_controls_follow_from_the_registry(studio: Studio) -> None:
+def test_controls_follow_from_the_registry(studio: Session) -> None:
     document = studio.document
     (radius,) = panels.controls(document.find(BALL))  # type: ignore[arg-type]
     assert (

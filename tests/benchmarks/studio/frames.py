@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from fracslice.studio.session import Studio, jpeg
+from fracslice.studio.session import Session, jpeg
 
 from ..runner import Row, Run, Spread
 
@@ -38,9 +38,9 @@ def rows(
 ) -> Iterator[Row]:
     with TemporaryDirectory() as folder:
         for name in names:
-            Studio(name, Path(folder), device="cpu").close()  # compiles
+            Session(name, Path(folder), device="cpu").close()  # compiles
             start = time.perf_counter()
-            studio = Studio(name, Path(folder), device="cpu")
+            studio = Session(name, Path(folder), device="cpu")
             opened = time.perf_counter() - start
             try:
                 yield {"": name, "first picture, s": opened, **used(studio, name, size, inputs, seconds)}
@@ -48,7 +48,7 @@ def rows(
                 studio.close()
 
 
-def used(studio: Studio, name: str, size: tuple[int, int], inputs: int, seconds: float) -> Row:
+def used(studio: Session, name: str, size: tuple[int, int], inputs: int, seconds: float) -> Row:
     """What a person who uses a studio waits for."""
     studio.live.resize(size)
     wait(lambda: studio.shown.samples >= 1)
@@ -67,7 +67,7 @@ def wait(holds: Callable[[], bool]) -> None:
         time.sleep(0.0005)
 
 
-def after(studio: Studio, act: Callable[[], None]) -> float:
+def after(studio: Session, act: Callable[[], None]) -> float:
     """Milliseconds from an input to the frame that shows it, as JPEG."""
     shown, scene, start = studio.shown, studio.live.scene, time.perf_counter()
     camera = studio.live.aim
@@ -80,7 +80,7 @@ def after(studio: Studio, act: Callable[[], None]) -> float:
     return 1e3 * (time.perf_counter() - start)
 
 
-def change(studio: Studio, name: str, step: int) -> Callable[[], None]:
+def change(studio: Session, name: str, step: int) -> Callable[[], None]:
     """A slider of the first element at its next value."""
     attribute, value, by = CHANGED[name]
     place = studio.document.version.at
@@ -88,7 +88,7 @@ def change(studio: Studio, name: str, step: int) -> Callable[[], None]:
     return lambda: studio.set_number(place, attribute, 0, number)
 
 
-def turned(studio: Studio, seconds: float) -> tuple[float, float]:
+def turned(studio: Session, seconds: float) -> tuple[float, float]:
     """Frames a second while the camera turns, and the spacing of their pixels."""
     frames, start = 0, time.perf_counter()
     while time.perf_counter() < start + seconds:
