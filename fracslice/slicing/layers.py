@@ -401,15 +401,11 @@ class SupportedLayer(Layer):
 
     @cached_property
     def _painted(self) -> tuple[float, int]:
-        """See `Layer._painted`; by whole pixels."""
+        """See `Layer._painted`; what both cover is found by whole pixels."""
         own, supports = self.own.runs, self.supports.runs
         pixels = [int((runs.end - runs.begin).sum()) for runs in (own, supports, own | supports)]
-        return self._of_both(pixels[0] + pixels[1] - pixels[2])
-
-    def _of_both(self, shared: float) -> tuple[float, int]:
-        """Area of both, pixels, of which they share some, and pixels that their contours cut."""
         pixel = self.stack.pixel[0] * self.stack.pixel[1]
-        area = (self.own.area + self.supports.area) / pixel - shared
+        area = (self.own.area + self.supports.area) / pixel - (pixels[0] + pixels[1] - pixels[2])
         return area, self.own.boundary + self.supports.boundary
 
     @cached_property
