@@ -204,6 +204,7 @@ def parted_lines(made: Parted, files: list[str]) -> Iterator[str]:
         title = files[index] if len(files) == len(named) else f"{files[0]}, part {name}"
         copies = f", {count} times" if count > 1 else ""
         yield f"{title}: {figures(mesh.report.mesh, mesh.report.problems)}{copies}"
+        yield from mesh.report.notes
     if divided.pegs:
         size = f"{divided.diameter:g} mm thick, {divided.length:g} mm long"
         yield f"{format_count(len(divided.pegs), 'peg')}, {size}"

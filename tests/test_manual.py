@@ -120,7 +120,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "own.py").write_text(OWN)
     for name in ("fields.registry.FORMULAS", "fields.registry._FILES"):
         monkeypatch.setattr(f"fracslice.{name}", dict(pkgutil.resolve_name(f"fracslice.{name}")))
-    (tmp_path / "scenes").symlink_to(ROOT / "scenes")
+    for name in ("scenes", "examples"):
+        (tmp_path / name).symlink_to(ROOT / name)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

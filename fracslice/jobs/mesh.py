@@ -80,13 +80,7 @@ def make_mesh(
     """
     job = _Job(scene, what or MeshJob(), Clock(work or Work()), None if path is None else Path(path))
     job.refuse()
-    result, finer = first, _ = job.made()
-    with suppress(TooLargeError):  # what was made is returned, and says what it lacks
-        for _ in range(TRIES):
-            if finer is None:
-                break
-            result, finer = finer.made()
-    return result if result is first else noted(result, first)
+    return job.best()
 
 
 def mesh_of_part(scene: Scene, whole: Plan, scale: float, root: Field, what: MeshJob, work: Work) -> Result:
@@ -111,8 +105,7 @@ def mesh_of_part(scene: Scene, whole: Plan, scale: float, root: Field, what: Mes
         undrilled=None,
         supports=None,
     )
-    made, _ = _Job(scene, what, Clock(work), None, Sized(planned, scale, what.edits(scene))).made()
-    return made
+    return _Job(scene, what, Clock(work), None, Sized(planned, scale, what.edits(scene))).best()
 
 
 PLUG = 24
@@ -214,6 +207,16 @@ class _Job:
 
         return sizing(self.scene, self.what.size, self.what.scale, self.clock.work)
 
+    def best(self) -> Result:
+        """Result, of finer samples where those that were asked for lose the object."""
+        result, finer = first, _ = self.made()
+        with suppress(TooLargeError):  # what was made is returned, and says what it lacks
+            for _ in range(TRIES):
+                if finer is None:
+                    break
+                result, finer = finer.made()
+        return result if result is first else noted(result, first)
+
     def made(self) -> tuple[Result, _Job | None]:
         """Result, and the job of finer samples that has the object if this one lost it; None if there is no
         need, or it would be too large.
@@ -223,7 +226,11 @@ class _Job:
         voxels = cure * self.what.voxels(self.size.longest)
         if cure == 1 or voxels > RAISED or self.clock.work.cluster is not None:
             return result, None
-        return result, replace(self, what=replace(self.what, voxel=None, resolution=voxels))
+        given = self.given
+        if given is not None:
+            planned = replace(given.planned, voxel=given.planned.voxel / cure)
+            given = replace(given, planned=planned)
+        return result, replace(self, what=replace(self.what, voxel=None, resolution=voxels), given=given)
 
     def refuse(self) -> None:
         """Raise the errors of invalid arguments before any work is done."""

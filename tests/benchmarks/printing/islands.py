@@ -21,7 +21,7 @@ from tests.stability.random_scenes import random_scene
 
 from ..runner import Row, Run
 
-SMALLEST = {"count": 1, "shipped": 0}
+SMALLEST = {"count": 1, "shipped": 0, "size": 10.0, "layer": 0.2}
 RUNS = 1
 
 
