@@ -81,6 +81,9 @@ class Host(Protocol):
     def run(self, name: str, make: Callable[[Work], str]) -> None:
         """Begin a job in the background, if none is running; it says what it made."""
 
+    def edit(self, change: Callable[..., None], *arguments: Any) -> None:
+        """Change the document, and show what it is now."""
+
     def set_part(self, part: str, attribute: str, value: str | None) -> None:
         """Give an attribute of an element below `<scene>` a value, or take it away."""
 
@@ -470,8 +473,19 @@ class Inside:
 
     def edit(self, name: str, value: str) -> None:
         """Change a print edit, or the size; an empty one is taken away."""
-        part = SOLID.name if name == "size" else Print.element
-        self._host.set_part(part, name, value or None)
+        if name == "size":
+            self._host.edit(self._resize, value or None)
+        else:
+            self._host.set_part(Print.element, name, value or None)
+
+    def _resize(self, size: str | None) -> None:
+        """Give the object a size, in place of that which a unit gave it."""
+        document = self._host.document
+        solid = document.part(SOLID.name)
+        if solid is not None:
+            with document.one_edit():
+                document.set_value(solid.place, "unit", None)
+                document.set_value(solid.place, "size", size)
 
     # what the page says
 

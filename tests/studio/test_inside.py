@@ -103,7 +103,7 @@ def test_print_edits_are_written_and_compared(studio: Session, inside: Inside) -
     base = next(edit for edit in inside.edits if edit["name"] == "base")
     assert base["value"] == 1.0 and base["text"] == "1mm" and base["most"] >= 2
     inside.edit("size", "20mm")
-    assert studio.document.problem or studio.document.scene.size_mm == 20
+    assert not studio.document.problem and studio.document.scene.size_mm == 20
     studio.edit(studio.document.undo)
     inside.show("mesh")
     done(studio)
