@@ -36,6 +36,20 @@ MARK = "\ufdd0"
 """No character: stands where an element will be."""
 
 
+OFF = re.compile(r"<!--off (.*) off-->", re.DOTALL)
+"""Comment that an element is which is turned off."""
+
+
+@dataclass(frozen=True)
+class Off:
+    """An element that is turned off. Positions are those of characters of its comment."""
+
+    name: str
+    above: Place  # element that it is in
+    start: int
+    end: int
+
+
 @dataclass
 class Tag:
     """An element of the text. Positions are those of characters."""
@@ -49,6 +63,7 @@ class Tag:
     close: int = 0  # start of its end tag; that of its start tag if it has none
     end: int = 0
     children: list[Tag] = field(default_factory=list)
+    off: list[Off] = field(default_factory=list)  # elements inside that are turned off
 
     @property
     def is_empty(self) -> bool:
@@ -89,11 +104,17 @@ def parse(text: str) -> Tag:
         tag.close = begin if closed else tag.start
         tag.end = text.index(">", begin) + 1 if closed else tag.inner
 
+    def comment(data: str) -> None:
+        begin = characters.at(parser.CurrentByteIndex)
+        if found := OFF.match(f"<!--{data}-->"):
+            name = (re.match(r"<(\w+)", found[1]) or ("", "?"))[1]
+            opened[-1].off.append(Off(name, opened[-1].place, begin, text.index("-->", begin) + 3))
+
     def doctype(*_: object) -> None:
         raise SceneError(f"{parser.CurrentLineNumber}: document types are not allowed in a scene")
 
     parser.StartElementHandler, parser.EndElementHandler = start, end
-    parser.StartDoctypeDeclHandler = doctype
+    parser.StartDoctypeDeclHandler, parser.CommentHandler = doctype, comment
     try:
         parser.Parse(data, True)
     except expat.ExpatError as error:
@@ -327,6 +348,27 @@ class Document:
         start, end = self._lines_of(tag)
         above = place[:-1] if place[-1] == 0 else (*place[:-1], place[-1] - 1)
         self.write(self.text[:start] + self.text[end:], above)
+
+    def turn_off(self, place: Place) -> None:
+        """Make an element a comment, which can be turned on again."""
+        tag = self._at(place)
+        old = self.text[tag.start : tag.end]
+        if "--" in old:
+            raise SceneError(f"<{tag.name}>: has a comment inside it, and cannot become one; remove it first")
+        self.write(f"{self.text[: tag.start]}<!--off {old} off-->{self.text[tag.end :]}", place[:-1])
+
+    def turn_on(self, start: int) -> None:
+        """Make the comment that starts at a character the element again that it was."""
+        off = next((off for tag in self.root.walk() for off in tag.off if off.start == start), None)
+        found = OFF.fullmatch(self.text[off.start : off.end]) if off else None
+        if off is None or found is None:
+            raise SceneError("expected an element that is turned off")
+        before = sum(child.end <= off.start for child in self._children(off.above))
+        self.write(self.text[: off.start] + found[1] + self.text[off.end :], (*off.above, before))
+
+    def _children(self, place: Place) -> list[Tag]:
+        tag = self.find(place)
+        return tag.children if tag else []
 
     def duplicate(self, place: Place) -> None:
         """Put a copy of an element behind it."""

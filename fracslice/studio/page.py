@@ -195,6 +195,7 @@ class Page:
                 "helping": False,
                 "making": False,
                 "opening": False,
+                "dragged": [],
                 "axis": "",
                 "share": 0.5,
                 "scenes": studio.scenes,
@@ -212,6 +213,7 @@ class Page:
         self.refresh()
         self.state.change("xml")(self.write)
         self._tabs, self._left = 0, 0.0
+        self.server.trigger("drop")(self.drop)
         self.ctrl.on_server_bind.add(self.guard)
         self.ctrl.on_server_ready.add(lambda **_: asyncio.get_running_loop().create_task(self.follow()))
         self.build()
@@ -289,6 +291,15 @@ class Page:
             state.axis, state.share = axis, float(share)
         self.studio.cut(axis, float(share))
 
+    def turn_on(self, start: int) -> None:
+        """Turn an element on again."""
+        self.edit(self.studio.document.turn_on, start)
+
+    def drop(self, place: list[int], onto: list[int]) -> None:
+        """Move an element before the one that it is dropped on."""
+        if place != onto:
+            self.edit(self.studio.document.move, tuple(place), tuple(onto))
+
     def choose(self, place: list[int]) -> None:
         """Choose an element."""
         self.studio.document.choose(tuple(place))
@@ -305,7 +316,7 @@ class Page:
         else:
             self.edit(document.add, at, name)
 
-    def change(self, edit: Literal["duplicate", "unwrap", "remove"]) -> None:
+    def change(self, edit: Literal["duplicate", "unwrap", "turn_off", "remove"]) -> None:
         """Change the chosen element."""
         document = self.studio.document
         self.edit(getattr(document, edit), document.version.at)
@@ -547,6 +558,7 @@ class Page:
                 ("mdi-arrow-down", "Move down", lambda: self.shift(1)),
                 ("mdi-content-copy", "Duplicate", lambda: self.change("duplicate")),
                 ("mdi-arrow-collapse", "Unwrap", lambda: self.change("unwrap")),
+                ("mdi-eye-off", "Turn off", lambda: self.change("turn_off")),
                 ("mdi-delete", "Delete", lambda: self.change("remove")),
             ):
                 v.VBtn(icon=icon, click=act, size="small", variant="text", raw_attrs=named(label))
@@ -554,14 +566,29 @@ class Page:
             v.VList(density="compact", style="max-height: 40vh; overflow: auto", raw_attrs=named("Elements")),
             v.VListItem(
                 v_for="row in rows",
-                key="row.place.join('.')",
+                key="row.start",
                 click=(self.choose, "[row.place]"),
                 active=("row.chosen",),
                 style=("`padding-left: ${8 + 14 * row.depth}px; min-height: 30px`",),
+                classes=("row.off ? 'text-disabled' : ''",),
+                raw_attrs=[
+                    ':draggable="!row.off"',
+                    '@dragstart="dragged = row.place"',
+                    "@dragover.prevent",
+                    "@drop.prevent=\"trigger('drop', [dragged, row.place])\"",
+                ],
             ),
         ):
             html.Span("{{ row.name }}")
             html.Span("{{ row.given }}", classes="text-caption text-medium-emphasis ml-2")
+            v.VBtn(
+                icon="mdi-eye",
+                v_if="row.off",
+                click=(self.turn_on, "[row.start]"),
+                size="x-small",
+                variant="text",
+                raw_attrs=named_by("'turn ' + row.name + ' on'"),
+            )
 
     def _panel(self) -> None:
         with html.Div(classes="pa-3"):

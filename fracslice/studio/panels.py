@@ -96,23 +96,20 @@ def colour_text(value: str) -> str:
 
 
 def outline(document: Document) -> list[dict[str, Any]]:
-    """The elements of a scene as rows of a tree: place, depth, name and what it is given."""
-    chosen = document.version.at
-    rows = []
+    """The elements of a scene as rows of a tree: place, depth, name, what it is given, whether it is off."""
+    chosen, rows = document.version.at, list[dict[str, Any]]()
     for tag in document.root.walk():
-        if not tag.place:
-            continue
-        given = " ".join(f"{name} {value}" for name, value in tag.attributes.items())
-        rows.append(
-            {
-                "place": list(tag.place),
-                "depth": len(tag.place) - 1,
-                "name": tag.name,
-                "given": given if len(given) <= 40 else given[:37] + "...",
-                "chosen": tag.place == chosen,
-            }
-        )
-    return rows
+        if tag.place:
+            given = " ".join(f"{name} {value}" for name, value in tag.attributes.items())
+            given = given if len(given) <= 40 else given[:37] + "..."
+            about = {"name": tag.name, "given": given, "chosen": tag.place == chosen, "off": False}
+            rows.append({"place": list(tag.place), "start": tag.start, **about})
+        for off in tag.off:
+            about = {"name": off.name, "given": "off", "chosen": False, "off": True}
+            rows.append({"place": list(off.above), "start": off.start, **about})
+    for row in rows:
+        row["depth"] = len(row["place"]) - (0 if row["off"] else 1)
+    return sorted(rows, key=lambda row: row["start"])
 
 
 def places_of_pictures() -> dict[str, str]:

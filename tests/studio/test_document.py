@@ -10,6 +10,7 @@ import pytest
 from fracslice.errors import SceneError
 from fracslice.scene import library
 from fracslice.studio.document import Document, Place, parse
+from fracslice.studio.panels import outline
 from tests.examples import stamped
 
 pytestmark = pytest.mark.once
@@ -155,3 +156,28 @@ def test_any_edits_can_be_undone(seed: int) -> None:
     for text in texts:
         assert document.text == text
         document.redo()
+
+
+def test_an_element_is_turned_off_and_on_again(tmp_path: Path) -> None:
+    text = """<scene version="1">
+  <solid size="1mm">
+    <sphere radius="1"/>
+    <transform translate="2 0 0"><box/></transform>
+  </solid>
+</scene>
+"""
+    document = Document(text, tmp_path / "two.xml")
+    document.turn_off((0, 0))
+    assert not document.problem and document.scene.root.formula.name == "transform"
+    (row,) = (row for row in outline(document) if row["off"])
+    assert (row["name"], row["place"], row["depth"]) == ("sphere", [0], 1)
+    assert [row["name"] for row in outline(document)] == ["solid", "sphere", "transform", "box"]
+    document.turn_on(row["start"])
+    assert document.text == text and document.version.at == (0, 0)
+    with pytest.raises(SceneError, match="turned off"):
+        document.turn_on(3)
+    document.set_value((0, 1), "translate", "2 0 0")
+    document.wrap((0, 1), "shell")
+    document.write(document.text.replace("<box/>", "<!-- why --><box/>"))
+    with pytest.raises(SceneError, match="comment inside"):
+        document.turn_off((0, 1))
