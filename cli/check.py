@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import threading
 import time
@@ -76,6 +77,9 @@ layers of it in which --fix compares what it tries.
 MOST_SECONDS = 50.0
 """CPU seconds of all examinations with --fix that are in no finer layers than those of `ACROSS`."""
 
+ASKED = 0.05
+"""Interval between two looks at the CPU time, which is dear on some systems, seconds."""
+
 
 class Deadline(threading.Event):
     """Cancellation by another event, or once the process has taken an amount of CPU time."""
@@ -83,10 +87,18 @@ class Deadline(threading.Event):
     def __init__(self, other: threading.Event, until: float) -> None:
         super().__init__()
         self.other, self.until = other, until
+        self._asked = -math.inf
 
     def is_set(self) -> bool:
-        """True once either is so, or it was set itself."""
-        return super().is_set() or self.other.is_set() or time.process_time() > self.until
+        """True once either is so, or it was set itself; the CPU time is asked for at most every `ASKED`."""
+        if super().is_set() or self.other.is_set():
+            return True
+        now = time.monotonic()
+        if now - self._asked > ASKED:
+            self._asked = now
+            if time.process_time() > self.until:
+                self.set()
+        return super().is_set()
 
 
 def limit(text: str) -> Any:

@@ -101,6 +101,7 @@ class WholeOptions(MeshFileOptions):
     bed: Triple | None
     parts: tuple[int, int, int] | str | None
     plugs: bool
+    support_body: bool
     copies: int = COPIES
     spacing: float = SPACING
 
@@ -128,6 +129,8 @@ def mesh(given: WholeOptions) -> int:
     refuse_options({"spacing"}, "only for several parts: --copies, or fracslice plate")
     if given.plugs:
         return make_plugged(given)
+    if given.support_body:
+        return make_apart(given)
     return make_files(given) if given.bed is None and given.parts is None else make_parted(given)
 
 
@@ -135,7 +138,7 @@ NO_PARTS = frozenset({"implicit", "report", "seconds", "every", "cluster", "shar
 """Options that parts do not have."""
 
 NO_PLUGS = NO_PARTS | {"picture", "cache", "device"}
-"""Options that plugs do not have."""
+"""Options that plugs and bodies of supports do not have."""
 
 NO_COPIES = NO_PLUGS | PartsJob.kinds().keys()
 """Options that copies do not have."""
@@ -166,6 +169,29 @@ def make_plugged(given: WholeOptions) -> int:
         lines = [summary(given.output, made.report), *of_mesh(made, given.material, given.price).lines()]
         click.echo(os.linesep.join([*lines, f"{count}, wide and high: {sizes}"]))
     return 1 if made.report.problems else 0
+
+
+NAMES = "object", "supports"
+"""Bodies of a supported object."""
+
+
+def make_apart(given: WholeOptions) -> int:
+    """Make the mesh of an object and that of its supports: bodies of one .3mf file, or each in its own."""
+    from fracslice.jobs import mesh as jobs
+    from fracslice.jobs.plates import write_bodies
+
+    PartsJob(**given.values(PartsJob))
+    refuse_options(NO_PLUGS, "not with --support-body")
+    check_targets(given.source, given.output)
+    scene = load_scene(given.source, given.settings)
+    with given.working() as work:
+        made = jobs.make_apart(scene, given.oriented(scene, work).mesh_job(scene), work)
+        files = write_bodies(made, NAMES, Path(given.output), jobs.metadata(scene), work)
+    if not given.quiet:
+        titles = [str(file) for file in files] if len(files) > 1 else [f"{files[0]}, {n}" for n in NAMES]
+        for title, one in zip(titles, made, strict=True):
+            click.echo(summary(title, one.report))
+    return 1 if made[0].report.problems else 0
 
 
 def make_parted(given: WholeOptions) -> int:
@@ -342,7 +368,7 @@ def make_and_write(scene: Scene, given: MeshFileOptions, work: Work) -> Result:
     if picture is not None:
         from fracslice.viewer import picture as draw
 
-        shown = result.mesh
+        shown = result.shown
         if shown.filaments is not None:
             from fracslice.mesh.filaments import painted_mesh
 

@@ -35,7 +35,7 @@ from fracslice.common.parameters import (
     picture_size,
 )
 from fracslice.errors import ClusterError, SceneError, VolumeError
-from fracslice.records import MeshJob, Part, Print, RasterOptions, SliceJob
+from fracslice.records import MeshJob, Part, Placed, Print, RasterOptions, SliceJob
 
 from .execution import DENSITIES, NOTHING, BadInput, refuse_options, working
 
@@ -378,15 +378,14 @@ class PreparationOptions(SceneOptions):
         """These options with the direction up of --orient."""
         if vars(self).get("orient") is None:
             return self
-        from fracslice.slicing.orientation import orientations
-        from fracslice.volume.amount import sizing
+        from fracslice.slicing.orientation import best_up
 
         given = vars(self)
         refuse_options({"up"}, "--orient finds it; expected one of them")
-        best = orientations(scene.root, sizing(scene, given["size"], given["scale"], work), work)[0]
+        up = best_up(scene, Placed(size=given["size"], scale=given["scale"]), work)
         if not given["quiet"]:
-            click.echo(f"--up {up_text(best.up)}", err=True)
-        return self.but(up=best.up, orient=None)
+            click.echo(f"--up {up_text(up)}", err=True)
+        return self.but(up=up, orient=None)
 
     def printing(self, given: Print) -> Print:
         """Print settings, overridden by those of the options."""

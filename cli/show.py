@@ -36,5 +36,5 @@ def show(given: ShowOptions) -> None:
     scene = load_scene(given.source, given.settings)
     viewer.need_screen()  # before the mesh, which may take minutes
     with given.working() as work:
-        mesh = make_mesh(scene, given.oriented(scene, work).mesh_job(scene), work).mesh
-    viewer.show(mesh)
+        made = make_mesh(scene, given.oriented(scene, work).mesh_job(scene), work)
+    viewer.show(made.shown)

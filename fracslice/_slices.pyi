@@ -228,7 +228,7 @@ def plate_picture(
     levels: bytes,
     encoding: Encoding,
 ) -> tuple[bytes, float, int]:
-    """Layers of several objects in one picture, encoded; they must not overlap.
+    """Layers of several objects in one picture, encoded; at most two of them may overlap in a place.
 
     Parameters
     ----------

@@ -436,6 +436,9 @@ class PartsJob(Record):
         Length, 0.15, "gap around the pegs that join parts, and around plugs", zero=True
     )
     plugs: bool = attribute(Flag, False, "makes a plug for each drain hole, too")
+    support_body: bool = attribute(
+        Flag, False, "supports are a body of their own in an .3mf file, or a file of their own"
+    )
 
     def __post_init__(self) -> None:
         validate(self, SceneError)
@@ -443,6 +446,8 @@ class PartsJob(Record):
             raise SceneError("parts auto: expected a bed, too, such as 220x220x250mm")
         if self.plugs and (self.parts or self.bed):
             raise SceneError("plugs and parts: expected one of them")
+        if self.support_body and (self.plugs or self.parts or self.bed):
+            raise SceneError("support_body and plugs or parts: expected one of them")
 
     def side(self, axis: int) -> float:
         """Longest part along an axis, mm.

@@ -136,7 +136,8 @@ def make_mesh(
     """Make a printable mesh of a shape.
 
     Lengths are numbers in mm, or text such as "0.5mm". Keywords set the fields of `MeshJob`, `Print` and
-    `Work`, and override those of the records and of the scene.
+    `Work`, and override those of the records and of the scene. ``up="auto"`` is the best direction up that
+    `fracslice orient` finds.
 
     Parameters
     ----------
@@ -187,7 +188,8 @@ def make_mesh(
     scene = as_scene(shape)
     given = job or MeshJob()
     edited = replace(scene, printing=given.edits(scene))
-    return make_mesh_job(scene, job_of(given, edited, options), work_of(options, work), path)
+    work = work_of(options, work)
+    return make_mesh_job(scene, job_of(given, edited, options, work), work, path)
 
 
 S = TypeVar("S", bound=np.generic)
@@ -303,7 +305,8 @@ def slice_layers(
 ) -> Slices:
     """Slice a shape into the layers of a print, directly from its field.
 
-    Lengths are numbers in mm, or text such as "0.05mm".
+    Lengths are numbers in mm, or text such as "0.05mm". ``up="auto"`` is the best direction up that
+    `fracslice orient` finds.
 
     Parameters
     ----------
@@ -340,7 +343,7 @@ def slice_layers(
     """
     work = work_of(options)
     scene = as_scene(shape, options.get("size"))
-    job = job_of(SliceJob(layer=layer), scene, options)
+    job = job_of(SliceJob(layer=layer), scene, options, work)
     stack = plan_layers(scene.root, job, work, sizing(scene, job.size, job.scale, work))
     return Slices(stack, range(len(stack.z)), _coverage, work)
 

@@ -63,7 +63,7 @@ class PlacedKeywords(PrintKeywords, WorkKeywords, total=False):
     """Size and orientation, print preparation and execution."""
 
     size: AnyLength | None
-    up: Sequence[float] | None
+    up: Sequence[float] | Literal["auto"] | None
     scale: AnyScale | None
 
 
@@ -151,7 +151,7 @@ def print_of(scene: Scene, options: Mapping[str, Any]) -> Print:
     return replace(scene.printing, **_given_options(options, Print.kinds()))
 
 
-def job_of(job: J, scene: Scene, options: Mapping[str, Any]) -> J:
+def job_of(job: J, scene: Scene, options: Mapping[str, Any], work: Work | None = None) -> J:
     """Job of a scene with the given options.
 
     Parameters
@@ -161,9 +161,18 @@ def job_of(job: J, scene: Scene, options: Mapping[str, Any]) -> J:
     scene : Scene
         The scene with its own print settings.
     options : mapping
-        Fields of the job and of `Print` to override; None keeps the field.
+        Fields of the job and of `Print` to override; None keeps the field. The direction up "auto" is the
+        best one that is found.
+    work : Work, optional
+        Threads, progress and cancellation of the search for it.
     """
-    return replace(job_with(job, options), printing=print_of(scene, options))
+    up = options.get("up")
+    if not (isinstance(up, str) and up == "auto"):
+        return replace(job_with(job, options), printing=print_of(scene, options))
+    from ..slicing.orientation import best_up
+
+    made = job_of(job, scene, {**options, "up": None})
+    return replace(made, up=best_up(scene, made, work))
 
 
 def job_with(job: K, options: Mapping[str, Any]) -> K:

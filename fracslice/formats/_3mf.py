@@ -130,10 +130,11 @@ def write_build(
     metadata: Mapping[str, str],
     work: Work,
     picture: bytes | None = None,
+    together: bool = False,
 ) -> None:
     """Write objects, without colours, and a build of them, streamed as one object is.
 
-    `picture`: of all, as PNG.
+    `picture`: of all, as PNG; `together`: they are the bodies of one object, at their first places.
     """
 
     def texts() -> Iterator[Text]:
@@ -145,7 +146,14 @@ def write_build(
             yield from mesh_element(built.mesh.in_order())
             yield from _texts(b"</object>\n")
             places = (" ".join(f"{v:.9g}" for v in place.ravel().tolist()) for place in built.places)
-            items += "".join(f'<item objectid="{number}" transform="{place}"/>\n' for place in places)
+            what = "component" if together else "item"
+            items += "".join(f'<{what} objectid="{number}" transform="{place}"/>\n' for place in places)
+        if together:
+            whole = (
+                f'<object id="{len(objects) + 1}" type="model"><components>{items}</components></object>\n'
+            )
+            yield from _texts(whole.encode())
+            items = f'<item objectid="{len(objects) + 1}"/>\n'
         yield from _texts(f"</resources>\n<build>\n{items}</build>\n</model>\n".encode())
 
     meshes = [built.mesh for built in objects]

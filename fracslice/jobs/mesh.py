@@ -150,6 +150,53 @@ def make_plugs(scene: Scene, whole: Result, clearance: float, work: Work | None 
     return made
 
 
+def make_apart(scene: Scene, what: MeshJob, work: Work | None = None) -> tuple[Result, Result]:
+    """Make the mesh of an object, and that of its supports, which reach into it at their tips.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene to mesh.
+    what : MeshJob
+        Size, resolution and changes of the mesh, with supports.
+    work : Work, optional
+        Threads, progress and cancellation.
+
+    Returns
+    -------
+    tuple of Result
+        Of the object and of the supports, each standing on z = 0; `Result.place` says where they belong.
+
+    Raises
+    ------
+    SceneError
+        Without supports.
+    VolumeError
+        If the object needs none, and as `make_mesh`.
+    """
+    from ..volume import plan
+
+    how, clock = what.edits(scene), Clock(work or Work())
+    if how.supports == "none":
+        raise SceneError("support_body: expected supports, such as medium")
+    job = _Job(scene, what, clock, None)
+    job.refuse()
+    sized = plan_mesh(scene, what, job.size, clock)
+    held, voxel = sized.planned.supports, sized.planned.voxel
+    if held is None:
+        raise VolumeError("support_body: the object needs no supports")
+    results = []
+    for root, supports, keep in (
+        (held.carried, None, sized.left),
+        (held.node, replace(held, box=None), Print()),
+    ):
+        planned = plan(root, max(root.bounds.box.size) / voxel, clock.work)
+        planned = replace(planned, voxel=voxel, supports=supports)
+        own = replace(what, printing=replace(how, supports="none", raft=0.0) if supports is None else Print())
+        results.append(_Job(scene, own, clock, None, Sized(planned, sized.scale, keep)).made()[0])
+    return results[0], results[1]
+
+
 def standing_on(mesh: Mesh, up: np.ndarray) -> Mesh:
     """Mesh, turned so that a direction is up, centred on z = 0."""
     up = up / np.linalg.norm(up)

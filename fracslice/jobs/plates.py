@@ -37,6 +37,7 @@ from .slices import SliceRecipe, StackModel, rendered
 if TYPE_CHECKING:
     from ..mesh import Mesh
     from ..slicing.stack import Standing
+    from .report import Result
 
 
 @dataclass(frozen=True)
@@ -225,6 +226,28 @@ def write_each(
     for file in files:
         check_target(file)
     return [write(mesh, file, about, work) for mesh, file in zip(meshes, files, strict=True)]
+
+
+def write_bodies(
+    made: Sequence[Result], names: Sequence[str], path: Path, about: Mapping[str, str], work: Work
+) -> list[Path]:
+    """Write meshes of one scene where they belong: as bodies of one object in a .3mf file, or each to a file
+    of its own. The lowest one stands on z = 0. Returns the files.
+    """
+    from ..common.files import check_target, replacing
+    from ..formats._3mf import Built, write_build
+    from ..version import APPLICATION
+
+    at = [np.array(one.place.offset) for one in made]
+    lowest = at[int(np.argmax([offset[2] for offset in at]))]
+    meshes = [one.mesh.translated(lowest - offset) for one, offset in zip(made, at, strict=True)]
+    if path.suffix.lower() != ".3mf":
+        return write_each(meshes, names, path, about, work)
+    check_target(path)
+    built = [Built(m, [np.eye(4, 3)], name) for m, name in zip(meshes, names, strict=True)]
+    with replacing(path) as file:
+        write_build(built, file, {"Application": APPLICATION, **about}, work, together=True)
+    return [path]
 
 
 def lay_out(

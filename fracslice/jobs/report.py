@@ -208,6 +208,10 @@ class Placement:
         return scene
 
 
+SHOWN = np.array([(239, 227, 208), (60, 130, 200)], np.uint8)
+"""Colours of an object and of its supports."""
+
+
 @dataclass(frozen=True, eq=False, repr=False, init=False)
 class Result(Mesh):
     """A mesh in mm, standing on z = 0, quantised to float32, with its report.
@@ -267,6 +271,15 @@ class Result(Mesh):
         if self.whole is None:
             raise TooLargeError("the mesh does not fit in memory; it is in the file that was written")
         return self.whole
+
+    @property
+    def shown(self) -> Mesh:
+        """The mesh as it is drawn: supports have another colour than an object without colours."""
+        mesh, supports = self.mesh, self.planned.supports
+        if supports is None or mesh.colours is not None:
+            return mesh
+        away = supports.distances(self.place.units(mesh.vertices))
+        return replace(mesh, colours=SHOWN[(away < self.planned.voxel / 8).astype(int)])
 
     @property  # type: ignore[misc]
     def vertices(self) -> NDArray[np.float64]:

@@ -36,8 +36,8 @@ BEHIND = (24, 26, 29)
 LINE, INK = 0.7, 0.45
 """Half the width of an edge, pixels, and its share of the light."""
 
-SMALLEST = 40.0
-"""Twice the area of a triangle whose edges are drawn, pixels: those of smaller ones would cover them."""
+FAINTEST, CLEAREST = 15.0, 90.0
+"""Twice the areas of triangles whose edges are not drawn, as they would cover all, or fully, pixels."""
 
 WIDEST = 120.0
 """Angle of view of cameras that see more than a plane can show, degrees."""
@@ -251,7 +251,8 @@ class MeshView:
             own = (weights[:, :, None] * drawn.values(self._colours)[corners]).sum(1)
         light = own * lit[:, None]
         if self.edges:
-            light[(line < LINE) & (np.abs(area) > SMALLEST)] *= INK
+            shade = (1 - INK) * np.clip((np.abs(area) - FAINTEST) / (CLEAREST - FAINTEST), 0, 1)
+            light *= np.where(line < LINE, 1 - shade, 1)[:, None]
         if self.cut:
             light[area > 0] = to_linear(np.array(SECTION) / 255.0)
         return (255 * from_linear(np.minimum(light, 1)) + 0.5).astype(np.uint8)

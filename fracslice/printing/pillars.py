@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import heapq
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -70,9 +70,17 @@ FARTHEST = 12.0
 TRIES = 12
 """Branches and trunks that are tried, those first that save most."""
 
-SUNK = 1.2
-"""Least depth of what a strut stands on, radii: its end must not look out below, where it would be an island.
+SUNK = np.array(
+    [(0, 0, 0), (0, 0, -1.2), *((0.8 * x, 0.8 * y, -0.8) for x in (-1, 0, 1) for y in (-1, 0, 1))]
+)
+"""Places in what a strut stands on, radii from its end, which must not look out below: it would be an island.
 """
+
+PIECE = 0.05
+"""What radii of pieces to be taken out are multiples of, mm."""
+
+POCKET = 50_000
+"""Most places of a pocket that are looked through for its exit."""
 
 LENGTHS = 2.0, 1.4, 1.0, 0.7
 """Lengths of the cones of tips, mm."""
@@ -141,11 +149,21 @@ class Room:
     @cached_property
     def outside(self) -> NDArray[np.bool_]:
         """Cells from which a piece as wide as a cell finds a way out."""
+        return self.exits(1)
+
+    def exits(self, steps: int) -> NDArray[np.bool_]:
+        """Cells as many steps away from the object that have a way out of such cells."""
         from scipy.ndimage import label
 
-        free = self.away > 0
-        labels, _ = label(free)
-        return np.asarray(free & (labels == labels[0, 0, 0]))
+        least = min(steps, self.wide)
+        if least not in self._exits:
+            labels, _ = label(self.away >= least)
+            self._exits[least] = np.asarray((labels == labels[0, 0, 0]) & (labels > 0))
+        return self._exits[least]
+
+    @cached_property
+    def _exits(self) -> dict[int, NDArray[np.bool_]]:
+        return {}
 
     def at(self, points: Points) -> tuple[NDArray[np.int64], ...]:
         """Cells (z, y, x) of points [..., 3], of those outside of the room the nearest ones."""
@@ -436,17 +454,16 @@ class Object:
         return float(((own + sections(beams, heights)) / (self.areas.max() / CARRIED)).min())
 
     def first_below(
-        self, points: Points, floor: float, step: float, depths: NDArray[np.float64]
+        self, points: Points, floor: float, step: float, radii: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Heights of the first solid as deep as given below points [n, 3], to a step; the floor where there
-        is none.
+        """Heights below points [n, 3] at which a ball first ends inside the solid, to a step; the floor where
+        none does.
         """
         result = np.full(len(points), floor)
         left, z = np.arange(len(points)), points[:, 2] - step
         while len(left := left[z[left] > floor]):
-            ends = np.stack([z[left], z[left] - depths[left]])
-            sides = np.broadcast_to(points[left, :2], (2, len(left), 2))
-            full = (self.values(np.concatenate([sides, ends[..., None]], 2)) < 0).all(0)
+            middle = np.column_stack([points[left, :2], z[left]])
+            full = (self.values(middle + SUNK[:, None] * radii[left, None]) < 0).all(0)
             result[left[full]] = z[left[full]]
             left = left[~full]
             z[left] -= step
@@ -458,12 +475,63 @@ class Object:
         return normals.T
 
 
+@dataclass(eq=False)
+class Exits:
+    """Ways out for balls of one radius, on samples of the field half as far apart.
+
+    Cells hold the object where a part of it is in them, so that they lack narrow exits.
+    """
+
+    of: Object
+    room: Room
+    radius: float  # mm
+    shut: set[tuple[int, ...]] = field(default_factory=set)  # places without a way out
+
+    @cached_property
+    def open(self) -> NDArray[np.bool_]:
+        """Cells that have a way out of cells."""
+        return self.room.exits(math.ceil(self.radius / float(self.room.cell.min())) + 1)
+
+    def lead_out(self, top: Points, ground: float) -> bool:
+        """True if a ball in the place of a strut straight down, or beside it, finds a way out."""
+        step = self.radius / 2
+        along = np.arange(ground, float(top[2]), step)
+        x, y, z = (axis.ravel() for axis in np.meshgrid(SIDES * step, SIDES * step, along, indexing="ij"))
+        halfway = np.column_stack([top[0] + x / 2, top[1] + y / 2, z])
+        start = np.column_stack([top[0] + x, top[1] + y, z])[self.of.values(halfway) > 0]
+        return self._flood(np.unique(np.round(start / step).astype(np.int64), axis=0))
+
+    def _flood(self, front: NDArray[np.int64]) -> bool:
+        """True if a way leads out from one of some places [n, 3]."""
+        seen = set[tuple[int, ...]]()
+        while len(seen) < POCKET and len(front := self._free(front)):
+            if self.open[self.room.at(front * self.radius / 2)].any():
+                return True
+            seen.update(map(tuple, front.tolist()))
+            near = set(map(tuple, (front[:, None] + STEPS).reshape(-1, 3).tolist()))
+            fresh = sorted(near - seen - self.shut)
+            front = np.array(fresh, np.int64).reshape(-1, 3)
+        self.shut |= seen
+        return False
+
+    def _free(self, places: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Those of some places where a ball is outside the solid."""
+        ends = np.concatenate([np.zeros((1, 3)), 2 * STEPS])[:, None]
+        return places[(self.of.values((places + ends) * self.radius / 2) > 0).all(0)]
+
+
+STEPS = np.concatenate([np.eye(3, dtype=np.int64), -np.eye(3, dtype=np.int64)])
+"""Steps to neighbours."""
+
+SIDES = np.arange(-4, 5)
+"""Places beside a strut from which a way out is looked for, steps."""
+
+
 class Contacts(NamedTuple):
     """Places where supports touch the surface."""
 
     points: Points  # mm, [n, 3]
     radii: NDArray[np.float64]  # mm, [n]
-    enclosed: NDArray[np.bool_]  # whether it is in a hole without exit, [n]
 
 
 def directions(normals: Points) -> Points:
@@ -510,7 +578,7 @@ def support(
     """Supports of points of the surface, and the share of the cross-section that they have to have next to
     it; `raft`: height of the raft, mm.
     """
-    points, tips, enclosed = where
+    points, tips = where
     lowest = float(points[:, 2].min())
     ends = tip_ends(room, points, of.slopes(points, strength.tip / 4))
     led = np.isfinite(ends[:, 0])
@@ -519,13 +587,13 @@ def support(
     cones = np.stack(
         [np.column_stack([points, tips])[led], np.column_stack([ends[led], radii[: forest.tips]])], 1
     )
-    ground = of.first_below(points[~led], room.floor, float(room.cell.min()) / 2, SUNK * tips[~led])
+    ground = of.first_below(points[~led], room.floor, float(room.cell.min()) / 2, tips[~led])
     inner = ground > room.floor
-    struts = _struts(np.column_stack([points, tips])[~led], ground, strength.pillar / 2)
+    struts, caught = _struts(of, room, np.column_stack([points, tips])[~led], ground, strength.pillar / 2)
     feet = np.concatenate([feet, struts[len(ground) :, 1][~inner]])
     beams = np.concatenate([cones, branches, struts, forest.braces()])
     node, volume = _node(beams, feet, room.floor, raft, of.scale)
-    counts = len(points), int(inner.sum()), int((enclosed[~led] & inner).sum())
+    counts = len(points), int(inner.sum()), caught
     scars = math.pi * float((tips**2).sum() + (tips[~led][inner] ** 2).sum())
     return Supports(of.root, node, strength.tip, *counts, volume, scars), of.carried(beams, lowest)
 
@@ -548,15 +616,29 @@ def sections(beams: Points, heights: NDArray[np.float64]) -> NDArray[np.float64]
     return np.asarray(np.where((share >= 0) & (share <= 1), math.pi * radii**2, 0).sum(1))
 
 
-def _struts(tops: Points, ground: NDArray[np.float64], pillar: float) -> Points:
-    """Beams straight down from balls [n, 4] to what is below, as thin at both ends, and thicker between if
-    they are long.
+def _struts(
+    of: Object, room: Room, tops: Points, ground: NDArray[np.float64], pillar: float
+) -> tuple[Points, int]:
+    """Beams straight down from balls [n, 4] to what is below, thicker between if they are long and a piece as
+    wide can be taken out, thinner if only that can, and the number of those of which no piece can.
     """
-    low, middle = tops.copy(), tops.copy()
+    tops, low, middle = tops.copy(), tops.copy(), tops.copy()
     low[:, 2] = ground
     middle[:, 2] = (tops[:, 2] + ground) / 2
     middle[:, 3] = np.clip((tops[:, 2] - ground) / 8, tops[:, 3], np.maximum(tops[:, 3], pillar))
-    return np.concatenate([np.stack([tops, middle], 1), np.stack([middle, low], 1)])
+    exits, caught = dict[int, Exits](), 0
+    for k in np.flatnonzero(ground > room.floor).tolist():
+        tip = float(tops[k, 3])
+        for radius in (float(middle[k, 3]), tip, tip / 2):
+            size = max(round(min(radius, (tops[k, 2] - ground[k]) / 2) / PIECE), 1)
+            way = exits.setdefault(size, Exits(of, room, size * PIECE))
+            if way.lead_out(tops[k, :3], float(ground[k])):
+                middle[k, 3], tops[k, 3], low[k, 3] = radius, min(tip, radius), min(tip, radius)
+                break
+        else:
+            middle[k, 3] = tip
+            caught += 1
+    return np.concatenate([np.stack([tops, middle], 1), np.stack([middle, low], 1)]), caught
 
 
 def _volume(beams: Points) -> float:

@@ -239,6 +239,11 @@ class Layer:
         return self.mean is None
 
     @property
+    def sheets(self) -> Sequence[Layer]:
+        """Layers of one field each that it is put together of."""
+        return (self,)
+
+    @property
     def known_area(self) -> float | None:
         """Area in mm^2, of the coverage or else of the contours; None if neither was made."""
         made = vars(self)
@@ -285,15 +290,7 @@ class PlateLayer(Layer):
 
     def encoded(self, view: ScreenView, encoding: Encoding) -> bytes:
         """As `Layer.encoded`."""
-        shown: dict[tuple[int, int], tuple[Layer, Standing, list[tuple[int, int]]]] = {}
-        for part, layer in self.parts:
-            _, _, places = shown.setdefault((id(part.stack), part.turns), (layer, part, []))
-            places.append(_place(part, view))
-        pieces = [
-            (layer.slab, layer.place, *_orientation(part, view), places)
-            for layer, part, places in shown.values()
-        ]
-        data, area, cut = plate_picture(pieces, view.shape, view.levels, encoding)
+        data, area, cut = _put_together(self.parts, view, encoding)
         self._painted = area, cut
         return data
 
@@ -335,6 +332,20 @@ class PlateLayer(Layer):
         )
 
 
+def _put_together(parts: Sequence[tuple[Standing, Layer]], view: ScreenView, encoding: Encoding) -> Encoded:
+    """Picture of layers of parts."""
+    shown: dict[tuple[int, int], tuple[Layer, Standing, list[tuple[int, int]]]] = {}
+    for part, layer in parts:
+        _, _, places = shown.setdefault((id(part.stack), part.turns), (layer, part, []))
+        places.append(_place(part, view))
+    pieces = [
+        (sheet.slab, sheet.place, *_orientation(part, view), places)
+        for layer, part, places in shown.values()
+        for sheet in layer.sheets
+    ]
+    return plate_picture(pieces, view.shape, view.levels, encoding)
+
+
 def _orientation(part: Standing, view: ScreenView) -> tuple[bool, bool, tuple[int, int], bool]:
     """How a screen shows a part: transposed, backwards, rows and columns of its lattice, and upside down.
 
@@ -356,16 +367,30 @@ def _place(part: Standing, view: ScreenView) -> tuple[int, int]:
 
 @dataclass(eq=False)
 class SupportedLayer(Layer):
-    """A layer of a fractal and of its supports, each sampled by itself: between supports, the fractal shows
+    """A layer of an object and of its supports, each sampled by itself: between supports, the object shows
     the same specks as alone. Contours are those of both together.
     """
 
     own: Layer = field(kw_only=True)
     supports: Layer = field(kw_only=True)
 
+    @property
+    def sheets(self) -> Sequence[Layer]:
+        """See `Layer.sheets`."""
+        return self.own, self.supports
+
+    def encoded(self, view: ScreenView, encoding: Encoding) -> bytes:
+        """See `Layer.encoded`."""
+        alone = Standing(self.stack, 0, (0, 0))
+        data, area, cut = _put_together([(alone, self)], view, encoding)
+        self._painted = area, cut
+        return data
+
     @cached_property
     def coverage(self) -> np.ndarray:
         """See `Layer.coverage`."""
+        if self.mean is not None:
+            return self.mean[0]
         both: np.ndarray = np.maximum(self.own.coverage, self.supports.coverage)
         return both
 
@@ -374,29 +399,14 @@ class SupportedLayer(Layer):
         """See `Layer.runs`."""
         return self.own.runs | self.supports.runs
 
-    @property
-    def is_tiled(self) -> bool:
-        """See `Layer.is_tiled`."""
-        return False
-
-    @property
-    def area(self) -> float:
-        """See `Layer.area`; what is in both is found by whole pixels."""
-        if self.mean is not None:
-            return self.mean[1]
-        pixels = [int((r.end - r.begin).sum()) for r in (self.own.runs, self.supports.runs, self.runs)]
-        shared = (pixels[0] + pixels[1] - pixels[2]) * self.stack.pixel[0] * self.stack.pixel[1]
-        return self.own.area + self.supports.area - shared
-
-    @property
-    def known_area(self) -> float | None:
-        """See `Layer.known_area`."""
-        return self.area
-
-    @property
-    def boundary(self) -> int:
-        """See `Layer.boundary`."""
-        return self.own.boundary + self.supports.boundary
+    @cached_property
+    def _painted(self) -> tuple[float, int]:
+        """See `Layer._painted`; what both cover is found by whole pixels."""
+        own, supports = self.own.runs, self.supports.runs
+        pixels = [int((runs.end - runs.begin).sum()) for runs in (own, supports, own | supports)]
+        pixel = self.stack.pixel[0] * self.stack.pixel[1]
+        area = (self.own.area + self.supports.area) / pixel - (pixels[0] + pixels[1] - pixels[2])
+        return area, self.own.boundary + self.supports.boundary
 
     @cached_property
     def contours(self) -> Contours:
@@ -525,13 +535,8 @@ class Slicer:
 
 
 def _fields(stack: Stack) -> list[Field]:
-    """Fields that are sampled: a fractal and its supports each by itself."""
-    supports = stack.supports
-    return (
-        [supports.carried, supports.node]
-        if supports and supports.carried.bounds.exterior_only
-        else [stack.root]
-    )
+    """Fields that are sampled: an object and its supports each by itself."""
+    return [stack.supports.carried, stack.supports.node] if stack.supports else [stack.root]
 
 
 def _sampler(stack: Stack, root: Field) -> Sampler:

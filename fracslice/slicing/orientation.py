@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +19,15 @@ from ..fields.box import Triple
 from ..fields.field import Field
 from ..printing.pillars import CARRIED, LIFT
 from ..printing.walls import Samples, edge_crossings
+from ..records import Placed
 from ..volume import Bricks, plan, sample_scene
-from ..volume.amount import Sizing, orientation
+from ..volume.amount import Sizing, orientation, sizing
 from ..volume.bricks import BRICK, INSIDE
 from ..work import Work
 from .feature_graph import Graph, Runs, layer_components
+
+if TYPE_CHECKING:
+    from ..scene import Scene
 
 SAMPLES = 64
 """Samples along the longest side."""
@@ -109,6 +114,11 @@ def orientations(root: Field, size: Sizing, work: Work | None = None) -> list[Or
             chosen.append(refined if _is_apart(refined, chosen) else one)
         work.progress("turning", len(chosen) / BEST)
     return sorted(chosen, key=_rank)
+
+
+def best_up(scene: Scene, placed: Placed, work: Work | None = None) -> Triple:
+    """Find the best direction up of a scene, for a job with its size and scale."""
+    return orientations(scene.root, sizing(scene, placed.size, placed.scale, work), work)[0].up
 
 
 def _rank(one: Orientation) -> tuple[float, Triple]:

@@ -30,6 +30,7 @@ from ..printing.pillars import (
     Object,
     Room,
     Strength,
+    steps_from,
     support,
 )
 from ..records import PIXEL, Print, SliceJob
@@ -65,6 +66,9 @@ SPECK, PIXELS = 0.02, 8
 
 GROWN, TALL = 0.1, 0.3
 """Area, mm2, and height, mm, that a speck reaches alone if it has a tip."""
+
+POCKET = 4.5
+"""Reach in holes without exit, mm, where tips stay for good: below the limit of `fracslice.checks`."""
 
 REGAINED = 1.0
 """Reach that is regained for each mm of material above."""
@@ -221,6 +225,13 @@ class _Survey:
         """Cross-section that carries the object, mm2."""
         return max(self.areas) / CARRIED
 
+    def open(self, room: Room) -> NDArray[np.bool_]:
+        """Cells [z, y, x] of the object, or beside them, that have a way out."""
+        z, y, x = (int(axis) for axis in room.at(self.low + 0.5 * self.sides))
+        depth, rows, columns = np.array(self.full).shape
+        near = steps_from(room.outside, 2) < 2
+        return near[z : z + depth, y : y + rows, x : x + columns]
+
     def around(self, count: int) -> NDArray[np.int64]:
         """Cells (z, y, x) where the object gets wider above its lowest point, spread evenly, up to where it
         carries itself.
@@ -238,20 +249,19 @@ class _Survey:
         return cells[chosen]
 
     def contacts(self, of: Object, room: Room, strength: Strength, around: int = 0) -> Contacts:
-        """Contacts of supports. What grows into the air in holes without exit has none: it is no island.
+        """Contacts of supports.
 
         What is wide before it joins anything older has a wide one. `around`: further ones beside the lowest.
         """
         tip, begun = strength.tip / 2, self.begun
         islands = of.under(begun[:, :3], np.full(len(begun), float(self.stack.heights[0])))
-        cells = _Growth(np.array(self.full), self.sides, strength.reach).tips(islands, self.low)
+        growth = _Growth(np.array(self.full), self.open(room), self.sides, strength.reach)
+        cells = growth.tips(islands, self.low)
         grown = self.on_surface(of, np.concatenate([cells, self.around(around)]))
         points = np.concatenate([islands, grown])
         wide = np.clip(np.sqrt(begun[:, 3] / CARRIED / math.pi), tip, WIDEST * tip)
         radii = np.concatenate([wide, np.full(len(grown), tip)])
-        enclosed = ~room.outside[room.at(points - [0, 0, 1.0] * self.sides)]
-        kept = ~enclosed | (np.arange(len(points)) < len(islands))
-        return Contacts(points[kept], radii[kept], enclosed[kept])
+        return Contacts(points, radii)
 
     def room(self, strength: Strength, raft: float) -> Room:
         """Room around the object, which is lifted by whole slabs of layers: its layers stay as they are."""
@@ -302,6 +312,7 @@ class _Growth:
     """Growth of an object into the air, layer by layer of cells."""
 
     full: NDArray[np.bool_]  # [z, y, x]
+    open: NDArray[np.bool_]  # cells that are not in holes without exit
     cell: NDArray[np.float64]  # sides of a cell, mm
     reach: float
 
@@ -316,12 +327,17 @@ class _Growth:
         used, found = np.full(self.full.shape[1:], np.inf, np.float32), []
         for k, now in enumerate(self.full):
             tips = known[order[starts[k] : starts[k + 1]], 1:]
-            used, more = self._layer(used, now, tips)
+            reach = np.where(self.open[k], self.reach, POCKET).astype(np.float32)
+            used, more = self._layer(used, now, tips, reach)
             found += [(k, *place) for place in more]
         return np.array(found, np.int64).reshape(-1, 3)
 
     def _layer(
-        self, used: NDArray[np.float32], now: NDArray[np.bool_], tips: NDArray[np.int64]
+        self,
+        used: NDArray[np.float32],
+        now: NDArray[np.bool_],
+        tips: NDArray[np.int64],
+        reach: NDArray[np.float32],
     ) -> tuple[NDArray[np.float32], list[tuple[int, int]]]:
         """Reach that is used in a layer, of that in the layer below, and the places of its further tips."""
         result = np.where(now, np.maximum(used - REGAINED * self.cell[2], 0), np.inf).astype(np.float32)
@@ -332,9 +348,9 @@ class _Growth:
             return result, more
         here = self._filled(result, bare)
         while True:
-            worst = int(here[rows, columns].argmax())
+            worst = int((here[rows, columns] - reach[rows, columns]).argmax())
             y, x = int(rows[worst]), int(columns[worst])
-            if not here[y, x] > self.reach:
+            if not here[y, x] > reach[y, x]:
                 break
             more.append((y, x))
             wide, deep = (math.ceil(self.reach * 2 / side) for side in self.cell[:2].tolist())

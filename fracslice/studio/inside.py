@@ -4,6 +4,7 @@ the background and shown by the camera of the picture.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -27,6 +28,7 @@ from ..jobs.slices import SliceRecipe
 from ..mesh.drawing import BEHIND, MeshDrawing, MeshView, Plane, Size
 from ..records import SAME, MeshJob, Print, SliceJob
 from ..rendering.live import Live, Shown
+from ..rendering.setup import footprint
 from ..scene import Scene
 from ..scene.layout import SOLID
 from ..scene.model import to_xml
@@ -40,7 +42,7 @@ from ..work import Work
 from .document import Document
 from .layer_view import LayerImage, PrintLayers, Window
 from .measuring import Mark, Overlay, Tracer, outline, readout
-from .solid import SceneSolid, legend
+from .solid import SceneSolid, legend, thickness_at
 from .views import Pixel, Views, triple
 
 MODES = "field", "mesh", "layers"
@@ -78,6 +80,9 @@ class Host(Protocol):
 
     def run(self, name: str, make: Callable[[Work], str]) -> None:
         """Begin a job in the background, if none is running; it says what it made."""
+
+    def edit(self, change: Callable[..., None], *arguments: Any) -> None:
+        """Change the document, and show what it is now."""
 
     def set_part(self, part: str, attribute: str, value: str | None) -> None:
         """Give an attribute of an element below `<scene>` a value, or take it away."""
@@ -135,21 +140,22 @@ class Inside:
     """The inside of the scene of a studio."""
 
     def __init__(self, host: Host, work: Work) -> None:
-        self._host, self._work = host, work
+        self._host, self._work = host, Work(work.threads)  # its progress is that of no job
+        self.fineness, self.edges, self.measure = FINENESS, False, ""
+        self.printer, self.layer = "", LAYER
+        self.measuring, self.bed = False, False
         self.release()
 
     def release(self) -> None:
         """Forget all that was made, and show the field."""
-        self.mode, self.message = "field", ""
-        self.fineness, self.edges, self.measure, self.designed = FINENESS, False, "", False
+        self.mode, self.message, self.designed = "field", "", False
         self.solids: dict[bool, tuple[Scene, SceneSolid]] = {}  # by whether print edits were left out
-        self.printer, self.layer, self.index, self.window = "", LAYER, 0, Window()
+        self.index, self.window = 0, Window()
         self.layers: PrintLayers | None = None
         self.report: PrintReport | None = None
         self.chosen: int | None = None
-        self.measuring, self.bed = False, False
         self.points: list[NDArray[np.float64]] = []  # scene units
-        self.thickness = ""
+        self.there: list[tuple[str, str]] = []  # what is known of the last point
         self.hovered = ""
         self.overlay = Overlay(())
         self._picture: MeshPicture | LayerPicture | None = None
@@ -160,6 +166,11 @@ class Inside:
         self._host.live.draw(None)
 
     # what is shown
+
+    @property
+    def has_made(self) -> bool:
+        """True if there is anything to forget."""
+        return bool(self.solids or self.layers)
 
     @property
     def solid(self) -> SceneSolid | None:
@@ -303,7 +314,7 @@ class Inside:
         resin = default_resin(job.printer, job.layer[0]) if job.printer else None
         layers = PrintLayers(stack, self._work, job.printer, resin)
         layers.survey()
-        self.layers, self._layered, self.report, self.chosen = layers, scene, None, None
+        self.chosen, self.report, self.layers, self._layered = None, None, layers, scene
         self.index = min(self.index or len(layers) // 2, len(layers) - 1)
         self.draw()
         return f"{len(layers):,} layers"
@@ -351,10 +362,10 @@ class Inside:
             if self.layers is None or self._layered is not scene:
                 self._planned(scene, work)
             assert self.layers is not None
-            self.report = check_layers(self.layers.stack, None, self.layers.printer, work)
-            self.chosen = None
+            report = check_layers(self.layers.stack, None, self.layers.printer, work)
+            self.chosen, self.report = None, report
             self.draw()
-            return verdict(self.report.problems)
+            return verdict(report.problems)
 
         self._host.run("the check", make)
 
@@ -372,9 +383,9 @@ class Inside:
         if problem and problem.at and self.mode == "layers":
             self.window = Window(*problem.at[:2], max(self.window.zoom, 4.0))
         elif problem and problem.at:
-            tracer, live = self._tracer, self._host.live
-            place, longest = self.footing.units(problem.at), max(self._longest, 1e-9)
-            self._host.views.fly_to(tracer.view(place, live.aim, APPROACH * longest))
+            place = self.footing.units(problem.at)
+            tracer = self._tracer_at(triple(place))
+            self._host.views.fly_to(tracer.view(place, self._host.live.aim, APPROACH * self._longest))
         self.draw()
 
     @property
@@ -385,35 +396,43 @@ class Inside:
 
     # measuring
 
-    @property
-    def _tracer(self) -> Tracer:
-        """Rays through the field that is shown."""
-        root = self._host.live.root
-        return Tracer(root, root.bounds.box if root.bounds.box.finite else Box((-10.0,) * 3, (10.0,) * 3))
+    def _tracer_at(self, place: Triple) -> Tracer:
+        """The field that is shown, around a place."""
+        root, camera, size = self._host.live.root, self._host.live.camera, self._host.live.size
+        box = root.bounds.box if root.bounds.box.finite else Box((-10.0,) * 3, (10.0,) * 3)
+        growth, base = footprint(camera, size)
+        return Tracer(root, box, growth * math.dist(camera.eye, place) + base)
 
     def pick(self, at: Pixel) -> None:
         """Measure the point that is under the mouse, after those before."""
         found = self._surface_at(at)
         if found is None:
             return
-        point, self.thickness = found
+        point, self.there = found
         self.points.append(point)
         self._mark()
 
-    def _surface_at(self, at: Pixel) -> tuple[NDArray[np.float64], str] | None:
-        """Point of the surface at a pixel, and the thickness there."""
+    def _surface_at(self, at: Pixel) -> tuple[NDArray[np.float64], list[tuple[str, str]]] | None:
+        """Point of the surface at a pixel, and names and values of what is known of it."""
         if isinstance(self._picture, MeshPicture):
-            spot = self._picture.drawn(self._host.live).at(*at)
-            return (np.array(spot.point), "") if spot else None
+            spot, solid = self._picture.drawn(self._host.live).at(*at), self.solid
+            if spot is None or solid is None:
+                return None
+            point = np.array(spot.point)
+            width = thickness_at(solid, point, np.array(spot.normal)) if spot.corners else math.inf
+            return point, [("thickness", f"{width:.4g} mm")] if math.isfinite(width) else []
         seen = self._host.views.surface_at(at)
         if seen is None:
             return None
-        point = self._tracer.snapped(np.array(seen))
-        return point, f"{self.footing.scale * self._tracer.thickness(point):.4g} mm"
+        tracer, scale = self._tracer_at(seen), self.footing.scale
+        point = tracer.snapped(np.array(seen))
+        known = {"thickness": tracer.thickness(point), "radius": tracer.radius(point)}
+        lengths = [(name, scale * length) for name, length in known.items() if math.isfinite(length)]
+        return point, [(name, f"{length:.4g} mm") for name, length in lengths]
 
     def forget(self) -> None:
         """Forget the points that were measured."""
-        self.points, self.thickness = [], ""
+        self.points, self.there = [], []
         self._mark()
 
     def hover(self, at: Pixel) -> None:
@@ -454,8 +473,19 @@ class Inside:
 
     def edit(self, name: str, value: str) -> None:
         """Change a print edit, or the size; an empty one is taken away."""
-        part = SOLID.name if name == "size" else Print.element
-        self._host.set_part(part, name, value or None)
+        if name == "size":
+            self._host.edit(self._resize, value or None)
+        else:
+            self._host.set_part(Print.element, name, value or None)
+
+    def _resize(self, size: str | None) -> None:
+        """Give the object a size, in place of that which a unit gave it."""
+        document = self._host.document
+        solid = document.part(SOLID.name)
+        if solid is not None:
+            with document.one_edit():
+                document.set_value(solid.place, "unit", None)
+                document.set_value(solid.place, "size", size)
 
     # what the page says
 
@@ -504,12 +534,11 @@ class Inside:
         return self.layers.figures(now, self.index, self.report)
 
     def _last_point(self, points: list[NDArray[np.float64]]) -> list[tuple[str, str]]:
-        """Place and thickness of the last point."""
+        """Place of the last point, and what is known of it."""
         if not points:
             return []
         at = points[-1] - self.footing.scale * np.array(self.footing.origin)
-        rows = [(f"point {len(points)}", f"{place_text(at.tolist(), 3)} mm")]
-        return [*rows, ("thickness", self.thickness)] if self.thickness else rows
+        return [(f"point {len(points)}", f"{place_text(at.tolist(), 3)} mm"), *self.there]
 
     def _row(self, problem: Problem) -> dict[str, Any]:
         """A problem as a page lists it."""

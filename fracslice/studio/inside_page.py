@@ -12,7 +12,7 @@ from ..errors import FracsliceError
 from ..slicing.printers import PRINTERS
 from .inside import MODES
 from .solid import MEASURES
-from .widgets import named, named_by
+from .widgets import NARROW, named, named_by, number_field
 
 if TYPE_CHECKING:
     from .page import Page
@@ -84,12 +84,15 @@ class InsidePanel:
             raw_attrs=named("What is shown"),
         ):
             for mode in MODES:
-                v.VBtn(mode, value=mode, size="small", click=(self.show, f"['{mode}']"))
+                pressed = [f":aria-pressed=\"inside.mode == '{mode}'\""]
+                v.VBtn(mode, value=mode, size="small", click=(self.show, f"['{mode}']"), raw_attrs=pressed)
 
     def build(self) -> None:
         """Lay the panel out."""
         with (
-            v.VNavigationDrawer(v_model=("looking_inside",), location="right", width=320),
+            v.VNavigationDrawer(
+                v_model=("looking_inside",), location="right", width=320, mobile_breakpoint=NARROW
+            ),
             v.VExpansionPanels(multiple=True, model_value=([0, 1, 2, 3, 4],), variant="accordion"),
         ):
             for title, lay in (
@@ -121,7 +124,7 @@ class InsidePanel:
                 raw_attrs=named("Make the mesh"),
             )
         with html.Div(classes="d-flex"):
-            self._switch("edges", "Edges", "edges")
+            self._switch("edges", "Edges")
             v.VCheckbox(
                 model_value=("inside.designed",),
                 update_modelValue=(self.compare, "[$event]"),
@@ -184,7 +187,7 @@ class InsidePanel:
                 color=("inside.old ? 'warning' : undefined",),
                 raw_attrs=named("Plan the layers"),
             )
-        self._switch("bed", "Build volume in the picture", "bed", "!inside.printer")
+        self._switch("bed", "Build volume in the picture", "!inside.printer")
         with html.Div(v_if="inside.count", classes="d-flex align-center"):
             v.VSlider(
                 model_value=("inside.index",),
@@ -196,13 +199,7 @@ class InsidePanel:
                 density="compact",
                 raw_attrs=named("Layer"),
             )
-            html.Input(
-                type="number",
-                value=("inside.index",),
-                change=(self.scrub, "[$event.target.value]"),
-                style="width: 64px; color: inherit",
-                raw_attrs=named("Layer as a number"),
-            )
+            number_field("inside.index", (self.scrub, "[$event.target.value]"), named("Layer as a number"))
         with html.Div(v_if="inside.count", classes="text-caption"):
             for colour, text in (("#ec8c32", "nothing below"), ("#d63cc8", "island"), ("#5496d6", "support")):
                 html.Span("■ ", style=f"color: {colour}")
@@ -255,7 +252,7 @@ class InsidePanel:
 
     def _measure(self) -> None:
         with html.Div(classes="d-flex align-center"):
-            self._switch("measuring", "Click points", "measuring")
+            self._switch("measuring", "Click points")
             v.VBtn(
                 "Clear",
                 click=(self.forget,),
@@ -279,7 +276,7 @@ class InsidePanel:
             v.VSlider(
                 v_if="!e.choices",
                 model_value=("e.value",),
-                end=(self.edit, "[e.name, $event ? $event + 'mm' : null]"),
+                update_modelValue=(self.edit, "[e.name, $event ? $event + 'mm' : null]"),
                 min=0,
                 max=("e.most",),
                 step=("e.step",),
@@ -287,11 +284,14 @@ class InsidePanel:
                 density="compact",
                 raw_attrs=named_by("e.name"),
             )
-            html.Input(
+            v.VTextField(
                 v_if="!e.choices",
-                value=("e.text",),
+                model_value=("e.text",),
                 change=(self.edit, "[e.name, $event.target.value]"),
-                style="width: 72px; color: inherit",
+                density="compact",
+                variant="plain",
+                hide_details=True,
+                style="flex: 0 0 72px; margin-top: -12px",
                 raw_attrs=named_by("e.name + ' as a text'"),
             )
             v.VSelect(
@@ -304,10 +304,10 @@ class InsidePanel:
                 raw_attrs=named_by("e.name"),
             )
 
-    def _switch(self, name: str, label: str, value: str, off: str = "false") -> None:
+    def _switch(self, name: str, label: str, off: str = "false") -> None:
         """A box that turns something of the inside on or off."""
         v.VCheckbox(
-            model_value=(f"inside.{value}",),
+            model_value=(f"inside.{name}",),
             update_modelValue=(self.toggle, f"['{name}']"),
             label=label,
             density="compact",
@@ -317,15 +317,17 @@ class InsidePanel:
 
     def _table(self, rows: str, others: str = "") -> None:
         """Names and values, and beside them values of another state."""
-        with (
-            v.VTable(density="compact", classes="text-caption"),
-            html.Tbody(),
-            html.Tr(v_for=f"(row, i) in {rows}", key="i"),
-        ):
-            html.Td("{{ row[0] }}", classes="text-medium-emphasis")
-            html.Td("{{ row[1] }}")
+        with html.Table(classes="text-caption", style="width: 100%; table-layout: fixed"):
             if others:
-                html.Td(f"{{{{ {others}[i] ? {others}[i][1] : '' }}}}", v_if=f"{others}.length")
+                with html.Tr(v_if=f"{others}.length", classes="text-medium-emphasis"):
+                    html.Td("", style="width: 76px")
+                    html.Td("{{ inside.designed ? 'before' : 'after' }}")
+                    html.Td("{{ inside.designed ? 'after' : 'before' }}")
+            with html.Tr(v_for=f"(row, i) in {rows}", key="i", style="vertical-align: top"):
+                html.Td("{{ row[0] }}", classes="text-medium-emphasis pr-2", style="width: 76px")
+                html.Td("{{ row[1] }}")
+                if others:
+                    html.Td(f"{{{{ {others}[i] ? {others}[i][1] : '' }}}}", v_if=f"{others}.length")
 
 
 def _printers() -> list[dict[str, str]]:

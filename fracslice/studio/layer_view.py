@@ -52,7 +52,7 @@ class Window:
     zoom: float = 1.0
 
     def scale(self, stack: Stack, size: Size) -> float:
-        """LayerImage of a millimetre in a picture of a size."""
+        """Pixels of a millimetre in a picture of a size."""
         across, along, _ = stack.size
         return self.zoom * FILLED * min(size[0] / across, size[1] / along)
 
@@ -95,11 +95,22 @@ class PrintLayers:
         """Slicer of the stack."""
         return Slicer(self.stack, self.work)
 
+    @cached_property
+    def _carried(self) -> Slicer | None:
+        """Slicer of the object without its supports, where layers do not tell them apart."""
+        supports = self.stack.supports
+        if supports is None or supports.carried.bounds.exterior_only:
+            return None
+        return Slicer(replace(self.stack, root=supports.carried, supports=None), self.work)
+
     def look(self, index: int) -> LayerImage:
         """A layer, compared with the one below it."""
         *below, now = self.slicer.map(_read, [index - 1, index] if index else [index])
         self.areas[index] = now.area
         pixel, classes = self.stack.pixel, now.classes
+        if self._carried:
+            (own,) = self._carried.map(lambda layer: layer.coverage, [index])
+            classes[own < now.coverage] = HELD
         if not below:
             return LayerImage(_colours(now), classes, now.area, len(layer_components(now.runs)[0]), 0, 0.0)
         reach = max(float(self.stack.heights[index]) / min(pixel), 1.0)

@@ -24,8 +24,11 @@ from .views import triple
 Point = NDArray[np.float64]
 """Three coordinates."""
 
-NEAR = 2e-3
-"""Distance within which a point is moved to the surface, longest sides."""
+NEAR, STEP = 2.0, 0.01
+"""Distance within which a point is moved to the surface, and steps of differences, pixels."""
+
+FLAT = 1e-3
+"""Least curvature that is told from none, of the longest side."""
 
 SAMPLES = 8192
 """Samples along a line through a solid, whose bound may not hold inside."""
@@ -41,11 +44,14 @@ HELD = 0.03
 
 
 class Tracer:
-    """The surface of a field, and what lies below it and before it; all in scene units."""
+    """The surface of a field, and what lies below it and before it; all in scene units.
 
-    def __init__(self, root: Field, box: Box) -> None:
+    `pixel`: size of a pixel there.
+    """
+
+    def __init__(self, root: Field, box: Box, pixel: float) -> None:
         self._kernel = root.kernel("cpu", "float64")
-        self._longest = math.dist(box.lo, box.hi)
+        self._longest, self._pixel = math.dist(box.lo, box.hi), pixel
 
     def values(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """The field at points [n, 3]."""
@@ -53,7 +59,7 @@ class Tracer:
 
     def snapped(self, point: Point) -> Point:
         """Root of the field along the normal at a point that is seen; the point itself, if none is near."""
-        normal, reach = self.normal(point), NEAR * self._longest
+        normal, reach = self.normal(point), NEAR * self._pixel
         low, high = self.values(point + np.array([[-reach], [reach]]) * normal)
         if not low <= 0 < high:
             return point
@@ -71,9 +77,16 @@ class Tracer:
 
     def normal(self, point: Point) -> Point:
         """Unit normal of the surface at a point."""
-        steps = 1e-5 * self._longest * np.eye(3)
+        steps = STEP * self._pixel * np.eye(3)
         slope = self.values(point + steps) - self.values(point - steps)
         return np.asarray(slope / max(float(np.linalg.norm(slope)), 1e-300))
+
+    def radius(self, point: Point) -> float:
+        """Radius of mean curvature at a point of the surface, negative in a hollow, infinite where flat."""
+        step, shifts = self._pixel, self._pixel * np.eye(3)
+        turns = [self.normal(point + shift) - self.normal(point - shift) for shift in shifts]
+        mean = sum(float(turn[k]) for k, turn in enumerate(turns)) / (4 * step)
+        return 1 / mean if abs(mean) * self._longest > FLAT else math.inf
 
     def thickness(self, point: Point) -> float:
         """Thickness of the solid below a point of its surface, along the normal; infinite without end."""
@@ -81,8 +94,10 @@ class Tracer:
         ways = self._longest * np.arange(1, SAMPLES + 1) / SAMPLES
         outside = self.values(point + ways[:, None] * inwards) > 0
         first = int(outside.argmax())
-        if not outside.any() or not first:
-            return 0.0 if first == 0 and outside.any() else math.inf
+        if not outside.any():
+            return math.inf
+        if first == 0:
+            return 0.0
         far = point + ways[first] * inwards
         return float(ways[first] - self._root(far, -inwards, 0.0, float(ways[first] - ways[first - 1])))
 

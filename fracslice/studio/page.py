@@ -27,7 +27,7 @@ from .film_page import HEIGHT, FilmPanel
 from .inside_page import InsidePanel
 from .session import FILMS, PRINT_ENDINGS, Session, jpeg
 from .sheets import SheetPanel, embedded
-from .widgets import named, named_by, number_field
+from .widgets import NARROW, named, named_by, number_field
 
 TICK = 1 / 60
 """Interval between two looks at the picture, seconds."""
@@ -70,8 +70,8 @@ TWICE, NEAR = 0.35, 5.0
 BAR = 48
 """Height of the bar above the picture, pixels."""
 
-NARROW = 900
-"""Width of a page below which the text covers the picture, pixels."""
+AWAY = 30.0
+"""Time after the last tab was closed in which another one finds the same, seconds."""
 
 AREA = "picture"
 
@@ -211,6 +211,7 @@ class Page:
         self.inside = InsidePanel(self)
         self.refresh()
         self.state.change("xml")(self.write)
+        self._tabs, self._left = 0, 0.0
         self.ctrl.on_server_bind.add(self.guard)
         self.ctrl.on_server_ready.add(lambda **_: asyncio.get_running_loop().create_task(self.follow()))
         self.build()
@@ -374,7 +375,18 @@ class Page:
             self.film.follow()
             self._say()
             self.inside.follow()
+            self._forget()
             await asyncio.sleep(TICK)
+
+    def _count_tabs(self, more: int) -> None:
+        """Note that a tab was opened, or closed, or nothing of either."""
+        self._tabs, self._left = self._tabs + more, time.monotonic()
+
+    def _forget(self) -> None:
+        """Free what was made to look at, some time after the last tab was closed."""
+        inside = self.studio.inside
+        if self._tabs == 0 and inside.has_made and time.monotonic() - self._left > AWAY:
+            inside.release()
 
     def _say(self) -> None:
         """Bring the line below the picture, and that of the job, up to date."""
@@ -396,7 +408,7 @@ class Page:
                 state_now.update(changes)
 
     def guard(self, server: Any) -> None:
-        """Refuse requests that were made to another host, or by the page of another site."""
+        """Refuse requests that were made to another host, or by the page of another site; count tabs."""
 
         @web.middleware
         async def refuse(
@@ -407,7 +419,12 @@ class Page:
             origin = request.headers.get("Origin")
             if request.host not in known or (origin and origin.partition("//")[2] not in known):
                 raise web.HTTPForbidden(text="expected the address that fracslice studio has printed")
-            return await handler(request)
+            is_tab = request.headers.get("Upgrade", "").lower() == "websocket"
+            self._count_tabs(is_tab)
+            try:
+                return await handler(request)
+            finally:
+                self._count_tabs(-is_tab)
 
         server.app.middlewares.append(refuse)
 

@@ -506,6 +506,8 @@ class Session:
             job.problem = "cancelled; nothing was written"
         except FracsliceError as error:
             job.problem = str(error)
+        except MemoryError:
+            job.problem = "there is not enough memory for it"
 
     def _file(self, path: Path, scene: Scene, camera: Camera, options: dict[str, Any], work: Work) -> str:
         """Make a picture, a film, a mesh or layers."""

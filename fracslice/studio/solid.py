@@ -42,6 +42,7 @@ class SceneSolid:
 
     result: Result
     known: dict[str, NDArray[np.float64]] = field(default_factory=dict)  # values of vertices, by measure
+    limits: dict[str, tuple[float, float]] = field(default_factory=dict)  # those of the first and last colour
 
     @cached_property
     def mesh(self) -> Mesh:
@@ -65,26 +66,18 @@ class SceneSolid:
     def measure(self, name: str, work: Work) -> None:
         """Measure the surface for its colours; `name` of `MEASURES`."""
         if name not in self.known:
-            self.known[name] = MEASURES[name].of(self, work)
+            measure = MEASURES[name]
+            values = measure.of(self, work)
+            self.limits[name] = measure.limits or _limits(values, measure.signed)
+            self.known[name] = values
 
     def coloured(self, name: str) -> Mesh:
         """The mesh in the colours of a measure that was taken."""
-        low, high = self.limits(name)
+        low, high = self.limits[name]
         share = np.clip((self.known[name] - low) / max(high - low, 1e-30), 0, 1) * (len(PALETTE) - 1)
         stops = np.arange(len(PALETTE))
         colours = np.stack([np.interp(share, stops, PALETTE[:, k]) for k in range(3)], 1)
         return replace(self.mesh, colours=(255 * colours + 0.5).astype(np.uint8))
-
-    def limits(self, name: str) -> tuple[float, float]:
-        """Values of the first and the last colour of a measure."""
-        measure, values = MEASURES[name], self.known[name]
-        if measure.limits:
-            return measure.limits
-        known = values[np.isfinite(values)]
-        if not len(known):
-            return 0.0, 1.0
-        low, high = np.quantile(known, (1 - MOST, MOST)).tolist()
-        return (low if measure.signed else 0.0), max(high, low + 1e-9)
 
     def value(self, name: str, drawn: MeshDrawing, column: float, row: float) -> str:
         """What is at a point of its picture: the place in mm, and the measure, if it shows one."""
@@ -119,17 +112,38 @@ class SceneSolid:
         ]
 
 
+def _limits(values: NDArray[np.float64], signed: bool) -> tuple[float, float]:
+    """Values of the first and the last colour: a few of the greatest, and of the least, have the same."""
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return 0.0, 1.0
+    low, high = np.quantile(known, (1 - MOST, MOST)).tolist()
+    return low if signed else 0.0, max(high, low + 1e-9)
+
+
+def thickness_at(of: SceneSolid, point: NDArray[np.float64], normal: NDArray[np.float64]) -> float:
+    """Thickness below a point of the surface, mm; infinite if it is more than can be measured."""
+    return float(_width(of, point[None], -normal[None], 1.0)[0])
+
+
+def _width(
+    of: SceneSolid, points: NDArray[np.float64], directions: NDArray[np.float64], towards: float
+) -> NDArray[np.float64]:
+    """Way through the solid, or what is empty if `towards` is -1, from points of the surface, [n], mm."""
+    bricks, mesh = of.result.bricks, of.mesh
+    limit = FARTHEST * float((mesh.vertices.max(0) - mesh.vertices.min(0)).max())
+    step = INSIDE * bricks.voxel
+    start = np.ascontiguousarray(points + step * directions)
+    width = Samples(bricks).native.through(start, directions, limit, towards)
+    return np.where(width < limit, of.result.place.scale * (width + step), np.inf)
+
+
 def _widths(gaps: bool) -> Callable[[SceneSolid, Work], NDArray[np.float64]]:
     """Width of the wall below the surface, or of the gap above it; infinite where it is none, mm."""
 
     def measured(of: SceneSolid, _: Work) -> NDArray[np.float64]:
-        bricks, mesh = of.result.bricks, of.mesh
-        limit = FARTHEST * float((mesh.vertices.max(0) - mesh.vertices.min(0)).max())
-        step, towards = INSIDE * bricks.voxel, -1.0 if gaps else 1.0
-        inwards = -towards * of.normals
-        start = np.ascontiguousarray(mesh.vertices + step * inwards)
-        width = Samples(bricks).native.through(start, inwards, limit, towards)
-        return np.where(width < limit, of.result.place.scale * (width + step), np.inf)
+        towards = -1.0 if gaps else 1.0
+        return _width(of, of.mesh.vertices, -towards * of.normals, towards)
 
     return measured
 
@@ -194,7 +208,7 @@ MEASURES = {
 
 def legend(solid: SceneSolid, name: str) -> dict[str, Any]:
     """Legend of a measure that was taken: its colours for a page, its limits and unit."""
-    low, high = solid.limits(name)
+    low, high = solid.limits[name]
     stops = ", ".join("#" + "".join(f"{round(255 * c):02x}" for c in colour) for colour in PALETTE)
     return {
         "name": name,

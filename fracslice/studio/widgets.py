@@ -7,6 +7,9 @@ from typing import Any
 
 from trame.widgets import vuetify3 as v
 
+NARROW = 900
+"""Width of a page below which panels at the right cover the picture, pixels."""
+
 
 def named(label: str, title: str = "") -> list[str]:
     """Attributes that name a control, for those who see it and those who do not."""

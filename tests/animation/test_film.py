@@ -23,6 +23,8 @@ from fracslice.errors import Cancelled, ExportError, RenderError
 from fracslice.rendering import Renderer, develop
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 FILMS = Path(__file__).parents[2] / "examples/films"
 SCENE = """<scene version="1"><solid size="80mm"><material colour="1 1 1"><sphere/></material></solid>
 <camera eye="0 -4 0"/><light kind="{light}" position="1 -1 1"/><film width="40" height="24" samples="8"/>

@@ -105,7 +105,7 @@ def test_a_good_model_would_print_and_an_open_one_has_no_layers(
 
 
 def test_a_problem_has_its_place_and_fix_mends_it(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    trimesh.util.concatenate([box(PLATE), ball(4, 4)]).export(tmp_path / "loose.stl")
+    trimesh.util.concatenate([box((8, 8, 2)), ball(2, 4)]).export(tmp_path / "loose.stl")
     assert run(["check", str(tmp_path / "loose.stl"), *COARSE, "--fix", "--json"]) in (0, 1)
     report = json.loads(capfd.readouterr().out)["layers"]
     (bodies,) = (p for p in report["before"]["problems"] if p["kind"] == "bodies")
@@ -169,21 +169,21 @@ def test_fix_writes_what_it_made(tmp_path: Path, capfd: pytest.CaptureFixture[st
 
 def bowl() -> trimesh.Trimesh:
     """A suction cup, unless it lies on a side."""
-    hole = box((12, 12, 10), 2)
-    return box((20, 20, 10)).difference(hole)
+    hole = box((6, 6, 5), 1)
+    return box((10, 10, 5)).difference(hole)
 
 
 def test_fix_turns_a_model_and_writes_it(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     source, made = tmp_path / "bowl.stl", tmp_path / "made.stl"
     bowl().export(source)
-    command = ["check", str(source), *COARSE, "--size", "30mm", "--fix", "--json", "-o", str(made)]
+    command = ["check", str(source), *COARSE, "--size", "15mm", "--fix", "--json", "-o", str(made)]
     assert run(command) == 0
     layers = json.loads(capfd.readouterr().out)["layers"]
     assert [problem["kind"] for problem in layers["before"]["problems"]] == ["cups"]
     assert layers["flags"] == "--up 1 0 0" and layers["after"]["problems"] == []
-    assert layers["after"]["size"] == pytest.approx((15, 30, 30))
+    assert layers["after"]["size"] == pytest.approx((7.5, 15, 15))
     solid = trimesh.load_mesh(made)
-    assert solid.extents == pytest.approx((15, 30, 30), abs=1e-4)
+    assert solid.extents == pytest.approx((7.5, 15, 15), abs=1e-4)
     assert solid.volume == pytest.approx(bowl().volume * 1.5**3, rel=1e-4)
 
 
@@ -191,8 +191,8 @@ def test_fix_keeps_a_direction_that_was_asked_for(tmp_path: Path, capfd: pytest.
     bowl().export(tmp_path / "bowl.stl")
     source, made = tmp_path / "bowl.stl", tmp_path / "made.stl"
     for more, size in (
-        (["--up", "0", "1", "0"], (20, 10, 20)),
-        (["--scale", "100%,100%,110%"], (20, 20, 11)),
+        (["--up", "0", "1", "0"], (10, 5, 10)),
+        (["--scale", "100%,100%,110%"], (10, 10, 5.5)),
     ):
         run(["check", str(source), *COARSE, "--fix", *more, "-o", str(made)])
         assert "with --up" not in capfd.readouterr().out

@@ -15,6 +15,8 @@ from fracslice.cli.main import run
 from fracslice.errors import Cancelled
 from fracslice.export.resuming import Journal
 
+pytestmark = pytest.mark.once
+
 
 def sliced(*arguments: object) -> int:
     return run(["slice", *map(str, arguments), "--pixel", "0.2mm"])

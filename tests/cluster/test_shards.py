@@ -28,6 +28,8 @@ from fracslice.work import Work
 
 from .test_cluster import RECIPE, rendered, sliced
 
+pytestmark = pytest.mark.once
+
 pytest.importorskip("fsspec")
 
 

@@ -36,6 +36,8 @@ from fracslice.slicing.printers import Printer, Resin
 from fracslice.slicing.raster import Screen
 from fracslice.work import Work
 
+pytestmark = pytest.mark.once
+
 MACHINE = Printer("test", "Test", (96, 80), (24.0, 20.0), 30, portrait=True)
 ROOT = difference(menger(level=1), sphere(radius=0.9))
 

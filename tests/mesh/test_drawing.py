@@ -9,6 +9,7 @@ import pytest
 import trimesh
 
 from fracslice import Mesh
+from fracslice._native import foremost
 from fracslice.mesh.drawing import BEHIND, SECTION, MeshView, Plane, Projection, clip
 from fracslice.scene.view import Camera
 
@@ -82,3 +83,24 @@ def test_colours_are_those_of_the_corners() -> None:
     assert left[2] > 2 * left[0] and right[0] > 2 * right[2]
     edged = MeshView(red, edges=True).draw(CAMERA, SIZE).pixels.astype(int)
     assert (edged <= pixels).all() and (edged < pixels).any()
+
+
+def test_the_foremost_triangle_is_that_of_all_at_each_pixel() -> None:
+    rng = np.random.default_rng(7)
+    points = np.concatenate([rng.uniform(-4, 24, (60, 3)), rng.integers(-2, 44, (60, 3)) / 2.0])
+    triangles = rng.integers(0, len(points), (80, 3)).astype(np.int32)
+    y, x = (axis.astype(float) + 0.5 for axis in np.mgrid[0:16, 0:20])
+    best, front = np.full(x.shape, -np.inf), np.full(x.shape, -1)
+    for number, (a, b, c) in enumerate(points[triangles]):
+        area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        if area == 0:
+            continue
+        v = ((x - a[0]) * (c[1] - a[1]) - (y - a[1]) * (c[0] - a[0])) / area
+        w = ((b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])) / area
+        z = a[2] + v * (b[2] - a[2]) + w * (c[2] - a[2])
+        nearer = (v >= 0) & (w >= 0) & (v + w <= 1) & (z > best)
+        best[nearer], front[nearer] = z[nearer], number
+    np.testing.assert_array_equal(foremost(points, triangles, (16, 20)), front)
+    far = np.concatenate([points, [[1e12, -1e12, 0.0], [-1e12, 3e12, 0.0], [-1e12, -1e12, 0.0]]])
+    whole = np.array([[120, 121, 122]], np.int32)
+    assert (foremost(far, whole, (16, 20)) == 0).all()

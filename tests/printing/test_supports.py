@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
+import zlib
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from scipy.ndimage import distance_transform_edt, label
 
-from fracslice import MeshJob, make_mesh
+from fracslice import MeshJob, make_mesh, slice_layers
+from fracslice._slices import Encoding
 from fracslice.checks.layer_checks import check_layers
 from fracslice.errors import SceneError
 from fracslice.formulas import (
@@ -24,10 +28,12 @@ from fracslice.formulas import (
     transform,
     union,
 )
-from fracslice.jobs.mesh import make_implicit
-from fracslice.printing.pillars import Room, steps_from
+from fracslice.jobs.mesh import make_apart, make_implicit
+from fracslice.jobs.plates import write_bodies
+from fracslice.printing.pillars import Object, Room, steps_from
 from fracslice.scene import Print, scene
 from fracslice.slicing import SliceJob, Slicer, Stack, plan_stack
+from fracslice.slicing.layers import Layer, ScreenView
 from fracslice.slicing.orientation import _runs, orientations
 from fracslice.volume.amount import Sizing
 from fracslice.work import Work
@@ -116,8 +122,15 @@ def test_a_cone_on_its_tip_is_held_beside_it() -> None:
 
 
 def test_a_mesh_has_the_size_of_object_and_supports() -> None:
-    report = make_mesh(MUSHROOM, resolution=96, supports="medium", threads=1).report
+    made = make_mesh(MUSHROOM, resolution=96, supports="medium", threads=1)
+    report, high = made.report, made.vertices[:, 2] > 10.0
     assert not [note for note in report.notes if "finer than the samples" in note] and report.problems == ()
+    colours = made.shown.colours
+    assert colours is not None and made.colours is None
+    assert (
+        len(np.unique(colours[high], axis=0)) == 2
+        and len(np.unique(colours[made.vertices[:, 2] < 1], axis=0)) == 1
+    )
 
 
 def test_what_hangs_in_a_cavity_is_caught() -> None:
@@ -126,6 +139,38 @@ def test_what_hangs_in_a_cavity_is_caught() -> None:
     assert "1 in holes without exit (--cavities fill" in str(held)
     filled = supported(CAVITY, cavities="fill").supports  # type: ignore[arg-type]
     assert filled is not None and filled.caught == 0
+
+
+@pytest.mark.parametrize(("hole", "caught"), [(1.2, 0), (0.3, 1)])
+def test_what_comes_out_of_a_hole_is_not_caught(hole: float, caught: int) -> None:
+    room = difference(
+        CAVITY, transform(cylinder(radius=hole / 2, height=8), rotate=(0, 1, 0, 90), translate=(5, 0, 0))
+    )
+    held = supported(room).supports
+    assert held is not None and held.inner == 1 and held.caught == caught
+
+
+def test_a_strut_stands_on_what_is_as_wide() -> None:
+    rod, floor = cylinder(radius=0.1, height=4), at(box(size=(4, 4, 1)), 0, 0, -3)
+    of = Object(union(rod, floor), 1.0, np.ones(1), 0.1, Work(threads=1))
+    start = np.array([[0.0, 0.0, 4.0], [0.0, 1.0, 4.0]])
+    assert of.first_below(start, -9.0, 0.1, np.full(2, 0.08))[0] == pytest.approx(2, abs=0.2)
+    assert of.first_below(start, -9.0, 0.1, np.full(2, 0.2)) == pytest.approx(-2.5, abs=0.11)
+
+
+def test_pictures_show_what_either_layer_covers() -> None:
+    stack = supported(BALL)
+    view = ScreenView(stack.shape, False, False, (0, 0), stack.shape, bytes(range(256)))
+
+    def shown(layer: Layer) -> tuple[np.ndarray, np.ndarray, float, float]:
+        data = zlib.decompress(layer.encoded(view, Encoding.PNG))
+        area = layer.area
+        image = np.frombuffer(data, np.uint8).reshape(stack.shape[0], -1)[::-1, 1:]
+        return image, layer.coverage, area, int(layer.coverage.sum()) / 255 * STEP**2
+
+    for image, coverage, area, covered in Slicer(stack, Work(threads=1)).map(shown):
+        assert (image == coverage).all()
+        assert area == pytest.approx(covered, rel=0.02, abs=0.1)
 
 
 def test_more_carries_more() -> None:
@@ -159,6 +204,24 @@ def test_mesh_is_one_solid() -> None:
     coarse = make_mesh(scene(MUSHROOM, unit=1), MeshJob(voxel=0.4, printing=job.printing), Work(threads=1))
     assert any("tips of 0.8 mm" in note for note in coarse.report.notes)  # two voxels
     assert coarse.report.mesh.components == 1
+
+
+def test_a_body_of_its_own_stands_where_it_belongs(tmp_path: Path) -> None:
+    solid, job = scene(MUSHROOM, unit=1), MeshJob(voxel=0.4, printing=Print(supports="heavy"))
+    made = make_apart(solid, job, Work(threads=1))
+    whole = make_mesh(solid, job, Work(threads=1)).mesh
+    assert [note.startswith("supports: ") for one in made for note in one.report.notes[:1]] == [True]
+    (file,) = write_bodies(made, ("object", "supports"), tmp_path / "o.3mf", {}, Work(threads=1))
+    bodies = trimesh.load(file)
+    assert list(bodies.geometry) == ["object", "supports"]
+    parts = bodies.dump()
+    assert all(part.is_watertight for part in parts)
+    joined = trimesh.boolean.union(parts, engine="manifold")
+    assert joined.volume == pytest.approx(whole.volume, rel=2e-3)
+    assert joined.bounds[:, 2] == pytest.approx(whole.bounds[:, 2], abs=1e-3)
+    assert len(write_bodies(made, ("object", "supports"), tmp_path / "o.stl", {}, Work(threads=1))) == 2
+    with pytest.raises(SceneError, match="expected supports"):
+        make_apart(solid, MeshJob(voxel=0.4), Work(threads=1))
 
 
 def test_the_same_with_any_number_of_threads() -> None:
@@ -238,6 +301,8 @@ def test_best_direction_up(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(best) == 5
     for k, one in enumerate(best):
         assert all(np.dot(one.up, other.up) < math.cos(math.radians(14.9)) for other in best[:k])
+    slices = slice_layers(MUSHROOM, layer=1, pixel=1, up="auto")
+    assert slices[0].sum(dtype=int) > 4 * slices[-1].sum(dtype=int)
     turned = orientations(transform(MUSHROOM, rotate=(1, 0, 0, 30)), Sizing(20.0), Work(threads=1))[0]
     assert turned.supports < 5  # the side of its hat is one of the hull
 

@@ -22,6 +22,8 @@ from fracslice.formulas import get, mandelbox, orbit
 from fracslice.scene import Scene, read, reads, to_xml
 from fracslice.scene.manual import OPEN, PATH
 
+pytestmark = pytest.mark.once
+
 STEP = "return scale * ball(fold(w, 1), 0.5) + c"
 FILE = f"""<scene version="1">
   <define name="own">

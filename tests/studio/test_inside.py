@@ -2,24 +2,31 @@
 
 from __future__ import annotations
 
+import math
+import time
 import zipfile
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from fracslice import box, make_mesh, sphere
+from fracslice import box, cylinder, make_mesh, sphere, transform
 from fracslice.errors import SceneError
+from fracslice.fields.box import Box
 from fracslice.mesh.drawing import SECTION
-from fracslice.records import Print
+from fracslice.records import Print, SliceJob
 from fracslice.scene.view import Camera
+from fracslice.slicing import plan_stack
 from fracslice.studio.inside import Inside
-from fracslice.studio.layer_view import HANGS, ISLAND
+from fracslice.studio.layer_view import HANGS, HELD, ISLAND, PrintLayers
 from fracslice.studio.measuring import Mark, Overlay, Tracer, angle, circle, readout
 from fracslice.studio.measuring import sphere as best_sphere
 from fracslice.studio.session import Session
-from fracslice.studio.solid import MEASURES, SceneSolid, legend
+from fracslice.studio.solid import MEASURES, SceneSolid, legend, thickness_at
+from fracslice.volume import Supports
+from fracslice.volume.amount import Sizing
 from fracslice.work import Work
 
 from .test_session import within
@@ -96,7 +103,7 @@ def test_print_edits_are_written_and_compared(studio: Session, inside: Inside) -
     base = next(edit for edit in inside.edits if edit["name"] == "base")
     assert base["value"] == 1.0 and base["text"] == "1mm" and base["most"] >= 2
     inside.edit("size", "20mm")
-    assert studio.document.problem or studio.document.scene.size_mm == 20
+    assert not studio.document.problem and studio.document.scene.size_mm == 20
     studio.edit(studio.document.undo)
     inside.show("mesh")
     done(studio)
@@ -129,6 +136,17 @@ def test_layers_show_islands_in_the_pixels_of_a_printer(studio: Session, inside:
     within(lambda: (studio.shown.pixels > 100).all(2).sum() > 1.2 * area)
     inside.drag(400, 0)
     within(lambda: not (studio.shown.pixels > 100).all(2).any())
+
+
+def test_supports_of_a_layer_are_told_from_the_object() -> None:
+    ball = transform(sphere(2), translate=(0, 0, 4))
+    rod = transform(cylinder(0.5, 3), translate=(0, 0, 1.5))
+    size = Sizing.of(6.0)
+    stack = plan_stack(ball | rod, SliceJob(layer=0.5, pixel=0.1), WORK, size)
+    held = Supports(ball, rod, 0.5, 1, 0, 0, 1.0, 0.1)
+    layers = PrintLayers(replace(stack, supports=held), WORK, None, None)
+    assert (layers.look(1).classes == HELD).sum() == pytest.approx(100 * np.pi / 4, rel=0.2)
+    assert not (layers.look(8).classes == HELD).any()
 
 
 def test_layers_are_written_for_the_printer(studio: Session, inside: Inside, tmp_path: Path) -> None:
@@ -192,6 +210,10 @@ def test_points_of_a_mesh_are_measured(studio: Session, inside: Inside) -> None:
     within(lambda: studio.shown.camera.eye == (0.0, -40.0, 0.0))
     inside.pick((48, 32))
     np.testing.assert_allclose(inside.points[0][1], -5.0, atol=1e-3)
+    assert inside.there == []  # 10 mm are more than a quarter of the object
+    assert inside.solid
+    top = thickness_at(inside.solid, np.array([1.0, 1.0, 7.0]), np.array([0.0, 0.0, 1.0]))
+    assert top == pytest.approx(2, abs=0.05)
     inside.hover((48, 32))
     assert inside.hovered.endswith("mm") and "-5.0" in inside.hovered
 
@@ -224,12 +246,16 @@ def test_colours_measure_the_surface() -> None:
 
 def test_points_snap_to_the_root() -> None:
     ball = sphere(5)
-    tracer = Tracer(ball, ball.bounds.box)
+    tracer = Tracer(ball, ball.bounds.box, 0.02)
     seen = np.array([0.3, -4.89, 1.0])
     point = tracer.snapped(seen)
     assert np.linalg.norm(point) == pytest.approx(5, abs=1e-12) and np.linalg.norm(point - seen) < 0.01
     assert (tracer.snapped(2 * seen) == 2 * seen).all()
     assert tracer.thickness(point) == pytest.approx(10, abs=1e-6)
+    assert tracer.radius(point) == pytest.approx(5, rel=1e-4)
+    hollow = Tracer(box((20, 20, 20)) - ball, Box((-10.0,) * 3, (10.0,) * 3), 0.02)
+    assert hollow.radius(np.array([3.0, 4.0, 0.0])) == pytest.approx(-5, rel=1e-4)
+    assert math.isinf(hollow.radius(np.array([10.0, 0.0, 0.0])))
     camera = Camera(eye=(0.0, -20.0, 0.0), target=(0.0, 0.0, 0.0))
     view = tracer.view(np.array([0.0, 5.0, 0.0]), camera, 4.0)  # the far side is not seen from the front
     assert view.eye[1] >= 5 and view.target == (0.0, 5.0, 0.0)
@@ -252,3 +278,29 @@ def test_marks_behind_the_eye_are_not_drawn() -> None:
         assert Overlay((mark,)).over(black, camera, size).any() == drawn
     through = Mark(np.array([[0.0, -10.0, -1.0], [0.0, 10.0, 1.0]]), (255, 0, 0))
     assert Overlay((through,)).over(black, camera, size).any()
+
+
+def test_what_was_made_is_freed_after_the_last_tab(
+    studio: Session, inside: Inside, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pages = pytest.importorskip("fracslice.studio.page")
+    page = pages.Page(studio)
+    inside.show("mesh")
+    done(studio)
+    monkeypatch.setattr(pages, "AWAY", 0.0)
+    for tabs, kept in ((2, True), (-1, True), (-1, False)):
+        page._count_tabs(tabs)
+        time.sleep(0.001)
+        page._forget()
+        assert inside.has_made == kept
+
+
+def test_a_mesh_is_seen_from_inside_and_the_field_from_outside(studio: Session, inside: Inside) -> None:
+    inside.show("mesh")
+    done(studio)
+    within_it = Camera(eye=(0.0, 0.0, 0.0), target=(0.0, 1.0, 0.0))
+    studio.live.look(within_it)
+    within(lambda: studio.shown.camera == within_it)
+    assert studio.shown.distance > 0
+    inside.show("field")
+    within(lambda: studio.shown.camera == studio.live.first)

@@ -165,6 +165,31 @@ def test_an_element_is_wrapped_and_a_file_made(served: Served) -> None:
     assert page.get_by_text("fracslice mesh two.xml -o two.stl --resolution 32").is_visible()
 
 
+def test_the_inside_is_looked_at(served: Served) -> None:
+    page = served.page
+    page.get_by_label("Text", exact=True).click()
+    page.get_by_label("Inside", exact=True).click()
+    panel = page.locator(".v-navigation-drawer", has_text="Layers")
+    panel.locator(".v-select", has_text="Fineness").click()
+    page.get_by_role("option", name="32", exact=True).click()
+    panel.get_by_text("closed, manifold").wait_for()
+    assert page.get_by_role("button", name="mesh", exact=True).get_attribute("aria-pressed") == "true"
+    panel.get_by_label("Click points").check()
+    box = page.locator(".v-main img").first.bounding_box()
+    assert box
+    page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    panel.get_by_text("point 1").wait_for()
+    page.get_by_role("button", name="layers", exact=True).click()
+    layer = panel.get_by_label("Layer as a number")
+    layer.fill("3")
+    layer.press("Enter")
+    panel.get_by_text("0.200 mm of").wait_for()
+    page.get_by_role("button", name="field", exact=True).click()
+    page.get_by_label("Inside", exact=True).click()
+    page.get_by_label("Text", exact=True).click()
+    picture(page)
+
+
 def test_two_tabs_show_the_same_scene(served: Served, browser: playwright.Browser) -> None:
     other = browser.new_page()
     other.goto(served.address)

@@ -378,6 +378,25 @@ class StreakRows {
     std::vector<size_t> begin_;  // of each row
 };
 
+// Puts a streak after others that begin before it, of which it may cover the last one: where both are, the higher level is shown.
+// Returns the area that both cover, by their levels.
+double put_over(Streak next, std::vector<Streak>& line) {
+    double shared = 0;
+    if (!line.empty() && next.column < line.back().column + line.back().count) {
+        const Streak last = line.back();
+        const int first = std::max(next.column, last.column), end = last.column + last.count, stop = next.column + next.count;
+        const int both = std::min(end, stop) - first;
+        line.back().count = first - last.column;
+        if (line.back().count == 0) line.pop_back();
+        if (both > 0) line.push_back({first, both, std::max(next.level, last.level)});
+        shared = both * std::min(next.level, last.level) / 255.0;
+        if (end > first + both) line.push_back({first + both, end - first - both, last.level});
+        next = {first + both, stop - first - both, next.level};
+    }
+    if (next.count > 0) line.push_back(next);
+    return shared;
+}
+
 }  // namespace
 
 Picture picture(const Slab& slab, const View& view, Encoding encoding) { return Shown(slab, view, encoding).picture(); }
@@ -406,16 +425,17 @@ Picture picture(const std::vector<Piece>& pieces, int rows, int columns, Encodin
     Adler sum;
     const int filter = encoding == Encoding::png;
     const int64_t stride = columns + filter;
-    std::vector<Streak> line;
+    std::vector<Streak> given, line;
     for (int y = 0; y < rows; ++y) {
-        line.clear();
+        given.clear(), line.clear();
         for (const Shows& one : shows) {
             const int own = y - one.row;
             if (own < 0 || own >= one.rows) continue;
             const auto [begin, end] = (*one.streaks)[one.upside_down ? one.rows - 1 - own : own];
-            for (const Streak* s = begin; s != end; ++s) line.push_back({s->column + one.column, s->count, s->level});
+            for (const Streak* s = begin; s != end; ++s) given.push_back({s->column + one.column, s->count, s->level});
         }
-        if (shows.size() > 1) std::ranges::stable_sort(line, {}, &Streak::column);
+        if (shows.size() > 1) std::ranges::stable_sort(given, {}, &Streak::column);
+        for (const Streak& s : given) painted.area -= put_over(s, line);
         int at = 0;
         runs.add(0, uint64_t(filter));
         for (const Streak& s : line) {

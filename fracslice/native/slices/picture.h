@@ -34,7 +34,7 @@ struct Piece {
     std::vector<std::array<int, 2>> places;  // row and column of its first pixel in the picture, for each time it is shown
 };
 
-// All of them in one picture, from rows of equal pixels of each object. What they cover is painted once for each piece.
+// All of them in one picture, from rows of equal pixels of each object; two of them may overlap in a place.
 Picture picture(const std::vector<Piece>& pieces, int rows, int columns, Encoding encoding);
 // Until this thread makes another.
 const Rows<uint8_t>& encoded(const Canvas& image, Encoding encoding);

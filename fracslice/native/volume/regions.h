@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <cstring>
 #include <deque>
+#include <functional>
 #include <limits>
 #include <mutex>
 #include <numeric>
@@ -109,30 +110,37 @@ class Regions {
     }
 
   private:
+    struct Cell;
+
+    // Points in a row, from `begin` to before `end`, that are in one cell.
+    struct Streak {
+        const Cell* cell;
+        uint32_t begin, end;
+    };
+
     // Points of one cell are evaluated together.
     void part(const Real* x, const Real* y, const Real* z, Real* f, size_t n) const {
-        thread_local std::vector<std::pair<const Cell*, uint32_t>> order;
-        order.resize(n);
+        thread_local std::vector<Streak> streaks;
+        streaks.clear();
         const Cell* cell = &root_;
-        size_t changes = 0;
         for (size_t i = 0; i < n; ++i) {
             const Point p{double(x[i]), double(y[i]), double(z[i])};
-            if (cell == &root_ || !cell->holds(p)) {
-                const Cell* next = leaf(p);
-                changes += next != cell;
-                cell = next;
-            }
-            order[i] = {cell, uint32_t(i)};
+            if (cell == &root_ || !cell->holds(p)) cell = leaf(p, *cell);
+            if (streaks.empty() || streaks.back().cell != cell) streaks.push_back({cell, uint32_t(i), uint32_t(i)});
+            ++streaks.back().end;
         }
-        if (changes * kGrain > n) std::sort(order.begin(), order.end());
-        for (size_t begin = 0, end; begin < n; begin = end) {
-            for (end = begin + 1; end < n && order[end].first == order[begin].first;) ++end;
-            some(*order[begin].first, &order[begin], end - begin, x, y, z, f);
+        if (streaks.size() * kGrain > n)
+            std::sort(streaks.begin(), streaks.end(), [](const Streak& a, const Streak& b) {
+                return a.cell != b.cell ? std::less<>()(a.cell, b.cell) : a.begin < b.begin;
+            });
+        for (size_t begin = 0, end; begin < streaks.size(); begin = end) {
+            for (end = begin + 1; end < streaks.size() && streaks[end].cell == streaks[begin].cell;) ++end;
+            some(&streaks[begin], end - begin, x, y, z, f);
         }
     }
 
     static constexpr size_t kPart = size_t(1) << 14;  // points that are ordered at a time
-    static constexpr size_t kFew = 16;     // elements of a leaf
+    static constexpr size_t kFew = 48;     // elements of a leaf
     static constexpr int kDeepest = 9;    // levels of cells
     static constexpr int kStuck = 5;      // levels without use, after which a cell is not divided
     static constexpr size_t kGrain = 16;  // points in a row, of one cell on the average, that need not be sorted
@@ -141,6 +149,7 @@ class Regions {
         Point centre{};
         double half = 0;
         int level = 0, stuck = 0;  // `stuck`: levels above it that left out few elements
+        const Cell* above = nullptr;
         std::vector<uint32_t> live;
         std::vector<Real> parameters;  // of a leaf
         mutable std::atomic<const Cell*> children{nullptr};  // eight
@@ -151,10 +160,13 @@ class Regions {
         bool is_leaf() const { return level == kDeepest || live.size() <= kFew || stuck == kStuck; }
     };
 
-    // The leaf of a point; the root, which lists all elements, for points outside.
-    const Cell* leaf(const Point& p) const {
-        const Cell* cell = &root_;
-        if (!cell->holds(p)) return cell;
+    // The leaf of a point, near that of another one; the root, which lists all elements, for points outside.
+    const Cell* leaf(const Point& p, const Cell& near) const {
+        const Cell* cell = &near;
+        while (!cell->holds(p)) {
+            if (!cell->above) return cell;
+            cell = cell->above;
+        }
         while (!cell->is_leaf()) {
             size_t k = 0;
             for (int axis = 0; axis < 3; ++axis) k |= size_t(p[axis] >= cell->centre[axis]) << axis;
@@ -212,6 +224,7 @@ class Regions {
         for (size_t k = 0; k < 8; ++k) {
             Cell& part = (*eight)[k];
             part.level = cell.level + 1;
+            part.above = &cell;
             part.half = half;
             double least = std::numeric_limits<double>::infinity(), size = std::abs(half);
             for (int axis = 0; axis < 3; ++axis) {
@@ -231,18 +244,27 @@ class Regions {
         return eight->data();
     }
 
-    void some(const Cell& cell, const std::pair<const Cell*, uint32_t>* order, size_t n, const Real* x, const Real* y, const Real* z,
-              Real* f) const {
+    // Points of some streaks in one cell.
+    void some(const Streak* streaks, size_t count, const Real* x, const Real* y, const Real* z, Real* f) const {
         thread_local std::vector<Real> rows;
+        size_t n = 0;
+        for (size_t k = 0; k < count; ++k) n += streaks[k].end - streaks[k].begin;
         const size_t lanes = (n + width_ - 1) / width_ * width_;
         rows.resize(4 * lanes);
         const std::array<const Real*, 3> given{x, y, z};
         for (int axis = 0; axis < 3; ++axis) {
             Real* row = &rows[axis * lanes];
-            for (size_t k = 0; k < lanes; ++k) row[k] = given[axis][order[std::min(k, n - 1)].second];
+            for (size_t k = 0; k < count; ++k) row = std::copy(given[axis] + streaks[k].begin, given[axis] + streaks[k].end, row);
+            std::fill(row, &rows[axis * lanes] + lanes, row[-1]);
         }
-        whole_.points(cell.parameters.data(), &rows[0], &rows[lanes], &rows[2 * lanes], &rows[3 * lanes], ptrdiff_t(lanes));
-        for (size_t k = 0; k < n; ++k) f[order[k].second] = rows[3 * lanes + k];
+        const std::vector<Real>& parameters = streaks->cell->parameters;
+        whole_.points(parameters.data(), &rows[0], &rows[lanes], &rows[2 * lanes], &rows[3 * lanes], ptrdiff_t(lanes));
+        const Real* made = &rows[3 * lanes];
+        for (size_t k = 0; k < count; ++k) {
+            const size_t own = streaks[k].end - streaks[k].begin;
+            std::copy_n(made, own, f + streaks[k].begin);
+            made += own;
+        }
     }
 
     Listing<Real> whole_, alone_;
