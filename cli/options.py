@@ -30,6 +30,7 @@ from fracslice.common.parameters import (
     Percent,
     Pixels,
     Record,
+    Sides,
     Vector,
     parse_length,
     picture_size,
@@ -150,6 +151,8 @@ def metavar(kind: Parameter) -> str:
         return kind.unit.upper() or ("N" if isinstance(kind, Number) else "X Y Z")
     if isinstance(kind, Pixels):
         return kind.letters
+    if isinstance(kind, Sides):
+        return "WxD[xH]" if kind.flat else "WxDxH"
     if isinstance(kind, Holes):
         return f"X,Y,Z|{kind.WORD}"
     names = {Percent: "N%[,N%,N%]", Duration: "TIME"}

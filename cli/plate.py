@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 OF_MESHES = {*(MeshJob.kinds().keys() - Placed.kinds().keys()), "material"}
 OF_LAYERS = {*(SliceJob.kinds().keys() - Placed.kinds().keys()), *("mirror", "exposure", "resin", "preview")}
 OF_LAYERS |= {"address", "html", "form", "cluster", "shard", "store"}
-SOLO = {"thickness", "bridge", "hollow"}
 
 
 class PlateOptions(LayerFileOptions, MeshOptions):

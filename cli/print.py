@@ -46,7 +46,7 @@ class SlicerOptions(MeshOptions):
     """Options of `print`."""
 
     records = (PartsJob,)
-    without = frozenset({"bodies", "plugs"})
+    without = frozenset({"bodies", "plugs", "support_body"})
     bed: Triple | None
     parts: tuple[int, int, int] | str | None
     copies: int = COPIES
