@@ -84,6 +84,13 @@ def text(page: playwright.Page) -> str:
     return str(page.get_by_label("Text of the scene").input_value())
 
 
+def settled(page: playwright.Page) -> str:
+    """Text of the scene once no value of a slider is on its way any more."""
+    seen = [""]
+    until(lambda: (seen.append(text(page)), time.sleep(0.3), seen[-1] == text(page))[2])
+    return seen[-1]
+
+
 def row(page: playwright.Page, name: str) -> playwright.Locator:
     """Elements of a name in the tree."""
     return page.get_by_role("list", name="Elements").get_by_text(name, exact=True)
@@ -141,7 +148,7 @@ def test_every_value_of_a_slider_arrives(served: Served) -> None:
 
 def test_a_wrong_text_is_said_at_its_line_while_the_picture_stays(served: Served) -> None:
     page, editor = served.page, served.page.get_by_label("Text of the scene")
-    right = text(page)
+    right = settled(page)
     editor.fill(right.replace("<sphere", "<spheres").replace("</sphere>", "</spheres>"))
     page.get_by_text(re.compile(r"two\.xml:5: <spheres> is not a known element")).wait_for()
     assert page.locator(".v-main img").first.is_visible()
