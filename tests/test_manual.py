@@ -134,6 +134,7 @@ def test_commands_are_understood(line: str, folder: Path, monkeypatch, capfd) ->
         return
     for work in (
         "jobs.mesh.make_mesh",
+        "jobs.mesh.make_apart",
         "jobs.divided.make_parts",
         "mesh.checks.repair",
         "jobs.mesh.make_implicit",

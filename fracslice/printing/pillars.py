@@ -79,7 +79,7 @@ SUNK = np.array(
 PIECE = 0.05
 """What radii of pieces to be taken out are multiples of, mm."""
 
-POCKET = 50_000
+POCKET = 5_000
 """Most places of a pocket that are looked through for its exit."""
 
 LENGTHS = 2.0, 1.4, 1.0, 0.7

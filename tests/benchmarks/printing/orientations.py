@@ -13,7 +13,7 @@ from typing import Any
 from fracslice import make_mesh
 from fracslice.common.messages import lacking
 from fracslice.fields.box import Triple
-from fracslice.fields.field import Field
+from fracslice.formulas import Node
 from fracslice.records import Print
 from fracslice.scene import library, read
 from fracslice.slicing import SliceJob, plan_stack
@@ -31,7 +31,7 @@ SIZE, VOXELS = 30.0, 96
 
 def rows(run: Run, shipped: int = 10, random: int = 10) -> Iterator[Row]:
     work = Work(threads=run.threads[0])
-    objects: list[tuple[str, Field]] = [(n, read(library.path(n)).root) for n in library.names()[:shipped]]
+    objects: list[tuple[str, Node]] = [(n, read(library.path(n)).root) for n in library.names()[:shipped]]
     objects += [(f"random {tree}", random_scene(tree, 0)) for tree in range(random)]
     ratios = []
     for name, root in objects:
@@ -43,7 +43,7 @@ def rows(run: Run, shipped: int = 10, random: int = 10) -> Iterator[Row]:
         yield {"": "median", "ratio": sorted(ratios)[len(ratios) // 2]}
 
 
-def _row(run: Run, root: Field, work: Work) -> Row:
+def _row(run: Run, root: Node, work: Work) -> Row:
     """Volumes of supports in both directions, and the time of both searches."""
     found: dict[str, Triple] = {}
 
@@ -69,7 +69,7 @@ def _row(run: Run, root: Field, work: Work) -> Row:
     return row
 
 
-def _supports(root: Field, up: Triple, work: Work) -> float:
+def _supports(root: Node, up: Triple, work: Work) -> float:
     """Volume of supports of an object in a direction, mm3."""
     job = SliceJob(size=SIZE, layer=0.1, pixel=0.1, up=up, printing=Print(supports="medium"))
     held = plan_stack(root, job, work).supports
