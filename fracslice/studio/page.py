@@ -61,7 +61,7 @@ HELP = (
 CONTROL = {"z": "undo", "y": "redo"}
 """What keys do with ctrl."""
 
-ACTIONS = ("v", ",", ".", "?")
+ACTIONS = ("v", "x", ",", ".", "?")
 """Keys of the picture that do something once."""
 
 TWICE, NEAR = 0.35, 5.0
@@ -153,8 +153,6 @@ class Frames:
             self.controls.release(key)
         elif key in MOVES or key in PACES:
             self.controls.press(key)
-        elif key == "x":
-            self._studio.focus_on(self.mouse)
         elif key in ACTIONS:
             self._act(key)
 
@@ -242,6 +240,9 @@ class Page:
         document = self.studio.document
         if key == "v":
             self.studio.views.home()
+        elif key == "x":
+            self.studio.focus_on(self.frames.mouse)
+            self.refresh()
         elif key in (",", "."):
             self.studio.views.back(1 if key == "," else -1)
         elif key == "?":

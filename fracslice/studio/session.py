@@ -32,7 +32,7 @@ from ..rendering.live import Live, Shown
 from ..scene import library
 from ..scene.layout import SOLID, varied
 from ..scene.model import Scene
-from ..scene.view import Camera
+from ..scene.view import Camera, View
 from ..work import Work
 from . import keyframes
 from .bookmarks import Bookmarks, between, is_worth_a_look
@@ -349,11 +349,17 @@ class Session:
         root = loosened(scene.root)
         if self.section:
             root = intersection(root, self.section.half(root.bounds.box))
-        if self.film and scene.view.camera and root == self.live.scene.root:
+        scene = replace(scene, root=root)
+        if scene.view.camera and self._is_flown and _unseen(scene) == _unseen(self.live.scene):
             self.views.look(scene.view.camera)
             return
-        self._scene.put(replace(scene, root=root))
+        self._scene.put(scene)
         self.live.wake()
+
+    @property
+    def _is_flown(self) -> bool:
+        """True if the film that is looked at moves the camera."""
+        return self.film is not None and any(t.of.startswith("camera.") for t in self.film.scene.tracks)
 
     def _at_time(self) -> Scene:
         """The scene at the time of its film; as it is without it where it has none."""
@@ -540,6 +546,11 @@ class Session:
             paths = write_frames(frames, range(frames.frames), folder, False, work)
         encode(paths, path, rate, work)
         return f"{path.name}: {frames.frames} frames"
+
+
+def _unseen(scene: Scene) -> tuple[Node, View]:
+    """What of a scene a picture is of, but for the camera."""
+    return scene.root, replace(scene.view, camera=None)
 
 
 def command(target: Path, name: str, options: dict[str, Any]) -> str:

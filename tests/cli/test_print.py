@@ -5,9 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-import time
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -16,6 +14,7 @@ from fracslice.cli.main import run
 from fracslice.export.sending import Figures, read_figures
 from fracslice.export.slicer_profiles import shipped
 from fracslice.mesh.models import read_mesh
+from tests.waiting import wait_until
 
 pytestmark = pytest.mark.once
 
@@ -198,13 +197,6 @@ def test_a_slicer_ends_with_the_process_that_started_it(cancelled: bool, tmp_pat
         if not cancelled:
             process.kill()
     wait_until(lambda: not slicer.exists() or not slicer.read_bytes())
-
-
-def wait_until(true: Callable[[], bool]) -> None:
-    end = time.monotonic() + 20
-    while not true():
-        assert time.monotonic() < end
-        time.sleep(0.05)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="programs are scripts")

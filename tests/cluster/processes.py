@@ -7,19 +7,9 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 
-SECONDS = 600.0
-"""Until something that must happen has happened: only a test that fails waits this long."""
-
-
-def wait_until(true: Callable[[], object]) -> None:
-    """Wait; fail after a time."""
-    end = time.monotonic() + SECONDS
-    while not true():
-        assert time.monotonic() < end
-        time.sleep(0.02)
+from tests.waiting import SECONDS, wait_until
 
 
 class Cluster:

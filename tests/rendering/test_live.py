@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -17,6 +17,7 @@ from fracslice.rendering.live import CameraInput, Live, SceneFile, Shown
 from fracslice.scene.view import Camera
 from fracslice.viewer.viewer import Controls
 from fracslice.work import Work
+from tests.waiting import wait_until
 
 SCENE = '<scene version="1"><solid size="80mm">{}</solid><camera eye="3 -2 1"/><film samples="4"/></scene>'
 SPHERE, BOX = "<sphere/>", '<box size="1 1 1"/>'
@@ -37,14 +38,6 @@ def live(path: Path) -> Iterator[Live]:
     assert not live.running
 
 
-def within(holds: Callable[[], bool], seconds: float = 60) -> None:
-    """Waits until it holds."""
-    end = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < end, "it never came"
-        time.sleep(0.005)
-
-
 def sharp(live: Live, camera: Camera, after: np.ndarray | None = None) -> np.ndarray:
     """The picture from there, when it has all of its samples and is another than the one before."""
     made: list[Shown] = []
@@ -53,7 +46,7 @@ def sharp(live: Live, camera: Camera, after: np.ndarray | None = None) -> np.nda
         made[:] = [live.shown]
         return made[0].camera == camera and made[0].samples == 4 and made[0].pixels is not after
 
-    within(done)
+    wait_until(done)
     return made[0].pixels
 
 
@@ -80,13 +73,13 @@ def test_a_flight_never_gets_there() -> None:
 def test_a_flight_away_ends_within_sight_of_the_first_view(live: Live) -> None:
     live.steer(CameraInput(forward=-1, pace=1e3))
     start = np.linalg.norm(live.first.eye)
-    within(lambda: np.linalg.norm(live.camera.eye) > 30 * start)
+    wait_until(lambda: np.linalg.norm(live.camera.eye) > 30 * start)
     live.steer(CameraInput(forward=-1, right=1, pace=2e3))
     time.sleep(0.5)
     assert np.linalg.norm(live.camera.eye) < 101 * start
     live.steer(CameraInput())
     live.look(live.first)
-    within(lambda: live.camera == live.first)
+    wait_until(lambda: live.camera == live.first)
 
 
 def test_keys_are_let_go_at_once_and_the_pace_has_limits() -> None:
@@ -105,17 +98,17 @@ def test_it_sharpens_and_follows_the_pilot(live: Live) -> None:
     first = sharp(live, before)
     assert first.shape == (32, 48, 3) and np.ptp(first) > 50
     live.steer(CameraInput(forward=1, pace=5))
-    within(lambda: 0 < live.shown.distance < 0.1)
+    wait_until(lambda: 0 < live.shown.distance < 0.1)
     live.steer(CameraInput())
     assert np.linalg.norm(np.cross(live.camera.forward, before.forward)) < 1e-9, "straight ahead"
-    within(lambda: live.shown.samples == 4)  # it has come to rest
+    wait_until(lambda: live.shown.samples == 4)  # it has come to rest
     near = live.shown.pixels
     assert abs(near.astype(int) - first).mean() > 5
     aside = live.camera.turned(90, 10)
     live.turn(90, 10)
-    within(lambda: live.shown.camera == aside)
+    wait_until(lambda: live.shown.camera == aside)
     live.look(live.first)
-    within(lambda: live.camera == before)
+    wait_until(lambda: live.camera == before)
     assert abs(sharp(live, before).astype(int) - first).mean() < 1
 
 
@@ -130,7 +123,7 @@ def test_a_draft_is_a_coarser_picture_in_the_same_light(path: Path, monkeypatch:
         means = draft.pixels.mean(axis=(0, 1)), final.mean(axis=(0, 1))
         np.testing.assert_allclose(*means, atol=2)
         live.resize((20, 30))
-        within(lambda: live.shown.pixels.shape == (30, 20, 3))
+        wait_until(lambda: live.shown.pixels.shape == (30, 20, 3))
         assert live.shown.camera == live.first
     finally:
         live.close()
@@ -141,7 +134,7 @@ def test_a_tap_on_a_key_is_never_lost(live: Live) -> None:
     live.steer(CameraInput(yaw=1))
     time.sleep(0.02)
     live.steer(CameraInput())
-    within(lambda: live.camera != live.first)
+    wait_until(lambda: live.camera != live.first)
 
 
 def test_a_new_kernel_shows_that_it_compiles(
@@ -179,7 +172,7 @@ def test_a_saved_file_is_looked_at_from_the_same_place(live: Live, path: Path) -
     boxed = sharp(live, turned, before)
     assert abs(boxed.astype(int) - before).mean() > 3
     save(path, SCENE.format('<sphere radius="x"/>'))
-    within(lambda: "ball.xml:1" in live.shown.problem)
+    wait_until(lambda: "ball.xml:1" in live.shown.problem)
     assert "radius" in live.shown.problem and live.running
     np.testing.assert_array_equal(live.shown.pixels, boxed)
     save(path, SCENE.format(SPHERE).replace("3 -2 1", "-3 -2 1"))
@@ -199,6 +192,6 @@ def test_what_cannot_be_rendered_is_said_at_once(path: Path) -> None:
 def test_what_stops_it_is_raised_at_the_end(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     live = Live(SceneFile(path), size=(48, 32), device="cpu")
     monkeypatch.setattr(live, "_step", lambda: 1 / 0)
-    within(lambda: not live.running)
+    wait_until(lambda: not live.running)
     with pytest.raises(ZeroDivisionError):
         live.close()

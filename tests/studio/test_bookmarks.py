@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from fracslice.scene import read
 from fracslice.studio.bookmarks import between, is_worth_a_look
 from fracslice.studio.session import Session
 from fracslice.work import Work
+from tests.waiting import wait_until
 
 pytestmark = pytest.mark.once
 
@@ -37,14 +37,6 @@ def studio(tmp_path: Path) -> Iterator[Session]:
     studio.close()
 
 
-def within(holds: Callable[[], bool], seconds: float = 60) -> None:
-    """Waits until it holds."""
-    end = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < end, "it never came"
-        time.sleep(0.01)
-
-
 def test_a_bookmark_is_a_scene_that_is_returned_to(studio: Session, tmp_path: Path) -> None:
     seen = studio.live.camera
     studio.bookmark()
@@ -55,10 +47,10 @@ def test_a_bookmark_is_a_scene_that_is_returned_to(studio: Session, tmp_path: Pa
     assert studio.bookmarks.picture("001").startswith(b"\xff\xd8")
     studio.set_number(BALL, "radius", 0, 3)
     studio.views.orbit(60, 0)
-    within(lambda: studio.shown.camera == studio.live.aim and studio.live.aim.eye != seen.eye)
+    wait_until(lambda: studio.shown.camera == studio.live.aim and studio.live.aim.eye != seen.eye)
     studio.go_to("001")
     assert studio.document.scene.root == sphere(radius=5.0)
-    within(lambda: studio.shown.camera.eye == pytest.approx(seen.eye))
+    wait_until(lambda: studio.shown.camera.eye == pytest.approx(seen.eye))
     studio.bookmarks.remove("001")
     assert not (tmp_path / "ball.bookmarks").exists()
     studio.go_to("001")

@@ -28,8 +28,7 @@ from fracslice.studio.solid import MEASURES, SceneSolid, legend, thickness_at
 from fracslice.volume import Supports
 from fracslice.volume.amount import Sizing
 from fracslice.work import Work
-
-from .test_session import within
+from tests.waiting import wait_until
 
 pytestmark = pytest.mark.once
 
@@ -63,7 +62,7 @@ def inside(studio: Session) -> Inside:
 
 def done(studio: Session) -> str:
     """What the last job says, once it is done."""
-    within(lambda: studio.job is not None and studio.job.is_done)
+    wait_until(lambda: studio.job is not None and studio.job.is_done)
     assert studio.job
     return studio.job.result or studio.job.problem
 
@@ -78,12 +77,12 @@ def test_the_mesh_is_shown_and_cut_open(studio: Session, inside: Inside) -> None
     figures = rows(inside.told["figures"])
     assert float(figures["volume"].split()[0]) == pytest.approx(0.472, rel=0.02)
     assert figures["bodies"] == "2 bodies" and figures["checked"].startswith("closed")
-    within(lambda: studio.shown.samples == 1 and studio.live.size == (96, 64))
+    wait_until(lambda: studio.shown.samples == 1 and studio.live.size == (96, 64))
     studio.cut("x", 0.5)
-    within(lambda: (studio.shown.pixels == SECTION).all(2).any())
+    wait_until(lambda: (studio.shown.pixels == SECTION).all(2).any())
     assert studio.document.is_saved
     inside.show("field")
-    within(lambda: not (studio.shown.pixels == SECTION).all(2).any())
+    wait_until(lambda: not (studio.shown.pixels == SECTION).all(2).any())
 
 
 def test_a_mesh_of_an_earlier_scene_is_said_to_be(studio: Session, inside: Inside) -> None:
@@ -118,24 +117,24 @@ def test_layers_show_islands_in_the_pixels_of_a_printer(studio: Session, inside:
     inside.printer = "sl1s"
     inside.show("layers")
     inside.plan("sl1s", 0.5)
-    within(lambda: studio.job is not None and studio.job.name == "layers" and studio.job.is_done)
+    wait_until(lambda: studio.job is not None and studio.job.name == "layers" and studio.job.is_done)
     inside.plan("sl1s", 0.5)
     assert done(studio) == "18 layers"
     inside.scrub(14)
-    within(lambda: (studio.shown.pixels == ISLAND).all(2).sum() > 100)
+    wait_until(lambda: (studio.shown.pixels == ISLAND).all(2).sum() > 100)
     shown = rows(inside.told["rows"])
     assert shown["islands"] == "1" and float(shown["area"].split()[0]) == pytest.approx(36, rel=0.01)
     assert float(shown["resin"].split()[1]) == pytest.approx(0.472, rel=0.15) and shown["time"].endswith(
         "min"
     )
     inside.scrub(15)
-    within(lambda: not (studio.shown.pixels == ISLAND).all(2).any())
+    wait_until(lambda: not (studio.shown.pixels == ISLAND).all(2).any())
     assert not (studio.shown.pixels == HANGS).all(2).any()
     area = (studio.shown.pixels > 100).all(2).sum()
     inside.zoom(2)
-    within(lambda: (studio.shown.pixels > 100).all(2).sum() > 1.2 * area)
+    wait_until(lambda: (studio.shown.pixels > 100).all(2).sum() > 1.2 * area)
     inside.drag(400, 0)
-    within(lambda: not (studio.shown.pixels > 100).all(2).any())
+    wait_until(lambda: not (studio.shown.pixels > 100).all(2).any())
 
 
 def test_supports_of_a_layer_are_told_from_the_object() -> None:
@@ -186,7 +185,7 @@ def test_a_check_lists_problems_and_flies_to_them(studio: Session, inside: Insid
 
 def test_points_of_the_field_are_measured(studio: Session, inside: Inside) -> None:
     studio.live.look(Camera(eye=(0.0, -40.0, 0.0), target=(0.0, 0.0, 0.0), fov=30))
-    within(lambda: studio.shown.camera.eye == (0.0, -40.0, 0.0))
+    wait_until(lambda: studio.shown.camera.eye == (0.0, -40.0, 0.0))
     inside.pick((48, 32))
     assert rows(inside.told["measures"]) == {"point 1": "0.000 -5.000 2.000 mm", "thickness": "10 mm"}
     inside.pick((0, 0))
@@ -207,7 +206,7 @@ def test_points_of_a_mesh_are_measured(studio: Session, inside: Inside) -> None:
     done(studio)
     studio.live.look(Camera(eye=(0.0, -40.0, 0.0), target=(0.0, 0.0, 0.0), fov=30))
     inside.measuring = True
-    within(lambda: studio.shown.camera.eye == (0.0, -40.0, 0.0))
+    wait_until(lambda: studio.shown.camera.eye == (0.0, -40.0, 0.0))
     inside.pick((48, 32))
     np.testing.assert_allclose(inside.points[0][1], -5.0, atol=1e-3)
     assert inside.there == []  # 10 mm are more than a quarter of the object
@@ -300,7 +299,7 @@ def test_a_mesh_is_seen_from_inside_and_the_field_from_outside(studio: Session, 
     done(studio)
     within_it = Camera(eye=(0.0, 0.0, 0.0), target=(0.0, 1.0, 0.0))
     studio.live.look(within_it)
-    within(lambda: studio.shown.camera == within_it)
+    wait_until(lambda: studio.shown.camera == within_it)
     assert studio.shown.distance > 0
     inside.show("field")
-    within(lambda: studio.shown.camera == studio.live.first)
+    wait_until(lambda: studio.shown.camera == studio.live.first)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +15,7 @@ from fracslice.studio import keyframes
 from fracslice.studio.document import Document
 from fracslice.studio.session import Session
 from fracslice.work import Work
+from tests.waiting import wait_until
 
 pytestmark = pytest.mark.once
 
@@ -125,10 +125,7 @@ def test_a_film_plays_to_its_end(studio: Session, monkeypatch: pytest.MonkeyPatc
     for clock.now in 11.0, 12.0, 14.5:
         studio.advance()
     assert studio.player.seconds == 4.0 and not studio.player.is_playing
-    end = time.monotonic() + 30
-    while studio.live.aim.eye != (0.0, 20.0, 3.0):
-        assert time.monotonic() < end
-        time.sleep(0.01)
+    wait_until(lambda: studio.live.aim.eye == (0.0, 20.0, 3.0))
 
 
 def test_a_flight_becomes_the_film(studio: Session, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -145,3 +142,24 @@ def test_a_flight_becomes_the_film(studio: Session, monkeypatch: pytest.MonkeyPa
     assert eye[2][1] == "19.0 0.0 3.0" or eye[2][1] == "19 0 3"
     assert keyframes.duration(studio.document) == 3.0
     assert studio.document.undoes == 1
+
+
+def test_what_is_changed_during_a_flight_is_seen(studio: Session) -> None:
+    keyframes.key_view(studio.document, 0.0, CAMERA)
+    keyframes.key_view(studio.document, 4.0, replace(CAMERA, eye=(0.0, 20.0, 3.0)))
+    studio.seek(0.0)
+    wait_until(lambda: studio.live.aim.eye == CAMERA.eye)
+    film = studio.document.part("film")
+    assert film
+    studio.edit(studio.document.set_value, film.place, "exposure", "2")
+    wait_until(lambda: studio.live.scene.view.film.exposure == 2)
+
+
+def test_a_film_without_a_flight_leaves_the_camera_alone(studio: Session) -> None:
+    keyframes.set_keys(studio.document, 0.0, {"sphere[2].radius": "1"})
+    keyframes.set_keys(studio.document, 2.0, {"sphere[2].radius": "1"})
+    studio.views.orbit(90, 0)
+    turned = studio.live.aim
+    studio.seek(1.0)
+    wait_until(lambda: studio.live.scene.root.children[1]["radius"] == 1.0)
+    assert studio.live.aim == turned

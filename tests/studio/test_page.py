@@ -9,11 +9,13 @@ import sys
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+
+from tests.waiting import wait_until
 
 playwright = pytest.importorskip("playwright.sync_api")
 
@@ -87,7 +89,7 @@ def text(page: playwright.Page) -> str:
 def settled(page: playwright.Page) -> str:
     """Text of the scene once no value of a slider is on its way any more."""
     seen = [""]
-    until(lambda: (seen.append(text(page)), time.sleep(0.3), seen[-1] == text(page))[2])
+    wait_until(lambda: (seen.append(text(page)), time.sleep(0.3), seen[-1] == text(page))[2])
     return seen[-1]
 
 
@@ -96,17 +98,9 @@ def row(page: playwright.Page, name: str) -> playwright.Locator:
     return page.get_by_role("list", name="Elements").get_by_text(name, exact=True)
 
 
-def until(holds: Callable[[], bool], seconds: float = 30) -> None:
-    """Waits until it holds."""
-    end = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < end, "it never came"
-        time.sleep(0.05)
-
-
 def picture(page: playwright.Page) -> bytes:
     """What the page shows as the picture, once it has samples."""
-    until(lambda: "sample" in page.get_by_role("status").inner_text())
+    wait_until(lambda: "sample" in page.get_by_role("status").inner_text())
     return bytes(page.locator(".v-main img").first.screenshot())
 
 
@@ -117,17 +111,17 @@ def test_a_person_looks_changes_undoes_and_saves(served: Served) -> None:
     page.mouse.down()
     page.mouse.move(760, 380, steps=8)
     page.mouse.up()
-    until(lambda: picture(page) != first)
+    wait_until(lambda: picture(page) != first)
     row(page, "sphere").click()
     page.get_by_label("radius 1 as a number").fill("0.7")
     page.get_by_label("radius 1 as a number").press("Enter")
     page.get_by_label("Text", exact=True).click()
-    until(lambda: 'radius="0.7"' in text(page))
+    wait_until(lambda: 'radius="0.7"' in text(page))
     page.get_by_label("Undo").click()
-    until(lambda: text(page) == SCENE)
+    wait_until(lambda: text(page) == SCENE)
     page.get_by_label("Redo").click()
     page.get_by_label("Save").click()
-    until(lambda: 'radius="0.7"' in (served.folder / "two.xml").read_text())
+    wait_until(lambda: 'radius="0.7"' in (served.folder / "two.xml").read_text())
     assert "<!-- A ball and a block. -->" in (served.folder / "two.xml").read_text()
 
 
@@ -142,7 +136,7 @@ def test_every_value_of_a_slider_arrives(served: Served) -> None:
     page.mouse.move(x + 40, y, steps=30)
     page.mouse.up()
     shown = page.get_by_label("radius 1 as a number")
-    until(lambda: f'radius="{float(shown.input_value()):.6g}"' in text(page))
+    wait_until(lambda: f'radius="{float(shown.input_value()):.6g}"' in text(page))
     assert float(shown.input_value()) > 0.75
 
 
@@ -162,7 +156,7 @@ def test_an_element_is_wrapped_and_a_file_made(served: Served) -> None:
     page.get_by_role("button", name="Wrap", exact=True).click()
     page.get_by_label("Search").fill("shell")
     page.locator(".v-dialog .v-list-item", has_text="shell").first.click()
-    until(lambda: "<shell" in text(page))
+    wait_until(lambda: "<shell" in text(page))
     page.get_by_label("Make a file").click()
     page.get_by_label("File:").fill("two.stl")
     page.get_by_label("Voxels").fill("32")
@@ -204,7 +198,7 @@ def test_two_tabs_show_the_same_scene(served: Served, browser: playwright.Browse
     row(served.page, "sphere").click()
     before = row(other, "sphere").count()
     served.page.get_by_role("button", name="Duplicate").click()
-    until(lambda: row(other, "sphere").count() == before + 1)
+    wait_until(lambda: row(other, "sphere").count() == before + 1)
     other.close()
 
 
@@ -230,7 +224,7 @@ def test_a_film_is_made_of_views(served: Served) -> None:
     panel.get_by_label("camera.eye at 0 s").wait_for()
     panel.get_by_label("Length of the film").fill("1")
     panel.get_by_label("Length of the film").press("Enter")
-    until(lambda: 'duration="1s"' in text(page))
+    wait_until(lambda: 'duration="1s"' in text(page))
     panel.locator(".v-slider-thumb").press("End")
     panel.get_by_text("1.00 s of").wait_for()
     page.mouse.move(700, 300)
@@ -238,7 +232,7 @@ def test_a_film_is_made_of_views(served: Served) -> None:
     page.mouse.move(760, 320, steps=4)
     page.mouse.up()
     panel.get_by_role("button", name="Key view").click()
-    until(lambda: text(page).count("; 1s:") == 2)
+    wait_until(lambda: text(page).count("; 1s:") == 2)
     panel.get_by_label("Play", exact=True).click()
     panel.get_by_label("Pause").wait_for()
     panel.get_by_text("1.00 s of").wait_for()

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,6 +21,7 @@ from fracslice.studio import panels
 from fracslice.studio.document import required
 from fracslice.studio.session import Session, loosened
 from fracslice.work import Work
+from tests.waiting import wait_until
 
 pytestmark = pytest.mark.once
 
@@ -44,28 +44,20 @@ def studio(tmp_path: Path) -> Iterator[Session]:
     studio.close()
 
 
-def within(holds: Callable[[], bool], seconds: float = 60) -> None:
-    """Waits until it holds."""
-    end = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < end, "it never came"
-        time.sleep(0.01)
-
-
 def rest(studio: Session) -> np.ndarray:
     """The picture with all of its samples."""
-    within(lambda: studio.shown.samples == 2 and studio.shown.camera == studio.live.aim)
+    wait_until(lambda: studio.shown.samples == 2 and studio.shown.camera == studio.live.aim)
     return studio.shown.pixels
 
 
 def test_an_edit_is_seen_and_undone(studio: Session) -> None:
     before = rest(studio)
     studio.set_number(BALL, "radius", 0, 3)
-    within(lambda: studio.live.scene.root == sphere(radius=3.0))
+    wait_until(lambda: studio.live.scene.root == sphere(radius=3.0))
     smaller = rest(studio)
     assert abs(smaller.astype(int) - before).mean() > 2
     studio.edit(studio.document.undo)
-    within(lambda: studio.live.scene.root == sphere(radius=5.0))
+    wait_until(lambda: studio.live.scene.root == sphere(radius=5.0))
     np.testing.assert_array_equal(rest(studio), before)
 
 
@@ -84,7 +76,7 @@ def test_the_camera_turns_around_its_target_and_is_kept(studio: Session) -> None
     arms = [np.subtract(camera.eye, camera.target) for camera in (first, turned)]
     np.testing.assert_allclose(turned.target, first.target, atol=1e-12)
     assert np.linalg.norm(arms[1]) == pytest.approx(np.linalg.norm(arms[0]) / 1.1**3)
-    within(lambda: studio.shown.camera == turned)
+    wait_until(lambda: studio.shown.camera == turned)
     studio.keep_view()
     studio.save()
     saved = read(studio.target).view.camera
@@ -95,11 +87,11 @@ def test_the_camera_turns_around_its_target_and_is_kept(studio: Session) -> None
 
 def test_files_are_made_in_the_folder_alone(studio: Session, tmp_path: Path) -> None:
     studio.start("ball.stl", {"resolution": 24.0})
-    within(lambda: studio.job is not None and studio.job.is_done)
+    wait_until(lambda: studio.job is not None and studio.job.is_done)
     assert studio.job and studio.job.result.startswith("ball.stl")
     assert Mesh.load(tmp_path / "ball.stl").volume == pytest.approx(500 / 3 * np.pi, rel=0.02)
     studio.start("ball.png", {"samples": 1, "size": (40, 30)})
-    within(lambda: studio.job is not None and studio.job.is_done)
+    wait_until(lambda: studio.job is not None and studio.job.is_done)
     assert (tmp_path / "ball.png").exists()
     for name in ("../ball.stl", "/ball.stl", "ball.txt"):
         with pytest.raises(SceneError, match=r"ball\.(stl|txt)"):
@@ -112,7 +104,7 @@ def test_a_job_is_cancelled_without_a_file(studio: Session, tmp_path: Path) -> N
     studio.start("other.stl", {})
     assert "ball.stl is being made" in studio.message
     studio.job.cancel.set()
-    within(lambda: studio.job is not None and studio.job.is_done)
+    wait_until(lambda: studio.job is not None and studio.job.is_done)
     assert "cancelled" in studio.job.problem and not list(tmp_path.glob("*.stl"))
 
 
@@ -141,15 +133,15 @@ def test_random_numbers_keep_the_text(studio: Session) -> None:
 def test_a_section_cuts_the_picture_and_not_the_file(studio: Session) -> None:
     whole = rest(studio)
     studio.cut("z", 0.5)
-    within(lambda: studio.live.scene.root.formula.name == "intersection")
+    wait_until(lambda: studio.live.scene.root.formula.name == "intersection")
     half = studio.live.scene.root
     assert half.distance([0, 0, 0.1]) == pytest.approx(0.1) and half.distance([0, 0, -1]) == pytest.approx(-1)
     assert abs(rest(studio).astype(int) - whole).mean() > 2
     studio.start("ball.stl", {"resolution": 16.0})
-    within(lambda: studio.job is not None and studio.job.is_done)
+    wait_until(lambda: studio.job is not None and studio.job.is_done)
     assert studio.job and studio.job.result
     studio.cut("", 0.5)
-    within(lambda: studio.live.scene.root == sphere(radius=5.0))
+    wait_until(lambda: studio.live.scene.root == sphere(radius=5.0))
     assert studio.document.is_saved
 
 
@@ -189,3 +181,12 @@ def test_every_new_element_has_values_of_its_kinds() -> None:
             assert value or isinstance(kind, File) or name == "text"
             if value:
                 kind.read(value)
+
+
+def test_the_camera_is_focused_on_what_is_under_the_mouse(studio: Session) -> None:
+    studio.focus_on((24.0, 16.0))
+    camera = studio.document.scene.view.camera
+    assert camera and camera.focus and camera.aperture > 0
+    assert camera.focus == pytest.approx(np.linalg.norm(camera.eye) - 5.0, rel=1e-2)
+    studio.focus_on((0.0, 0.0))
+    assert "no surface" in studio.message

@@ -1,0 +1,17 @@
+"""Waiting for what another thread or process does."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+SECONDS = 600.0
+"""Until something that must happen has happened: only a test that fails waits this long."""
+
+
+def wait_until(holds: Callable[[], object], seconds: float = SECONDS) -> None:
+    """Wait until it holds; fail after a time."""
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, "it never came"
+        time.sleep(0.01)
