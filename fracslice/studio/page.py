@@ -15,7 +15,7 @@ from typing import Any, Literal
 from aiohttp import web
 from trame.app import get_server
 from trame.ui.vuetify3 import VAppLayout
-from trame.widgets import html, rca
+from trame.widgets import client, html, rca
 from trame.widgets import vuetify3 as v
 
 from ..common.messages import format_count
@@ -37,6 +37,14 @@ QUALITIES = 75, 92
 
 PENDING = 2
 """Frames that a page may have to fetch still before others are left out."""
+
+STYLE = ".v-field-label, .text-medium-emphasis { opacity: 0.85 !important }"
+"""Contrast of 4.5 and more, as WCAG 2 wants it, for labels of Vuetify."""
+
+NAMED = """new MutationObserver(() =>
+  document.querySelectorAll("img.image-display-area:not([alt])").forEach(i => i.alt = "Picture of the scene")
+).observe(document, {childList: true, subtree: true})"""
+"""Script that names the picture for those who do not see it, as the widget of the picture cannot."""
 
 SMALL = (
     f"{{width: '{panels.CELL[0]}px', height: '{panels.CELL[1]}px', flexShrink: 0, borderRadius: '4px', "
@@ -487,26 +495,34 @@ class Page:
         """Lay the page out."""
         with VAppLayout(self.server, theme=("dark ? 'dark' : 'light'",)) as layout:
             self._bar()
-            with v.VNavigationDrawer(permanent=True, width=360):
+            with v.VNavigationDrawer(permanent=True, width=360, raw_attrs=named("Scene")):
                 self._tree()
                 v.VDivider()
                 self._panel()
             with v.VNavigationDrawer(
-                v_model=("editing",), location="right", width=460, mobile_breakpoint=NARROW
+                v_model=("editing",),
+                location="right",
+                width=460,
+                mobile_breakpoint=NARROW,
+                raw_attrs=named("Editor"),
             ):
                 self._editor()
-            with v.VNavigationDrawer(v_model=("marking",), location="right", width=240):
+            with v.VNavigationDrawer(
+                v_model=("marking",), location="right", width=240, raw_attrs=named("Bookmarked")
+            ):
                 self.sheets.build_bookmarks()
             self.inside.build()
             with v.VMain(style="height: 100vh"):
                 self._picture()
                 self.film.build()
             self._dialogs()
+            client.Style(STYLE)
+            client.Script(NAMED)
         self.layout = layout
 
     def _bar(self) -> None:
         with v.VAppBar(density="compact"):
-            v.VAppBarTitle("{{ trame__title }}{{ saved ? '' : ' *' }}")
+            v.VAppBarTitle("{{ trame__title }}{{ saved ? '' : ' *' }}", tag="h1")
             v.VBtn(icon="mdi-folder-open", click="opening = true; search = ''", raw_attrs=named("Open"))
             v.VBtn(
                 icon="mdi-bookmark-multiple", click=self.sheets.toggle_bookmarks, raw_attrs=named("Bookmarks")
@@ -739,12 +755,20 @@ class Page:
         scenes = "scenes.filter(c => (c.name + c.doc).includes(search))"
         self._list("opening", "Open a scene", scenes, (self.open, "[c.name]"))
         self.sheets.build_variations()
-        with v.VDialog(v_model=("helping",), width=460), v.VCard(title="Help"), v.VTable(), html.Tbody():
+        with (
+            v.VDialog(v_model=("helping",), width=460, raw_attrs=named("Help")),
+            v.VCard(title="Help"),
+            v.VTable(),
+            html.Tbody(),
+        ):
             for keys, meaning in HELP:
                 with html.Tr():
                     html.Td(keys)
                     html.Td(meaning)
-        with v.VDialog(v_model=("making",), width=460), v.VCard(title="Make a file", classes="pa-3"):
+        with (
+            v.VDialog(v_model=("making",), width=460, raw_attrs=named("Make a file")),
+            v.VCard(title="Make a file", classes="pa-3"),
+        ):
             v.VTextField(
                 v_model=("file_name",), label="File: .stl .3mf .ply .obj .glb .png .jpg .mp4 .goo .sl1 ..."
             )
@@ -754,7 +778,7 @@ class Page:
 
     def _list(self, flag: str, title: str, rows: str, click: tuple[Callable[..., None], str]) -> None:
         """Dialog with a search and the rows `c` that it leaves: picture, name and description."""
-        with v.VDialog(v_model=(flag,), width=720), v.VCard(title=title):
+        with v.VDialog(v_model=(flag,), width=720, raw_attrs=named(title)), v.VCard(title=title):
             v.VTextField(v_model=("search",), label="Search", autofocus=True, classes="mx-4")
             with (
                 v.VList(

@@ -13,7 +13,7 @@ from trame.widgets import vuetify3 as v
 from ..errors import FracsliceError
 from ..formulas import Node
 from .session import jpeg
-from .widgets import named_by
+from .widgets import named, named_by
 
 if TYPE_CHECKING:
     from .page import Page
@@ -118,7 +118,10 @@ class SheetPanel:
 
     def build_variations(self) -> None:
         """Lay the dialog of the variations out."""
-        with v.VDialog(v_model=("varying",), width=700), v.VCard(title="Variations: click to go on from one"):
+        with (
+            v.VDialog(v_model=("varying",), width=700, raw_attrs=named("Variations")),
+            v.VCard(title="Variations: click to go on from one"),
+        ):
             with html.Div(classes="d-flex flex-wrap justify-center", style="min-height: 480px"):
                 html.Img(
                     v_for="(image, i) in sheet",

@@ -18,6 +18,7 @@ import pytest
 from tests.waiting import wait_until
 
 playwright = pytest.importorskip("playwright.sync_api")
+axe = pytest.importorskip("axe_playwright_python.sync_playwright")
 
 pytestmark = [
     pytest.mark.once,
@@ -237,3 +238,15 @@ def test_a_film_is_made_of_views(served: Served) -> None:
     panel.get_by_label("Pause").wait_for()
     panel.get_by_text("1.00 s of").wait_for()
     page.get_by_role("button", name="Film", exact=True).click()
+
+
+def test_the_page_can_be_used_by_those_who_do_not_see_it_well(served: Served) -> None:
+    """Labels, contrast, landmarks, by the rules of axe-core."""
+    page = served.page
+    page.get_by_role("button", name="Film", exact=True).click()
+    page.get_by_role("region", name="Film").wait_for()
+    for _ in "light", "dark":
+        page.get_by_label("Light or dark").click()
+        page.wait_for_timeout(400)  # colours fade
+        found = {problem["id"] for problem in axe.Axe().run(page).response["violations"]}
+        assert found <= {"meta-viewport"}  # of the frame of trame
