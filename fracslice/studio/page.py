@@ -10,6 +10,7 @@ import threading
 import time
 import webbrowser
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 from typing import Any, Literal
 
 from aiohttp import web
@@ -21,6 +22,7 @@ from trame.widgets import vuetify3 as v
 from ..common.messages import format_count
 from ..errors import FracsliceError
 from ..export.images import IMAGES
+from ..rendering.live import CameraInput
 from ..viewer.viewer import MOVES, PACES, Controls
 from . import panels
 from .film_page import HEIGHT, FilmPanel
@@ -46,6 +48,18 @@ NAMED = """new MutationObserver(() =>
 ).observe(document, {childList: true, subtree: true})"""
 """Script that names the picture for those who do not see it, as the widget of the picture cannot."""
 
+PAD = """let still = true;
+setInterval(() => {
+  const pad = [...navigator.getGamepads()].find(p => p);
+  if (!pad) return;
+  const bent = pad.axes.slice(0, 4).map(a => Math.abs(a) < 0.12 ? 0 : a);
+  const axes = [...bent, (pad.buttons[7]?.value ?? 0) - (pad.buttons[6]?.value ?? 0)];
+  const rests = axes.every(a => a === 0);
+  if (!rests || !still) window.trame.trigger("pad", [axes]);
+  still = rests;
+}, 33)"""
+"""Script that tells of a gamepad: both sticks, and the shoulder buttons that are pressed by degrees."""
+
 SMALL = (
     f"{{width: '{panels.CELL[0]}px', height: '{panels.CELL[1]}px', flexShrink: 0, borderRadius: '4px', "
     "background: `url(${thumbnails})`, backgroundPosition: pictures[c.name]}"
@@ -59,6 +73,7 @@ HELP = (
     ("double click", "walk to what is under the mouse"),
     ("X", "focus on what is under the mouse"),
     ("W S A D R F, Q E", "fly, roll"),
+    ("gamepad", "fly by the sticks, climb by the triggers"),
     ("1 to 9", "pace"),
     ("V", "first view"),
     (", .", "the view before, after"),
@@ -96,6 +111,7 @@ class Frames:
         self._pressed, self._pressed_at = 0.0, (0.0, 0.0)
         self._drag: Callable[[float, float], None] | None = None
         self.mouse = 0.0, 0.0  # pixels from the upper left corner
+        self._pad = CameraInput()
         self.controls = Controls()
 
     def set_streamer(self, streamer: Any) -> None:
@@ -164,6 +180,19 @@ class Frames:
         elif key in ACTIONS:
             self._act(key)
 
+    def bend(self, axes: list[float]) -> None:
+        """Fly as a gamepad says: right and back, turn right and down, climb; -1 to 1 each."""
+        right, back, yaw, down, climb = map(float, axes)
+        self._pad = CameraInput(forward=-back, right=right, up=climb, yaw=yaw, pitch=-down)
+
+    @property
+    def input(self) -> CameraInput:
+        """What keys and a gamepad want of the camera."""
+        keys, pad = self.controls.input, self._pad
+        axes = "forward", "right", "up", "yaw", "pitch"
+        both = {axis: max(-1.0, min(1.0, getattr(keys, axis) + getattr(pad, axis))) for axis in axes}
+        return replace(keys, **both)
+
     async def send(self) -> None:
         """Send the picture if there is a new one, and a page to send it to."""
         shown, inside = self._studio.shown, self._studio.inside
@@ -220,6 +249,7 @@ class Page:
         self.state.change("xml")(self.write)
         self._tabs, self._left = 0, 0.0
         self.server.trigger("drop")(self.drop)
+        self.server.trigger("pad")(self.frames.bend)
         self.ctrl.on_server_bind.add(self.guard)
         self.ctrl.on_server_ready.add(lambda **_: asyncio.get_running_loop().create_task(self.follow()))
         self.build()
@@ -389,7 +419,7 @@ class Page:
     async def follow(self) -> None:
         """Steer by the keys that are held, send frames, and say how far things are, until the server ends."""
         while True:
-            self.studio.views.steer(self.frames.controls.input)
+            self.studio.views.steer(self.frames.input)
             self.studio.advance()
             await self.frames.send()
             self.film.follow()
@@ -518,6 +548,7 @@ class Page:
             self._dialogs()
             client.Style(STYLE)
             client.Script(NAMED)
+            client.Script(PAD)
         self.layout = layout
 
     def _bar(self) -> None:

@@ -240,6 +240,16 @@ def test_a_film_is_made_of_views(served: Served) -> None:
     page.get_by_role("button", name="Film", exact=True).click()
 
 
+def test_a_gamepad_flies(served: Served) -> None:
+    page = served.page
+    page.evaluate("navigator.getGamepads = () => [{axes: [0.9, 0, 0, 0.05], buttons: []}]")
+    before = picture(page)
+    wait_until(lambda: "draft" in page.get_by_role("status").inner_text())
+    page.evaluate("navigator.getGamepads = () => [{axes: [0, 0, 0, 0], buttons: []}]")
+    assert picture(page) != before
+    page.evaluate("navigator.getGamepads = () => []")
+
+
 def test_the_page_can_be_used_by_those_who_do_not_see_it_well(served: Served) -> None:
     """Labels, contrast, landmarks, by the rules of axe-core."""
     page = served.page
