@@ -152,6 +152,8 @@ WITHIN = 0.035
 """Aim for the time of a draft, seconds."""
 REST = 0.1
 """Time without a move after which the picture sharpens, seconds."""
+NOISY = 4
+"""Samples of each pixel below which a picture is smoothed."""
 SLOWER, STEADY = 1.5, 0.3
 """Ratio of the time of drafts to that, above which they are coarser, and the weight of the last one in it."""
 COARSEST = 8
@@ -345,9 +347,7 @@ class Live:
         coarse = max(size[0] // self._spacing, 1), max(size[1] // self._spacing, 1)
         renderer = self._made(drafts, camera, coarse)
         start = time.monotonic()
-        draft = renderer.draft()
-        # a GPU has the next frame sooner than this one's noise is gone
-        pixels = draft.smooth if self._spacing > 1 and renderer.device == "cpu" else draft.shown
+        pixels = _developed(renderer, renderer.draft())
         seconds = time.monotonic() - start
         seen = camera or renderer.setup.camera
         self.shown, self._drawn_by = Shown(pixels, 0.0, seen, drafts.distance, self._problem), None
@@ -369,8 +369,9 @@ class Live:
 
     def _sharpened(self) -> Iterator[Pass]:
         """Show the picture of every pixel, pass by pass."""
-        for done in self._made(self._finals, self.camera, self._drawn).passes():
-            self.shown = replace(self.shown, pixels=done.shown, samples=done.samples)
+        renderer = self._made(self._finals, self.camera, self._drawn)
+        for done in renderer.passes():
+            self.shown = replace(self.shown, pixels=_developed(renderer, done), samples=done.samples)
             yield done
 
     def _made(self, follower: Follower, camera: Camera | None, size: tuple[int, int]) -> Renderer:
@@ -413,3 +414,12 @@ class Live:
         except FracsliceError as error:
             self._problem = str(error)
             self.shown = replace(self.shown, problem=self._problem)
+
+
+def _developed(renderer: Renderer, done: Pass) -> np.ndarray:
+    """Picture of a pass, uint8 [height, width, 3]; with less noise where all pixels have few samples.
+
+    A GPU has the next one sooner than the noise of this one is gone.
+    """
+    noisy = 1 <= done.samples < NOISY and renderer.device == "cpu"
+    return done.smooth if noisy else done.shown

@@ -40,6 +40,12 @@ QUALITIES = 75, 92
 PENDING = 2
 """Frames that a page may have to fetch still before others are left out."""
 
+GRADIENT = (
+    "{width: '100%', height: '14px', borderRadius: '4px', marginBottom: '4px', "
+    "background: `linear-gradient(90deg, ${[...c.stops, c.stops[0]].join(', ')})`}"
+)
+"""Style of the strip above the stops of a gradient, which returns to its first."""
+
 STYLE = ".v-field-label, .text-medium-emphasis { opacity: 0.85 !important }"
 """Contrast of 4.5 and more, as WCAG 2 wants it, for labels of Vuetify."""
 
@@ -384,9 +390,12 @@ class Page:
         self.studio.set_number(self.studio.document.version.at, name, int(index), number)
         self.refresh()
 
-    def set_colour(self, name: str, value: str) -> None:
-        """Give an attribute a colour."""
-        self.set_text(name, panels.colour_text(value))
+    def set_colour(self, name: str, index: int, value: str | None) -> None:
+        """Give a colour of an attribute another value, add it behind the last, or take it away."""
+        control = next(control for control in self.state.panel if control["name"] == name)
+        stops = list(control["stops"])
+        stops[index : index + 1] = [] if value is None else [value]
+        self.set_text(name, panels.colour_text(stops))
 
     def write(self, xml: str, **_: Any) -> None:
         """Take the text of the editor."""
@@ -693,13 +702,33 @@ class Page:
                     hide_details=True,
                     raw_attrs=named_by("c.name"),
                 )
-                html.Input(
-                    v_if="c.kind == 'colour'",
-                    type="color",
-                    value=("c.hex",),
-                    change=(self.set_colour, "[c.name, $event.target.value]"),
-                    raw_attrs=named_by("c.name"),
-                )
+                with html.Div(v_if="c.kind == 'colours'", classes="d-flex flex-wrap align-center"):
+                    html.Div(v_if="c.stops.length > 1", style=(GRADIENT,))
+                    with html.Div(v_for="(stop, i) in c.stops", key="i", classes="d-flex mr-2"):
+                        html.Input(
+                            type="color",
+                            value=("stop",),
+                            change=(self.set_colour, "[c.name, i, $event.target.value]"),
+                            raw_attrs=named_by("c.name + ' ' + (i + 1)"),
+                        )
+                        v.VBtn(
+                            v_if="c.stops.length > 1",
+                            icon="mdi-close",
+                            click=(self.set_colour, "[c.name, i, null]"),
+                            size="x-small",
+                            density="compact",
+                            variant="text",
+                            raw_attrs=named_by("'remove ' + c.name + ' ' + (i + 1)"),
+                        )
+                    v.VBtn(
+                        v_if="c.stops.length < c.most",
+                        icon="mdi-plus",
+                        click=(self.set_colour, "[c.name, c.stops.length, c.stops[c.stops.length - 1]]"),
+                        size="x-small",
+                        density="compact",
+                        variant="text",
+                        raw_attrs=named_by("'add a stop to ' + c.name"),
+                    )
                 v.VTextField(
                     v_if="c.kind == 'text'",
                     model_value=("c.text",),

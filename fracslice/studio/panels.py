@@ -54,8 +54,10 @@ def _control(name: str, kind: Parameter, text: str | None) -> Control:
     if isinstance(kind, (File, Length)):
         return made
     numbers = _numbers(shown)
-    if name in COLOURS and isinstance(kind, Vector) and (numbers is None or len(numbers) == 3):
-        return made | {"kind": "colour", "hex": _hex(numbers or [1.0, 1.0, 1.0])}
+    if name in COLOURS and isinstance(kind, Vector) and (numbers is None or len(numbers) % 3 == 0):
+        given = numbers or [1.0, 1.0, 1.0]
+        stops = [_hex(given[i : i + 3]) for i in range(0, len(given), 3)]
+        return made | {"kind": "colours", "stops": stops, "most": max(kind.sizes) // 3}
     if isinstance(kind, Count) and numbers and len(numbers) == 1:
         limit = min(kind.most, max(4 * kind.least, 32, 2 * int(numbers[0])))
         return made | {"kind": "slider", "values": numbers, "least": kind.least, "most": limit, "step": 1.0}
@@ -90,9 +92,9 @@ def _hex(colour: list[float]) -> str:
     return "#" + "".join(f"{round(255 * min(max(c, 0.0), 1.0)):02x}" for c in colour)
 
 
-def colour_text(value: str) -> str:
-    """Three numbers of a colour that a browser wrote, such as #ff8800."""
-    return " ".join(f"{int(value[i : i + 2], 16) / 255:.3g}" for i in (1, 3, 5))
+def colour_text(stops: list[str]) -> str:
+    """The numbers of colours that a browser wrote, such as #ff8800: one, or the stops of a gradient."""
+    return " ".join(f"{int(stop[i : i + 2], 16) / 255:.3g}" for stop in stops for i in (1, 3, 5))
 
 
 def outline(document: Document) -> list[dict[str, Any]]:

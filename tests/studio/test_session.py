@@ -18,7 +18,7 @@ from fracslice.formulas import Node, burning_ship, mandelbulb, sphere, transform
 from fracslice.scene import read
 from fracslice.scene.layout import registered_formulas
 from fracslice.studio import panels
-from fracslice.studio.document import required
+from fracslice.studio.document import Tag, required
 from fracslice.studio.session import Session, loosened
 from fracslice.work import Work
 from tests.waiting import wait_until
@@ -168,7 +168,11 @@ def test_controls_follow_from_the_registry(studio: Session) -> None:
     document.add((), "light")
     light = {control["name"]: control for control in panels.controls(document.find((2,)))}  # type: ignore[arg-type]
     assert light["kind"]["kind"] == "choice" and "sun" in light["kind"]["choices"]
-    assert light["colour"]["hex"] == "#ffffff" and panels.colour_text("#ff8000") == "1 0.502 0"
+    assert light["colour"]["stops"] == ["#ffffff"] and light["colour"]["most"] == 1
+    assert panels.colour_text(["#ff8000", "#000000"]) == "1 0.502 0 0 0 0"
+    paint = Tag("material", {"colour": "1 0 0 0 0 1"}, (), 1, 0, 0)
+    (colours,) = (control for control in panels.controls(paint) if control["name"] == "colour")
+    assert colours["stops"] == ["#ff0000", "#0000ff"] and colours["most"] == 8
     for choice in panels.choices():
         tag = replace(document.root, name=choice["name"], attributes={})
         assert choice["doc"] and all(control["doc"] for control in panels.controls(tag))
