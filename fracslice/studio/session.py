@@ -245,6 +245,7 @@ class Session:
         self.player = Player()
         self._scene.put(self.document.scene)
         self.live.wake()
+        self._compile_ahead()
 
     @property
     def scenes(self) -> list[dict[str, str]]:
