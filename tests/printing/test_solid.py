@@ -310,6 +310,7 @@ def test_gaps_of_fractals_are_closed() -> None:
     assert 1.002 < after.sum() / before.sum() < 1.1
 
 
+@pytest.mark.nightly
 def test_time_is_linear_in_the_holes() -> None:
     """10^4 holes take at most a few times what 100 do, on as many samples."""
 

@@ -318,5 +318,5 @@ def test_wrong_arrays_and_options_are_one_line(make: Callable[[], object], messa
 
 
 def test_meshes_of_grids_have_no_faults() -> None:
-    made = make_mesh(array(hollow(POINTS)) | (array(cube(POINTS)) & gyroid(period=0.5)), resolution=48)
+    made = make_mesh(array(hollow(POINTS)) | (array(cube(POINTS)) & gyroid(period=0.5)), resolution=32)
     assert not made.report.problems and isinstance(made, Mesh)
