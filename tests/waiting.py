@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-SECONDS = 600.0
+SECONDS = 180.0
 """Until something that must happen has happened: only a test that fails waits this long."""
 
 

@@ -22,6 +22,7 @@ axe = pytest.importorskip("axe_playwright_python.sync_playwright")
 
 pytestmark = [
     pytest.mark.once,
+    pytest.mark.xdist_group("page"),  # one page, in the order of the tests
     pytest.mark.skipif(shutil.which("chromium") is None, reason="no Chromium is installed"),
 ]
 
@@ -242,11 +243,11 @@ def test_a_film_is_made_of_views(served: Served) -> None:
 
 def test_a_gamepad_flies(served: Served) -> None:
     page = served.page
-    page.evaluate("navigator.getGamepads = () => [{axes: [0.9, 0, 0, 0.05], buttons: []}]")
     before = picture(page)
-    wait_until(lambda: "draft" in page.get_by_role("status").inner_text())
+    page.evaluate("navigator.getGamepads = () => [{axes: [0.9, 0, 0, 0.05], buttons: []}]")
+    wait_until(lambda: page.locator(".v-main img").first.screenshot() != before, 60)
     page.evaluate("navigator.getGamepads = () => [{axes: [0, 0, 0, 0], buttons: []}]")
-    assert picture(page) != before
+    page.wait_for_timeout(100)
     page.evaluate("navigator.getGamepads = () => []")
 
 
