@@ -5,11 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-SECONDS = 180.0
-"""Until something that must happen has happened: only a test that fails waits this long."""
 
-
-def wait_until(holds: Callable[[], object], seconds: float = SECONDS) -> None:
+def wait_until(holds: Callable[[], object], seconds: float = 60.0) -> None:
     """Wait until it holds; fail after a time."""
     end = time.monotonic() + seconds
     while not holds():

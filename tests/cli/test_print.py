@@ -191,12 +191,12 @@ def test_a_slicer_ends_with_the_process_that_started_it(cancelled: bool, tmp_pat
         _run_program(["sh", "-c", {program!r}], work, "")
     """
     with subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL) as process:
-        wait_until((tmp_path / "pid").exists)
+        wait_until((tmp_path / "pid").exists, 20)
         slicer = Path(f"/proc/{(tmp_path / 'pid').read_text().strip()}/cmdline")
         assert b"97" in slicer.read_bytes()
         if not cancelled:
             process.kill()
-    wait_until(lambda: not slicer.exists() or not slicer.read_bytes())
+    wait_until(lambda: not slicer.exists() or not slicer.read_bytes(), 20)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="programs are scripts")

@@ -32,9 +32,8 @@ from fracslice.scene.view import Camera, View
 from fracslice.slicing import SliceJob
 from fracslice.volume import sampler
 from fracslice.work import Work
-from tests.waiting import SECONDS, wait_until
 
-from .processes import Cluster
+from .processes import SECONDS, Cluster, wait_until
 
 pytestmark = pytest.mark.once
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,8 +12,9 @@ from fracslice.formulas import Node, box, mandelbulb, menger, sphere, transform,
 from fracslice.scene import read
 from fracslice.studio.bookmarks import between, is_worth_a_look
 from fracslice.studio.session import Session
-from fracslice.work import Work
 from tests.waiting import wait_until
+
+from .conftest import Begin
 
 pytestmark = pytest.mark.once
 
@@ -29,12 +29,8 @@ BALL = (0, 0)
 
 
 @pytest.fixture
-def studio(tmp_path: Path) -> Iterator[Session]:
-    (tmp_path / "ball.xml").write_text(TEXT)
-    studio = Session(str(tmp_path / "ball.xml"), tmp_path, Work(threads=1), "cpu")
-    studio.live.resize((24, 16))
-    yield studio
-    studio.close()
+def studio(begin: Begin) -> Session:
+    return begin("ball.xml", TEXT, (24, 16))
 
 
 def test_a_bookmark_is_a_scene_that_is_returned_to(studio: Session, tmp_path: Path) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 import zipfile
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -30,6 +29,8 @@ from fracslice.volume.amount import Sizing
 from fracslice.work import Work
 from tests.waiting import wait_until
 
+from .conftest import Begin
+
 pytestmark = pytest.mark.once
 
 SCENE = """<scene version="1">
@@ -46,12 +47,8 @@ WORK = Work(threads=1)
 
 
 @pytest.fixture
-def studio(tmp_path: Path) -> Iterator[Session]:
-    (tmp_path / "two.xml").write_text(SCENE)
-    studio = Session(str(tmp_path / "two.xml"), tmp_path, WORK, "cpu")
-    studio.live.resize((96, 64))
-    yield studio
-    studio.close()
+def studio(begin: Begin) -> Session:
+    return begin("two.xml", SCENE, (96, 64))
 
 
 @pytest.fixture

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,8 +13,9 @@ from fracslice.scene.view import Camera
 from fracslice.studio import keyframes
 from fracslice.studio.document import Document
 from fracslice.studio.session import Session
-from fracslice.work import Work
 from tests.waiting import wait_until
+
+from .conftest import Begin
 
 pytestmark = pytest.mark.once
 
@@ -91,12 +91,8 @@ def test_what_fails_halfway_is_not_done(document: Document) -> None:
 
 
 @pytest.fixture
-def studio(tmp_path: Path) -> Iterator[Session]:
-    (tmp_path / "two.xml").write_text(TEXT)
-    studio = Session(str(tmp_path / "two.xml"), tmp_path, Work(threads=1), "cpu")
-    studio.live.resize((24, 16))
-    yield studio
-    studio.close()
+def studio(begin: Begin) -> Session:
+    return begin("two.xml", TEXT, (24, 16))
 
 
 def test_a_number_that_moves_is_changed_at_its_time(studio: Session) -> None:

@@ -10,12 +10,13 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 
-from tests.waiting import wait_until
+from tests import waiting
 
 playwright = pytest.importorskip("playwright.sync_api")
 axe = pytest.importorskip("axe_playwright_python.sync_playwright")
@@ -25,6 +26,8 @@ pytestmark = [
     pytest.mark.xdist_group("page"),  # one page, in the order of the tests
     pytest.mark.skipif(shutil.which("chromium") is None, reason="no Chromium is installed"),
 ]
+
+wait_until = partial(waiting.wait_until, seconds=30)
 
 SCENE = """<scene version="1">
   <!-- A ball and a block. -->
@@ -245,7 +248,7 @@ def test_a_gamepad_flies(served: Served) -> None:
     page = served.page
     before = picture(page)
     page.evaluate("navigator.getGamepads = () => [{axes: [0.9, 0, 0, 0.05], buttons: []}]")
-    wait_until(lambda: page.locator(".v-main img").first.screenshot() != before, 60)
+    wait_until(lambda: page.locator(".v-main img").first.screenshot() != before)
     page.evaluate("navigator.getGamepads = () => [{axes: [0, 0, 0, 0], buttons: []}]")
     page.wait_for_timeout(100)
     page.evaluate("navigator.getGamepads = () => []")

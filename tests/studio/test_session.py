@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,6 +22,8 @@ from fracslice.studio.session import Session, loosened
 from fracslice.work import Work
 from tests.waiting import wait_until
 
+from .conftest import Begin
+
 pytestmark = pytest.mark.once
 
 TEXT = """<scene version="1">
@@ -36,12 +37,8 @@ BALL = (0, 0)
 
 
 @pytest.fixture
-def studio(tmp_path: Path) -> Iterator[Session]:
-    (tmp_path / "ball.xml").write_text(TEXT)
-    studio = Session(str(tmp_path / "ball.xml"), tmp_path, Work(threads=1), "cpu")
-    studio.live.resize((48, 32))
-    yield studio
-    studio.close()
+def studio(begin: Begin) -> Session:
+    return begin("ball.xml", TEXT, (48, 32))
 
 
 def rest(studio: Session) -> np.ndarray:
