@@ -1,6 +1,6 @@
 """Films: a scene over time, its frames and their files."""
 
-from .film import ENDINGS, FilmJob, check_film, encode, sheet_frames, write_frames
+from .film import ENDINGS, FilmJob, check_film, encode, has_frames, sheet_frames, write_frames
 from .timeline import Timeline, with_flight
 
 __all__ = [
@@ -9,6 +9,7 @@ __all__ = [
     "Timeline",
     "check_film",
     "encode",
+    "has_frames",
     "sheet_frames",
     "with_flight",
     "write_frames",

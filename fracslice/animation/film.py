@@ -549,7 +549,7 @@ def _claim(job: FilmJob, folder: Path, resume: bool) -> None:
     if not journal.exists():
         if any(folder.iterdir()):
             raise RenderError(f"{folder}: expected an empty folder, or one with the frames of a film")
-    elif _film_key(journal) == job.key:
+    elif has_frames(job, folder):
         return
     elif resume:
         raise RenderError(
@@ -559,6 +559,30 @@ def _claim(job: FilmJob, folder: Path, resume: bool) -> None:
         path.unlink()
     with replacing(journal) as file:
         file.write(json.dumps({"key": job.key, "fps": job.fps}).encode() + b"\n")
+
+
+def has_frames(job: FilmJob, folder: Path) -> bool:
+    """Return whether a folder has frames of this film, perhaps not all: whether it can be resumed.
+
+    Parameters
+    ----------
+    job : FilmJob
+        The film.
+    folder : Path
+        Folder, which may be missing.
+
+    Returns
+    -------
+    bool
+        False for frames of another film, size, number of samples, rate or device.
+
+    Raises
+    ------
+    RenderError
+        If the folder has the journal of something else.
+    """
+    journal = folder / JOURNAL
+    return journal.exists() and _film_key(journal) == job.key
 
 
 def _film_key(journal: Path) -> str:

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..animation import ENDINGS as FILM_ENDINGS
-from ..animation import FilmJob, Timeline, check_film, encode, write_frames
+from ..animation import FilmJob, Timeline, check_film, encode, has_frames, write_frames
 from ..common.files import replacing
 from ..common.parameters import AUTO, Number
-from ..errors import Cancelled, FracsliceError, RenderError, SceneError
+from ..errors import Cancelled, FracsliceError, SceneError
 from ..export.images import IMAGES
 from ..export.layers import ENDINGS as LAYER_ENDINGS
 from ..fields.box import Box
@@ -36,7 +36,7 @@ from ..scene.view import Camera, View
 from ..work import Work
 from . import keyframes
 from .bookmarks import Bookmarks, between, is_worth_a_look
-from .document import Document, Place, Tag, element_of, with_attribute
+from .document import Document, Place, Tag, with_attribute
 from .inside import Inside
 from .keyframes import Player
 from .panels import controls
@@ -408,11 +408,9 @@ class Session:
         """An element with the values that it has at the time of the film."""
         if self.film is None or self.player.seconds is None or self.document.problem:
             return tag
-        element, values = element_of(tag.name), {}
-        for name in element.parameters if element else ():
-            of = keyframes.path_of(self.document, tag, name)
-            if keyframes.track_of(self.document, of):
-                values[name] = self.film.value(of, self.player.seconds)
+        prefix = keyframes.path_of(self.document, tag, "")
+        moving = [track.of for track in self.film.scene.tracks if track.of.startswith(prefix)]
+        values = {of.removeprefix(prefix): self.film.value(of, self.player.seconds) for of in moving}
         return replace(tag, attributes={**tag.attributes, **values})
 
     def set_value(self, place: Place, attribute: str, value: str | None) -> None:
@@ -541,11 +539,8 @@ class Session:
         size = scene.view.film.width, scene.view.film.height
         frames = FilmJob(film, size, samples, rate, device=self._device)
         folder = path.with_suffix(".frames")
-        try:
-            paths = write_frames(frames, range(frames.frames), folder, True, work)
-        except RenderError:  # those of the film as it was before
-            paths = write_frames(frames, range(frames.frames), folder, False, work)
-        encode(paths, path, rate, work)
+        resume = has_frames(frames, folder)
+        encode(write_frames(frames, range(frames.frames), folder, resume, work), path, rate, work)
         return f"{path.name}: {frames.frames} frames"
 
 

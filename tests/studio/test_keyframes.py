@@ -159,3 +159,20 @@ def test_a_film_without_a_flight_leaves_the_camera_alone(studio: Session) -> Non
     studio.seek(1.0)
     wait_until(lambda: studio.live.scene.root.children[1]["radius"] == 1.0)
     assert studio.live.aim == turned
+
+
+def test_a_film_is_made_and_made_again_where_it_changed(begin: Begin, tmp_path: Path) -> None:
+    text = TEXT.replace('<film samples="1"/>', '<film width="16" height="12"/><animation duration="0.1s"/>')
+    studio = begin("small.xml", text, (24, 16))
+
+    def made() -> list[int]:
+        """Times at which the frames were written."""
+        studio.start("small.gif", {"samples": 1})
+        wait_until(lambda: studio.job is not None and studio.job.is_done)
+        assert studio.job and studio.job.result == "small.gif: 2 frames", studio.job
+        return [path.stat().st_mtime_ns for path in sorted((tmp_path / "small.frames").glob("*.png"))]
+
+    first = made()
+    assert made() == first
+    studio.set_number((0, 0), "radius", 0, 4.0)
+    assert not set(made()) & set(first)
