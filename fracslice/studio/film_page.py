@@ -90,7 +90,7 @@ class FilmPanel:
         tag = document.chosen
         if tag:
             of = keyframes.path_of(document, tag, attribute)
-            value = self.page.value_of(attribute)
+            value = self.page.tree.value_of(attribute)
             self.page.edit(keyframes.set_keys, document, self._seconds, {of: value})
 
     def choose(self, of: str, seconds: float) -> None:

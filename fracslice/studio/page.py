@@ -10,8 +10,7 @@ import threading
 import time
 import webbrowser
 from collections.abc import Awaitable, Callable
-from dataclasses import replace
-from typing import Any, Literal
+from typing import Any
 
 from aiohttp import web
 from trame.app import get_server
@@ -22,29 +21,23 @@ from trame.widgets import vuetify3 as v
 from ..common.messages import format_count
 from ..errors import FracsliceError
 from ..export.images import IMAGES
-from ..rendering.live import CameraInput
-from ..viewer.viewer import MOVES, PACES, Controls
 from . import panels
 from .film_page import HEIGHT, FilmPanel
+from .frames import AREA, PAD, Frames
 from .inside_page import InsidePanel
-from .session import FILMS, PRINT_ENDINGS, Session, jpeg
+from .session import FILMS, PRINT_ENDINGS, Session
 from .sheets import SheetPanel, embedded
-from .widgets import NARROW, named, named_by, number_field
+from .tree_page import TreePanel
+from .widgets import NARROW, named
 
 TICK = 1 / 60
 """Interval between two looks at the picture, seconds."""
 
-QUALITIES = 75, 92
-"""Quality of JPEG frames, of drafts and of pictures at rest."""
+TELLING = 0.1
+"""Interval between two looks at the rest of what is shown, whose texts take a millisecond, seconds."""
 
 PENDING = 2
 """Frames that a page may have to fetch still before others are left out."""
-
-GRADIENT = (
-    "{width: '100%', height: '14px', borderRadius: '4px', marginBottom: '4px', "
-    "background: `linear-gradient(90deg, ${[...c.stops, c.stops[0]].join(', ')})`}"
-)
-"""Style of the strip above the stops of a gradient, which returns to its first."""
 
 STYLE = ".v-field-label, .text-medium-emphasis { opacity: 0.85 !important }"
 """Contrast of 4.5 and more, as WCAG 2 wants it, for labels of Vuetify."""
@@ -53,18 +46,6 @@ NAMED = """new MutationObserver(() =>
   document.querySelectorAll("img.image-display-area:not([alt])").forEach(i => i.alt = "Picture of the scene")
 ).observe(document, {childList: true, subtree: true})"""
 """Script that names the picture for those who do not see it, as the widget of the picture cannot."""
-
-PAD = """let still = true;
-setInterval(() => {
-  const pad = [...navigator.getGamepads()].find(p => p);
-  if (!pad) return;
-  const bent = pad.axes.slice(0, 4).map(a => Math.abs(a) < 0.12 ? 0 : a);
-  const axes = [...bent, (pad.buttons[7]?.value ?? 0) - (pad.buttons[6]?.value ?? 0)];
-  const rests = axes.every(a => a === 0);
-  if (!rests || !still) window.trame.trigger("pad", [axes]);
-  still = rests;
-}, 33)"""
-"""Script that tells of a gamepad: both sticks, and the shoulder buttons that are pressed by degrees."""
 
 SMALL = (
     f"{{width: '{panels.CELL[0]}px', height: '{panels.CELL[1]}px', flexShrink: 0, borderRadius: '4px', "
@@ -87,132 +68,11 @@ HELP = (
     ("?", "this help"),
 )
 
-CONTROL = {"z": "undo", "y": "redo"}
-"""What keys do with ctrl."""
-
-ACTIONS = ("v", "x", ",", ".", "?")
-"""Keys of the picture that do something once."""
-
-TWICE, NEAR = 0.35, 5.0
-"""Longest time between the clicks of a double click, seconds, and their distance, pixels."""
-
 BAR = 48
 """Height of the bar above the picture, pixels."""
 
 AWAY = 30.0
 """Time after the last tab was closed in which another one finds the same, seconds."""
-
-AREA = "picture"
-
-
-class Frames:
-    """The area of the picture: sends frames, receives sizes and what the mouse and the keys do."""
-
-    area_name = AREA
-
-    def __init__(self, studio: Session, act: Callable[[str], None]) -> None:
-        self._studio, self._act = studio, act
-        self._streamer: Any = None
-        self._sent: object = None
-        self._pressed, self._pressed_at = 0.0, (0.0, 0.0)
-        self._drag: Callable[[float, float], None] | None = None
-        self.mouse = 0.0, 0.0  # pixels from the upper left corner
-        self._pad = CameraInput()
-        self.controls = Controls()
-
-    def set_streamer(self, streamer: Any) -> None:
-        """Have the streamer of a page; called by trame-rca."""
-        self._streamer, self._sent = streamer, None
-
-    def update_size(self, _: str, size: dict[str, Any]) -> None:
-        """Follow the size of the area, pixels of the page."""
-        self._studio.live.resize((max(int(size.get("w", 0)), 16), max(int(size.get("h", 0)), 16)))
-        self._sent = None
-
-    def reset(self) -> None:
-        """Send the picture once more."""
-        self._sent = None
-
-    def on_interaction(self, _: str, event: dict[str, Any]) -> None:
-        """Do what an event of the mouse or a key says."""
-        kind, views, inside = event.get("type", ""), self._studio.views, self._studio.inside
-        if kind in ("KeyDown", "KeyPress", "KeyUp"):
-            self.key(str(event.get("key", "")).lower(), kind != "KeyUp", bool(event.get("controlKey")))
-            return
-        x, y = self.mouse
-        if "x" in event:
-            self.mouse = float(event["x"]), self._studio.live.size[1] - float(event["y"])
-        if kind.endswith("ButtonPress"):
-            self._press(kind == "LeftButtonPress" and not event.get("shiftKey"))
-        elif kind.endswith("ButtonRelease"):
-            self._drag = None
-            if inside.measuring and math.dist(self.mouse, self._pressed_at) < NEAR:
-                inside.pick(self.mouse)
-        elif kind == "MouseMove" and self._drag:
-            self._drag(self.mouse[0] - x, self.mouse[1] - y)
-        elif kind == "MouseMove":
-            inside.hover(self.mouse)
-        elif kind == "MouseWheel":
-            nearer = 1.0 if event.get("spinY", 0) < 0 else -1.0
-            if inside.is_flat:
-                inside.zoom(nearer)
-            else:
-                views.approach(nearer, self.mouse)
-
-    def _press(self, around: bool) -> None:
-        """Begin a drag around the point under the mouse or in place; a second click walks there."""
-        views, inside, now = self._studio.views, self._studio.inside, time.monotonic()
-        still = inside.is_flat or inside.measuring
-        if not still and now - self._pressed < TWICE and math.dist(self.mouse, self._pressed_at) < NEAR:
-            views.walk_to(self.mouse)
-            return
-        self._pressed, self._pressed_at = now, self.mouse
-        if inside.is_flat:
-            self._drag = inside.drag
-            return
-        self._drag = views.orbit if around else views.look_around
-        if around:
-            views.grip(self.mouse)
-
-    def key(self, key: str, down: bool, control: bool = False) -> None:
-        """Press or release a key."""
-        if control:
-            if down and key in CONTROL:
-                self._act(CONTROL[key])
-        elif not down:
-            self.controls.release(key)
-        elif key in MOVES or key in PACES:
-            self.controls.press(key)
-        elif key in ACTIONS:
-            self._act(key)
-
-    def bend(self, axes: list[float]) -> None:
-        """Fly as a gamepad says: right and back, turn right and down, climb; -1 to 1 each."""
-        right, back, yaw, down, climb = map(float, axes)
-        self._pad = CameraInput(forward=-back, right=right, up=climb, yaw=yaw, pitch=-down)
-
-    @property
-    def input(self) -> CameraInput:
-        """What keys and a gamepad want of the camera."""
-        keys, pad = self.controls.input, self._pad
-        axes = "forward", "right", "up", "yaw", "pitch"
-        both = {axis: max(-1.0, min(1.0, getattr(keys, axis) + getattr(pad, axis))) for axis in axes}
-        return replace(keys, **both)
-
-    async def send(self) -> None:
-        """Send the picture if there is a new one, and a page to send it to."""
-        shown, inside = self._studio.shown, self._studio.inside
-        now = shown, inside.overlay
-        if now == self._sent or self._streamer is None:
-            return
-        self._sent = now
-        still = shown.samples > 0
-        loop = asyncio.get_running_loop()
-        pixels = await loop.run_in_executor(None, inside.over, shown)
-        data = await loop.run_in_executor(None, jpeg, pixels, QUALITIES[still])
-        rows, columns, _ = pixels.shape
-        meta = {"type": "image/jpeg", "codec": "", "w": columns, "h": rows, "st": 0, "key": "key"}
-        self._streamer.push_content(AREA, meta, data)
 
 
 class Page:
@@ -236,7 +96,6 @@ class Page:
                 "helping": False,
                 "making": False,
                 "opening": False,
-                "dragged": [],
                 "axis": "",
                 "share": 0.5,
                 "scenes": studio.scenes,
@@ -248,13 +107,13 @@ class Page:
                 "job": {},
             }
         )
+        self.tree = TreePanel(self)
         self.sheets = SheetPanel(self)
         self.film = FilmPanel(self)
         self.inside = InsidePanel(self)
         self.refresh()
         self.state.change("xml")(self.write)
         self._tabs, self._left = 0, 0.0
-        self.server.trigger("drop")(self.drop)
         self.server.trigger("pad")(self.frames.bend)
         self.ctrl.on_server_bind.add(self.guard)
         self.ctrl.on_server_ready.add(lambda **_: asyncio.get_running_loop().create_task(self.follow()))
@@ -263,12 +122,8 @@ class Page:
     def refresh(self) -> None:
         """Bring what the page shows of the document up to date."""
         document = self.studio.document
-        tag = document.chosen
         with self.state as state:
-            state.rows = panels.outline(document)
-            state.panel = panels.controls(self.studio.at_time(tag)) if tag else []
-            state.at = list(document.version.at)
-            state.tag = tag.name if tag else ""
+            self.tree.refresh()
             state.xml = document.text
             state.problem = document.problem or self.studio.message
             state.undoes, state.redoes, state.saved = document.undoes, document.redoes, document.is_saved
@@ -336,67 +191,6 @@ class Page:
             state.axis, state.share = axis, float(share)
         self.studio.cut(axis, float(share))
 
-    def turn_on(self, start: int) -> None:
-        """Turn an element on again."""
-        self.edit(self.studio.document.turn_on, start)
-
-    def drop(self, place: list[int], onto: list[int]) -> None:
-        """Move an element before the one that it is dropped on."""
-        if place != onto:
-            self.edit(self.studio.document.move, tuple(place), tuple(onto))
-
-    def choose(self, place: list[int]) -> None:
-        """Choose an element."""
-        self.studio.document.choose(tuple(place))
-        self.refresh()
-
-    def add(self, name: str, around: bool) -> None:
-        """Add an element to the chosen one, or put it around that."""
-        document, at = self.studio.document, self.studio.document.version.at
-        self.shut("adding", "wrapping")
-        if any(choice["name"] == name and choice["kind"] == "part" for choice in self.state.choices):
-            at = ()
-        if around:
-            self.edit(document.wrap, at, name)
-        else:
-            self.edit(document.add, at, name)
-
-    def change(self, edit: Literal["duplicate", "unwrap", "turn_off", "remove"]) -> None:
-        """Change the chosen element."""
-        document = self.studio.document
-        self.edit(getattr(document, edit), document.version.at)
-
-    def shift(self, by: int) -> None:
-        """Move the chosen element up or down among its siblings."""
-        at = self.studio.document.version.at
-        if at and at[-1] + by >= 0:
-            self.edit(self.studio.document.move, at, (*at[:-1], at[-1] + by + (by > 0)))
-
-    def set_text(self, name: str, value: str | None) -> None:
-        """Give an attribute of the chosen element a text; none takes it away."""
-        self.studio.set_value(self.studio.document.version.at, name, value or None)
-        self.refresh()
-
-    def value_of(self, name: str) -> str:
-        """Text of an attribute of the chosen element, as its control shows it."""
-        return str(next(control["text"] for control in self.state.panel if control["name"] == name))
-
-    def set_number(self, name: str, index: int, value: Any) -> None:
-        """Give a number of an attribute a value."""
-        try:
-            number = float(value)
-        except (TypeError, ValueError):
-            return
-        self.studio.set_number(self.studio.document.version.at, name, int(index), number)
-        self.refresh()
-
-    def set_colour(self, name: str, index: int, value: str | None) -> None:
-        """Give a colour of an attribute another value, add it behind the last, or take it away."""
-        control = next(control for control in self.state.panel if control["name"] == name)
-        stops = list(control["stops"])
-        stops[index : index + 1] = [] if value is None else [value]
-        self.set_text(name, panels.colour_text(stops))
-
     def write(self, xml: str, **_: Any) -> None:
         """Take the text of the editor."""
         if xml != self.studio.document.text:
@@ -427,14 +221,17 @@ class Page:
 
     async def follow(self) -> None:
         """Steer by the keys that are held, send frames, and say how far things are, until the server ends."""
+        told = -math.inf
         while True:
             self.studio.views.steer(self.frames.input)
             self.studio.advance()
             await self.frames.send()
             self.film.follow()
-            self._say()
-            self.inside.follow()
-            self._forget()
+            if (now := time.monotonic()) - told > TELLING:
+                told = now
+                self._say()
+                self.inside.follow()
+                self._forget()
             await asyncio.sleep(TICK)
 
     def _count_tabs(self, more: int) -> None:
@@ -535,9 +332,7 @@ class Page:
         with VAppLayout(self.server, theme=("dark ? 'dark' : 'light'",)) as layout:
             self._bar()
             with v.VNavigationDrawer(permanent=True, width=360, raw_attrs=named("Scene")):
-                self._tree()
-                v.VDivider()
-                self._panel()
+                self.tree.build()
             with v.VNavigationDrawer(
                 v_model=("editing",),
                 location="right",
@@ -605,138 +400,6 @@ class Page:
         """Write the camera into the scene."""
         self.studio.keep_view()
         self.refresh()
-
-    def _tree(self) -> None:
-        with html.Div(classes="d-flex pa-1"):
-            v.VBtn("Add", click="adding = true; search = ''", size="small", variant="text")
-            v.VBtn("Wrap", click="wrapping = true; search = ''", size="small", variant="text")
-            for icon, label, act in (
-                ("mdi-arrow-up", "Move up", lambda: self.shift(-1)),
-                ("mdi-arrow-down", "Move down", lambda: self.shift(1)),
-                ("mdi-content-copy", "Duplicate", lambda: self.change("duplicate")),
-                ("mdi-arrow-collapse", "Unwrap", lambda: self.change("unwrap")),
-                ("mdi-eye-off", "Turn off", lambda: self.change("turn_off")),
-                ("mdi-delete", "Delete", lambda: self.change("remove")),
-            ):
-                v.VBtn(icon=icon, click=act, size="small", variant="text", raw_attrs=named(label))
-        with (
-            v.VList(density="compact", style="max-height: 40vh; overflow: auto", raw_attrs=named("Elements")),
-            v.VListItem(
-                v_for="row in rows",
-                key="row.start",
-                click=(self.choose, "[row.place]"),
-                active=("row.chosen",),
-                style=("`padding-left: ${8 + 14 * row.depth}px; min-height: 30px`",),
-                classes=("row.off ? 'text-disabled' : ''",),
-                raw_attrs=[
-                    ':draggable="!row.off"',
-                    '@dragstart="dragged = row.place"',
-                    "@dragover.prevent",
-                    "@drop.prevent=\"trigger('drop', [dragged, row.place])\"",
-                ],
-            ),
-        ):
-            html.Span("{{ row.name }}")
-            html.Span("{{ row.given }}", classes="text-caption text-medium-emphasis ml-2")
-            v.VBtn(
-                icon="mdi-eye",
-                v_if="row.off",
-                click=(self.turn_on, "[row.start]"),
-                size="x-small",
-                variant="text",
-                raw_attrs=named_by("'turn ' + row.name + ' on'"),
-            )
-
-    def _panel(self) -> None:
-        with html.Div(classes="pa-3"):
-            html.Div("{{ tag }}", classes="text-h6")
-            with html.Div(v_for="c in panel", key="at.join('.') + c.name", classes="mb-2"):
-                with html.Div(classes="d-flex align-center"):
-                    html.Span(
-                        "{{ c.name }}",
-                        title=("c.doc + ': ' + c.expects",),
-                        classes=("c.given ? 'text-body-2 font-weight-bold' : 'text-body-2'",),
-                    )
-                    v.VSpacer()
-                    v.VBtn(
-                        "reset",
-                        v_if="c.given",
-                        size="x-small",
-                        variant="text",
-                        click=(self.set_text, "[c.name, null]"),
-                        raw_attrs=named_by("'reset ' + c.name"),
-                    )
-                    v.VBtn(
-                        v_if="filming",
-                        icon="mdi-rhombus",
-                        size="x-small",
-                        variant="text",
-                        click=(self.film.key_value, "[c.name]"),
-                        raw_attrs=named_by("'keyframe of ' + c.name"),
-                    )
-                with (
-                    html.Template(v_if="c.kind == 'slider'"),
-                    html.Div(v_for="(value, i) in c.values", key="i", classes="d-flex align-center"),
-                ):
-                    v.VSlider(
-                        model_value=("value",),
-                        update_modelValue=(self.set_number, "[c.name, i, $event]"),
-                        min=("c.least",),
-                        max=("c.most",),
-                        step=("c.step",),
-                        density="compact",
-                        hide_details=True,
-                        raw_attrs=named_by("c.name + ' ' + (i + 1)"),
-                    )
-                    number_field(
-                        "value",
-                        (self.set_number, "[c.name, i, $event.target.value]"),
-                        named_by("c.name + ' ' + (i + 1) + ' as a number'"),
-                    )
-                v.VSelect(
-                    v_if="c.kind == 'choice'",
-                    model_value=("c.text",),
-                    items=("c.choices",),
-                    update_modelValue=(self.set_text, "[c.name, $event]"),
-                    density="compact",
-                    hide_details=True,
-                    raw_attrs=named_by("c.name"),
-                )
-                with html.Div(v_if="c.kind == 'colours'", classes="d-flex flex-wrap align-center"):
-                    html.Div(v_if="c.stops.length > 1", style=(GRADIENT,))
-                    with html.Div(v_for="(stop, i) in c.stops", key="i", classes="d-flex mr-2"):
-                        html.Input(
-                            type="color",
-                            value=("stop",),
-                            change=(self.set_colour, "[c.name, i, $event.target.value]"),
-                            raw_attrs=named_by("c.name + ' ' + (i + 1)"),
-                        )
-                        v.VBtn(
-                            v_if="c.stops.length > 1",
-                            icon="mdi-close",
-                            click=(self.set_colour, "[c.name, i, null]"),
-                            size="x-small",
-                            density="compact",
-                            variant="text",
-                            raw_attrs=named_by("'remove ' + c.name + ' ' + (i + 1)"),
-                        )
-                    v.VBtn(
-                        v_if="c.stops.length < c.most",
-                        icon="mdi-plus",
-                        click=(self.set_colour, "[c.name, c.stops.length, c.stops[c.stops.length - 1]]"),
-                        size="x-small",
-                        density="compact",
-                        variant="text",
-                        raw_attrs=named_by("'add a stop to ' + c.name"),
-                    )
-                v.VTextField(
-                    v_if="c.kind == 'text'",
-                    model_value=("c.text",),
-                    change=(self.set_text, "[c.name, $event.target.value]"),
-                    density="compact",
-                    hide_details=True,
-                    raw_attrs=named_by("c.name"),
-                )
 
     def _editor(self) -> None:
         html.Textarea(
@@ -810,8 +473,8 @@ class Page:
     def _dialogs(self) -> None:
         found = "choices.filter(c => (c.name + c.doc).includes(search)"
         around = f"{found} && c.kind != 'shape' && c.kind != 'part')"
-        self._list("adding", "Add an element", f"{found})", (self.add, "[c.name, false]"))
-        self._list("wrapping", "Wrap it in", around, (self.add, "[c.name, true]"))
+        self._list("adding", "Add an element", f"{found})", (self.tree.add, "[c.name, false]"))
+        self._list("wrapping", "Wrap it in", around, (self.tree.add, "[c.name, true]"))
         scenes = "scenes.filter(c => (c.name + c.doc).includes(search))"
         self._list("opening", "Open a scene", scenes, (self.open, "[c.name]"))
         self.sheets.build_variations()
