@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from .parameters import Triple
+
 if TYPE_CHECKING:
     import trimesh
 
@@ -305,3 +307,9 @@ LARGEST, COPIES = 1 << 21, 64
 """Vertices, triangles and parts that it may make, and how many times those of the file. A few lines could ask
 for any number.
 """
+
+
+def triple(array: NDArray[np.float64]) -> Triple:
+    """Three numbers of an array."""
+    x, y, z = array.tolist()
+    return x, y, z

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._native import foremost
-from ..common.arrays import from_linear, product, to_linear
+from ..common.arrays import from_linear, product, to_linear, triple
 from ..fields.box import Triple
 from ..scene.view import Camera
 from .model import AMBIENT, COLOUR, LIGHT, Mesh
@@ -176,12 +176,12 @@ class MeshDrawing:
         if cut and along @ normal > 0:
             facing = np.array(cut.normal)
             point = start + (cut.offset - facing @ start) / (facing @ along) * along
-            return SeenPoint(_triple(point), _triple(facing / np.linalg.norm(facing)), None, (0.0, 0.0, 0.0))
+            return SeenPoint(triple(point), triple(facing / np.linalg.norm(facing)), None, (0.0, 0.0, 0.0))
         place = self.view.mesh.vertices[corners]
         point = start + ((place[0] - start) @ normal) / (along @ normal) * along
         weights = np.linalg.lstsq(np.vstack([place.T, np.ones(3)]), np.append(point, 1.0), rcond=None)[0]
         a, b, c = corners.tolist()
-        return SeenPoint(_triple(point), _triple(normal), (a, b, c), _triple(weights))
+        return SeenPoint(triple(point), triple(normal), (a, b, c), triple(weights))
 
 
 @dataclass(frozen=True, eq=False)
@@ -272,8 +272,3 @@ def _weights(
     area = parts.sum(1)
     line = (np.abs(parts) / np.maximum(np.hypot(sides[..., 0], sides[..., 1]), 1e-30)).min(1)
     return parts / np.where(area == 0, 1, area)[:, None], line, area
-
-
-def _triple(array: NDArray[np.float64]) -> Triple:
-    x, y, z = array.tolist()
-    return x, y, z

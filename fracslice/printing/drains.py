@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._slices import closed_nodes
+from ..common.arrays import triple
 from ..common.messages import format_count, place, significant
 from ..errors import VolumeError
-from ..fields.box import Box, Triple
+from ..fields.box import Box
 from ..fields.field import Field
 from ..formulas import Node, cylinder, intersection, plane, transform, union
 from ..records import Print
@@ -228,12 +229,7 @@ class Drill:
         start, stop = (at + direction * t for t in (begin - radius / 2, end + radius))
         if self.drainage.open_at(at[:, None])[0]:
             start, stop = at + direction * (end + radius / 2), at + direction * (begin - radius)
-        return Drain(_triple(start), _triple(stop), radius)
-
-
-def _triple(point: NDArray[np.float64]) -> Triple:
-    x, y, z = point.tolist()
-    return x, y, z
+        return Drain(triple(start), triple(stop), radius)
 
 
 def _directions() -> NDArray[np.float64]:
@@ -258,7 +254,7 @@ def _cut(drain: Drain) -> Node:
         hole = transform(hole, rotate=(*axis.tolist(), turn))
     elif turn:
         hole = transform(hole, rotate=(1, 0, 0, 180))
-    return transform(hole, translate=_triple((start + end) / 2))
+    return transform(hole, translate=triple((start + end) / 2))
 
 
 def drained(planned: Plan, how: Print, scale: float, work: Work) -> Plan:

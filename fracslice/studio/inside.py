@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..checks.layer_checks import PrintReport, check_layers
 from ..checks.problems import Problem, verdict
+from ..common.arrays import triple
 from ..common.messages import format_count
 from ..common.messages import place as place_text
 from ..common.parameters import REQUIRED, Choice, Length, Parameter
@@ -43,7 +44,7 @@ from .document import Document
 from .layer_view import LayerImage, PrintLayers, Window
 from .measuring import Mark, Overlay, Tracer, outline, readout
 from .solid import SceneSolid, legend, thickness_at
-from .views import Pixel, Views, triple
+from .views import Pixel, Views
 
 MODES = "field", "mesh", "layers"
 

@@ -13,13 +13,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import triple
 from ..common.messages import significant
 from ..fields.box import Box
 from ..fields.field import Field
 from ..mesh.drawing import Projection
 from ..mesh.fit import AROUND
 from ..scene.view import Camera
-from .views import triple
 
 Point = NDArray[np.float64]
 """Three coordinates."""

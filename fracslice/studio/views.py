@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import triple
 from ..fields.box import Triple
 from ..fields.registry import Node
 from ..rendering.linking import camera_unit
@@ -105,12 +106,6 @@ def rounded(camera: Camera) -> Camera:
 
 def _places(camera: Camera) -> tuple[Triple, Triple, Triple]:
     return camera.eye, camera.target, camera.up
-
-
-def triple(array: NDArray[np.float64]) -> Triple:
-    """Three numbers of an array."""
-    x, y, z = array.tolist()
-    return x, y, z
 
 
 @dataclass(frozen=True)
