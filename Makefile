@@ -32,7 +32,7 @@ test: lint native-tests suite
 
 suite: setup
 	$(BIN)/python -m tests.structure
-	$(BIN)/python -m pytest -n 2 --dist loadgroup $(SELECT)
+	$(BIN)/python -m pytest -n 2 $(SELECT)
 
 native-tests: packages
 	cmake -S tests/native -B build/native-tests -G Ninja

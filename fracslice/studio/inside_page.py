@@ -93,7 +93,12 @@ class InsidePanel:
             v.VNavigationDrawer(
                 v_model=("looking_inside",), location="right", width=320, mobile_breakpoint=NARROW
             ),
-            v.VExpansionPanels(multiple=True, model_value=([0, 1, 2, 3, 4],), variant="accordion"),
+            v.VExpansionPanels(
+                v_if="looking_inside",  # a page opens sooner without
+                multiple=True,
+                model_value=([0, 1, 2, 3, 4],),
+                variant="accordion",
+            ),
         ):
             for title, lay in (
                 ("Mesh", self._mesh),
