@@ -107,15 +107,15 @@ class FilmPanel:
         with self.state as state:
             state.key = {}
 
-    def move_key(self, to: Any) -> None:
+    def move_key(self, to: float) -> None:
         """Move the chosen keyframe to another time."""
         key = self.state.key
-        self.page.edit(keyframes.move_key, self.studio.document, key["of"], key["seconds"], float(to))
-        self.choose(key["of"], float(to))
+        self.page.edit(keyframes.move_key, self.studio.document, key["of"], key["seconds"], to)
+        self.choose(key["of"], to)
 
-    def set_length(self, seconds: Any) -> None:
+    def set_length(self, seconds: float) -> None:
         """Set the length of the film."""
-        self.page.edit(keyframes.begin, self.studio.document, float(seconds))
+        self.page.edit(keyframes.begin, self.studio.document, seconds)
 
     def set_curve(self, of: str, curve: str) -> None:
         """Choose the curve of a track."""

@@ -40,6 +40,7 @@ from ..volume import with_depths
 from ..volume.amount import sizing
 from ..volume.extent import extent
 from ..work import Work
+from .cut_face import CutFace
 from .document import Document
 from .layer_view import LayerImage, PrintLayers, Window
 from .measuring import Mark, Overlay, Tracer, outline, readout
@@ -144,7 +145,7 @@ class Inside:
         self._host, self._work = host, Work(work.threads)  # its progress is that of no job
         self.fineness, self.edges, self.measure = FINENESS, False, ""
         self.printer, self.layer = "", LAYER
-        self.measuring, self.bed = False, False
+        self.measuring, self.bed, self.distances = False, False, False
         self.release()
 
     def release(self) -> None:
@@ -164,6 +165,7 @@ class Inside:
         self._layered: Scene | None = None
         self._seen: tuple[PrintLayers, int, LayerImage] | None = None
         self._footing: tuple[Scene, Footing] | None = None
+        self._face: tuple[Scene, Plane, CutFace] | None = None
         self._host.live.draw(None)
 
     # what is shown
@@ -246,11 +248,24 @@ class Inside:
             self._footing = scene, Footing((x, y, low), sizing(scene, None, SAME, self._work).scale(box))
         return self._footing[1]
 
+    @property
+    def face(self) -> CutFace | None:
+        """The face of the cut through the field, where its distances are shown."""
+        scene, plane = self._host.scene, self._host.cut_plane
+        if not self.distances or plane is None or self.mode != "field":
+            return None
+        if self._face is None or self._face[:2] != (scene, plane):
+            root = with_depths(scene.root, self._work)
+            face = CutFace(root, plane, extent(root, self._work).box, self.footing.scale)
+            self._face = scene, plane, face
+        return self._face[2]
+
     def over(self, shown: Shown) -> NDArray[np.uint8]:
-        """The picture with its marks."""
-        if not self.overlay.marks:
-            return shown.pixels
-        return self.overlay.over(shown.pixels, shown.camera, self._host.live.size)
+        """The picture with its marks, and the face of a cut in colours."""
+        pixels, size = shown.pixels, self._host.live.size
+        if face := self.face:
+            pixels = face.over(pixels, shown.camera, size)
+        return self.overlay.over(pixels, shown.camera, size) if self.overlay.marks else pixels
 
     # the mesh
 
@@ -520,6 +535,8 @@ class Inside:
             "measuring": self.measuring,
             "measures": [*self._last_point(points), *readout(points)],
             "bed": self.bed,
+            "distances": self.distances,
+            "face": self._face[2].legend if self._face and self.distances else None,
         }
 
     def _other_figures(self) -> list[tuple[str, str]]:

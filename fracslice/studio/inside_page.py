@@ -12,7 +12,7 @@ from ..errors import FracsliceError
 from ..slicing.printers import PRINTERS
 from .inside import MODES
 from .solid import MEASURES
-from .widgets import NARROW, named, named_by, number_field
+from .widgets import NARROW, legend, named, named_by, number_field
 
 if TYPE_CHECKING:
     from .page import Page
@@ -148,11 +148,7 @@ class InsidePanel:
             classes="my-2",
         )
         with html.Div(v_if="inside.legend", raw_attrs=named("Legend")):
-            html.Div(style=("`height: 12px; background: ${inside.legend.colours}`",))
-            with html.Div(classes="d-flex justify-space-between text-caption"):
-                html.Span("{{ inside.legend.low }}")
-                html.Span("{{ inside.legend.unit }}")
-                html.Span("{{ inside.legend.high }}")
+            legend("inside.legend")
         html.Div("{{ inside.hovered }}", classes="text-caption", style="min-height: 20px")
         self._table("inside.figures", "inside.other")
         v.VBtn("Make a file", click=(self.file, "['mesh']"), size="small", variant="text")

@@ -19,7 +19,7 @@ from trame.widgets import client, html, rca
 from trame.widgets import vuetify3 as v
 
 from ..common.messages import format_count
-from ..errors import FracsliceError
+from ..errors import FracsliceError, SceneError
 from ..export.images import IMAGES
 from . import panels
 from .film_page import HEIGHT, FilmPanel
@@ -28,7 +28,7 @@ from .inside_page import InsidePanel
 from .session import FILMS, PRINT_ENDINGS, Session
 from .sheets import SheetPanel, embedded
 from .tree_page import TreePanel
-from .widgets import NARROW, named
+from .widgets import NARROW, legend, named
 
 TICK = 1 / 60
 """Interval between two looks at the picture, seconds."""
@@ -198,9 +198,8 @@ class Page:
 
     def make(self) -> None:
         """Make the file that the page names."""
-        name, options = self.state.file_name, self.options
         try:
-            self.studio.start(name, options)
+            self.studio.start(self.state.file_name, self.options)
         except FracsliceError as error:
             self.studio.message = str(error)
         self.refresh()
@@ -209,10 +208,10 @@ class Page:
     def options(self) -> dict[str, Any]:
         """Options of the file that the page names."""
         if str(self.state.file_name).lower().endswith((*IMAGES, *FILMS)):
-            return {"samples": int(self.state.samples)}
+            return {"samples": int(_number(self.state.samples, "samples"))}
         if str(self.state.file_name).lower().endswith(PRINT_ENDINGS):
             return self.studio.inside.layer_options
-        return {"resolution": float(self.state.resolution)}
+        return {"resolution": _number(self.state.resolution, "voxels")}
 
     def cancel(self) -> None:
         """Cancel what is being made."""
@@ -445,6 +444,21 @@ class Page:
                     density="compact",
                     raw_attrs=named("Place of the cut"),
                 )
+                v.VBtn(
+                    icon="mdi-gradient-vertical",
+                    v_if="axis && inside.mode == 'field'",
+                    click=(self.inside.toggle, "['distances']"),
+                    active=("inside.distances",),
+                    size="small",
+                    variant="text",
+                    raw_attrs=named("Distances in the cut"),
+                )
+            with html.Div(
+                v_if="axis && inside.face && inside.mode == 'field'",
+                style="position: absolute; right: 8px; top: 48px; width: 240px; color: #eee",
+                classes="text-caption",
+            ):
+                legend("inside.face")
             with html.Div(style="position: absolute; left: 8px; top: 8px"):
                 self.inside.modes()
             html.Div(
@@ -519,3 +533,11 @@ class Page:
         """Make the file and close the dialog."""
         self.shut("making")
         self.make()
+
+
+def _number(text: Any, of: str) -> float:
+    """Number of a field that may be empty."""
+    try:
+        return float(text)
+    except (TypeError, ValueError):
+        raise SceneError(f"{of}: expected a number, not '{text or ''}'") from None

@@ -73,11 +73,7 @@ class SceneSolid:
 
     def coloured(self, name: str) -> Mesh:
         """The mesh in the colours of a measure that was taken."""
-        low, high = self.limits[name]
-        share = np.clip((self.known[name] - low) / max(high - low, 1e-30), 0, 1) * (len(PALETTE) - 1)
-        stops = np.arange(len(PALETTE))
-        colours = np.stack([np.interp(share, stops, PALETTE[:, k]) for k in range(3)], 1)
-        return replace(self.mesh, colours=(255 * colours + 0.5).astype(np.uint8))
+        return replace(self.mesh, colours=graded(self.known[name], self.limits[name]))
 
     def value(self, name: str, drawn: MeshDrawing, column: float, row: float) -> str:
         """What is at a point of its picture: the place in mm, and the measure, if it shows one."""
@@ -208,12 +204,25 @@ MEASURES = {
 
 def legend(solid: SceneSolid, name: str) -> dict[str, Any]:
     """Legend of a measure that was taken: its colours for a page, its limits and unit."""
-    low, high = solid.limits[name]
+    return legend_of(name, solid.limits[name], MEASURES[name].unit)
+
+
+def graded(values: NDArray[np.float64], limits: tuple[float, float]) -> NDArray[np.uint8]:
+    """Colours of values between two limits, sRGB [n, 3]."""
+    low, high = limits
+    share = np.clip((values - low) / max(high - low, 1e-30), 0, 1) * (len(PALETTE) - 1)
+    stops = np.arange(len(PALETTE))
+    colours = np.stack([np.interp(share, stops, PALETTE[:, k]) for k in range(3)], 1)
+    return (255 * colours + 0.5).astype(np.uint8)
+
+
+def legend_of(name: str, limits: tuple[float, float], unit: str) -> dict[str, Any]:
+    """Legend of values between two limits: the colours of `graded` for a page, limits and unit."""
     stops = ", ".join("#" + "".join(f"{round(255 * c):02x}" for c in colour) for colour in PALETTE)
     return {
         "name": name,
         "colours": f"linear-gradient(to right, {stops})",
-        "low": significant(low),
-        "high": significant(high),
-        "unit": MEASURES[name].unit,
+        "low": significant(limits[0]),
+        "high": significant(limits[1]),
+        "unit": unit,
     }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from trame.widgets import html
 from trame.widgets import vuetify3 as v
@@ -82,13 +82,9 @@ class TreePanel:
         """Text of an attribute of the chosen element, as its control shows it."""
         return str(next(control["text"] for control in self.state.panel if control["name"] == name))
 
-    def set_number(self, name: str, index: int, value: Any) -> None:
+    def set_number(self, name: str, index: int, value: float) -> None:
         """Give a number of an attribute a value."""
-        try:
-            number = float(value)
-        except (TypeError, ValueError):
-            return
-        self.studio.set_number(self.studio.document.version.at, name, int(index), number)
+        self.studio.set_number(self.studio.document.version.at, name, int(index), float(value))
         self.page.refresh()
 
     def set_colour(self, name: str, index: int, value: str | None) -> None:

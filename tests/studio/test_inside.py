@@ -14,16 +14,17 @@ import pytest
 from fracslice import box, cylinder, make_mesh, sphere, transform
 from fracslice.errors import SceneError
 from fracslice.fields.box import Box
-from fracslice.mesh.drawing import SECTION
+from fracslice.mesh.drawing import SECTION, Plane
 from fracslice.records import Print, SliceJob
 from fracslice.scene.view import Camera
 from fracslice.slicing import plan_stack
+from fracslice.studio.cut_face import CutFace
 from fracslice.studio.inside import Inside
 from fracslice.studio.layer_view import HANGS, HELD, ISLAND, PrintLayers
 from fracslice.studio.measuring import Mark, Overlay, Tracer, angle, circle, readout
 from fracslice.studio.measuring import sphere as best_sphere
 from fracslice.studio.session import Session
-from fracslice.studio.solid import MEASURES, SceneSolid, legend, thickness_at
+from fracslice.studio.solid import MEASURES, SceneSolid, graded, legend, thickness_at
 from fracslice.volume import Supports
 from fracslice.volume.amount import Sizing
 from fracslice.work import Work
@@ -300,3 +301,34 @@ def test_a_mesh_is_seen_from_inside_and_the_field_from_outside(studio: Session, 
     assert studio.shown.distance > 0
     inside.show("field")
     wait_until(lambda: studio.shown.camera == studio.live.first)
+
+
+@pytest.mark.parametrize("kind", ["perspective", "orthographic"])
+def test_the_face_of_a_cut_shows_distances(kind: str) -> None:
+    """A ball cut through its middle: rings, whose values are those of the radius, exactly."""
+    ball, plane = sphere(1.0), Plane((1.0, 0.0, 0.0), 0.0)
+    face = CutFace(ball, plane, ball.bounds.box, 20.0)
+    assert float(face.legend["high"]) == pytest.approx(20, rel=1e-3)
+    camera = Camera(eye=(4.0, 0.0, 0.0), target=(0.0, 0.0, 0.0), kind=kind, fov=40.0)
+    black = np.zeros((90, 160, 3), np.uint8)
+    seen = face.over(black, camera, (320, 180))
+    painted = seen.any(2)
+    radius = 45 / (4 * math.tan(math.radians(20)))  # pixels of a length of 1
+    rows, columns = np.indices(painted.shape) + 0.5
+    away = np.hypot(rows - 45, columns - 80) / radius
+    assert (painted == (away < 1)).mean() > 0.999
+    at = painted & (away < 0.99)
+    fits = (seen == graded(1 - away.ravel(), (0.0, 1.0)).reshape(seen.shape)).all(2)
+    assert 0.7 < fits[at].mean() < 1  # all but lines between bands
+    behind = replace(camera, eye=(-4.0, 0.0, 0.0))
+    assert not face.over(black, behind, (320, 180)).any()
+
+
+def test_distances_are_switched_on_in_the_page(studio: Session, inside: Inside) -> None:
+    studio.cut("x", 0.5)
+    plain = inside.over(studio.shown)
+    inside.distances = True
+    assert (inside.over(studio.shown) != plain).any()
+    assert inside.told["face"]["unit"] == "mm"
+    studio.cut("", 0.5)
+    assert inside.over(studio.shown) is studio.shown.pixels
