@@ -87,7 +87,7 @@ class CutFace:
     def _hits(
         self, view: Projection, column: NDArray[np.float64], row: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Where rays through pixels meet the plane, from the side that is cut away, [n, 3], and whether they do."""
+        """Where rays meet the plane, from the side that is cut away, [n, 3], and whether they do."""
         right, up = (column - view.size[0] / 2) / view.pixels, (view.size[1] / 2 - row) / view.pixels
         film = np.stack([right, up, np.full(len(up), 0.0 if view.parallel else 1.0)], 1) @ view.axes
         start = np.array(view.eye) + film if view.parallel else np.array(view.eye)[None]
