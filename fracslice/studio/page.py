@@ -30,6 +30,8 @@ from .sheets import SheetPanel, embedded
 from .tree_page import TreePanel
 from .widgets import NARROW, legend, named
 
+INDEX = "/index.html"
+
 TICK = 1 / 60
 """Interval between two looks at the picture, seconds."""
 
@@ -46,6 +48,12 @@ NAMED = """new MutationObserver(() =>
   document.querySelectorAll("img.image-display-area:not([alt])").forEach(i => i.alt = "Picture of the scene")
 ).observe(document, {childList: true, subtree: true})"""
 """Script that names the picture for those who do not see it, as the widget of the picture cannot."""
+
+AGAIN = f"""setInterval(() => {{
+  if (window.trame?.state.get("trame_error_report_msg"))
+    fetch("{INDEX}").then(answer => answer.ok && location.reload()).catch(() => {{}});
+}}, 1000)"""
+"""Script that loads the page again once the server can be reached, after the machine of either has slept."""
 
 SMALL = (
     f"{{width: '{panels.CELL[0]}px', height: '{panels.CELL[1]}px', flexShrink: 0, borderRadius: '4px', "
@@ -277,11 +285,22 @@ class Page:
             is_tab = request.headers.get("Upgrade", "").lower() == "websocket"
             self._count_tabs(is_tab)
             try:
-                return await handler(request)
+                return self._remembered(request, await handler(request))
             finally:
                 self._count_tabs(-is_tab)
 
         server.app.middlewares.append(refuse)
+
+    def _remembered(self, request: web.Request, response: web.StreamResponse) -> web.StreamResponse:
+        """Have a browser keep the token, which its script takes out of the address, for a reload."""
+        if request.path != INDEX:
+            return response
+        name, given = f"fracslice-{self.server.port}", request.query.get("secret")
+        if given is None and request.cookies.get(name) == self.token:
+            raise web.HTTPFound(f"{INDEX}?secret={self.token}")
+        if given == self.token:
+            response.set_cookie(name, self.token, httponly=True, samesite="Strict")
+        return response
 
     def serve(self, host: str, port: int, browser: bool, say: Callable[[str], None]) -> None:
         """Serve the page until it is interrupted; `say` is given its address."""
@@ -311,7 +330,7 @@ class Page:
 
     def _address(self, host: str) -> str:
         name = "127.0.0.1" if host in ("localhost", "0.0.0.0", "::") else host
-        return f"http://{name}:{self.server.port}/index.html?secret={self.token}"
+        return f"http://{name}:{self.server.port}{INDEX}?secret={self.token}"
 
     def _start(self, host: str, port: int, **how: Any) -> Any:
         os.environ["TRAME_ARGS"] = f"--authKey={self.token}"  # instead of this program's own arguments
@@ -351,6 +370,7 @@ class Page:
             self._dialogs()
             client.Style(STYLE)
             client.Script(NAMED)
+            client.Script(AGAIN)
             client.Script(PAD)
         self.layout = layout
 

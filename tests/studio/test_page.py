@@ -184,6 +184,28 @@ def test_the_inside_is_looked_at(served: Served) -> None:
     picture(page)
 
 
+def test_a_page_is_loaded_again_and_goes_on_after_a_lost_connection(served: Served) -> None:
+    page, sockets = served.page, []
+
+    def passed_on(socket: playwright.WebSocketRoute) -> None:
+        server = socket.connect_to_server()
+        socket.on_message(server.send)
+        server.on_message(socket.send)
+        sockets.append(socket)
+
+    page.route_web_socket("**/ws*", passed_on)
+    row(page, "sphere").click()
+    page.get_by_label("radius 1 as a number").fill("0.7")
+    page.get_by_label("radius 1 as a number").press("Enter")
+    page.reload()
+    row(page, "sphere").wait_for()
+    assert page.get_by_label("radius 1 as a number").input_value() == "0.7"
+    with page.expect_event("load"):
+        sockets[-1].close()
+    row(page, "sphere").wait_for()
+    picture(page)
+
+
 def test_two_tabs_show_the_same_scene(served: Served, browser: playwright.Browser) -> None:
     other = browser.new_page()
     other.goto(served.address)
