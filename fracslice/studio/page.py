@@ -441,9 +441,39 @@ class Page:
             area.set_drop_frames_pending_network_limit(PENDING)
             area.add_view_handler(self.frames)
             with html.Div(
-                classes="d-flex align-center",
-                style="position: absolute; right: 8px; top: 8px; width: 300px; color: #eee",
+                classes="d-flex flex-wrap justify-space-between",
+                style="position: absolute; left: 8px; right: 8px; top: 8px; pointer-events: none; gap: 4px",
             ):
+                with html.Div(style="pointer-events: auto"):
+                    self.inside.modes()
+                self._cuts()
+            html.Div(
+                "{{ status }}",
+                style="position: absolute; left: 8px; bottom: 6px; color: #eee; text-shadow: 0 0 3px #000",
+                classes="text-caption",
+                raw_attrs=['role="status"'],
+            )
+            v.VAlert(
+                "{{ problem }}",
+                v_if="problem",
+                type="warning",
+                density="compact",
+                style="position: absolute; left: 8px; right: 8px; top: 56px",
+            )
+            with v.VCard(
+                v_if="job.line",
+                style="position: absolute; right: 8px; bottom: 8px; width: 340px",
+                classes="pa-2",
+            ):
+                html.Div("{{ job.line }}", classes="text-caption")
+                v.VProgressLinear(v_if="!job.done", model_value=("job.share",), raw_attrs=named("Progress"))
+                html.Code("{{ job.command }}", classes="text-caption")
+                v.VBtn("Cancel", v_if="!job.done", size="small", variant="text", click=self.cancel)
+
+    def _cuts(self) -> None:
+        """What cuts the picture open."""
+        with html.Div(style="width: 300px; color: #eee; pointer-events: auto"):
+            with html.Div(classes="d-flex align-center"):
                 for axis in ("x", "y", "z"):
                     v.VBtn(
                         axis,
@@ -473,36 +503,8 @@ class Page:
                     variant="text",
                     raw_attrs=named("Distances in the cut"),
                 )
-            with html.Div(
-                v_if="axis && inside.face && inside.mode == 'field'",
-                style="position: absolute; right: 8px; top: 48px; width: 240px; color: #eee",
-                classes="text-caption",
-            ):
+            with html.Div(v_if="axis && inside.face && inside.mode == 'field'", classes="text-caption"):
                 legend("inside.face")
-            with html.Div(style="position: absolute; left: 8px; top: 8px"):
-                self.inside.modes()
-            html.Div(
-                "{{ status }}",
-                style="position: absolute; left: 8px; bottom: 6px; color: #eee; text-shadow: 0 0 3px #000",
-                classes="text-caption",
-                raw_attrs=['role="status"'],
-            )
-            v.VAlert(
-                "{{ problem }}",
-                v_if="problem",
-                type="warning",
-                density="compact",
-                style="position: absolute; left: 8px; right: 8px; top: 56px",
-            )
-            with v.VCard(
-                v_if="job.line",
-                style="position: absolute; right: 8px; bottom: 8px; width: 340px",
-                classes="pa-2",
-            ):
-                html.Div("{{ job.line }}", classes="text-caption")
-                v.VProgressLinear(v_if="!job.done", model_value=("job.share",), raw_attrs=named("Progress"))
-                html.Code("{{ job.command }}", classes="text-caption")
-                v.VBtn("Cancel", v_if="!job.done", size="small", variant="text", click=self.cancel)
 
     def _dialogs(self) -> None:
         found = "choices.filter(c => (c.name + c.doc).includes(search)"
