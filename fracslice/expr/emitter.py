@@ -675,6 +675,14 @@ class Target:
     features: str
 
 
+LONG = 250_000
+"""Characters of code from which it is optimised once.
+
+A second run makes fields faster by 2 %, up to 15 %. Kernels of pictures, of 400,000, are no faster by it, and
+compile in half the time without.
+"""
+
+
 def compile_object(program: Program, target: Target, loops: Sequence[Loop]) -> bytes:
     """Compile loops over a scene's field to an object file with one C function per loop.
 
@@ -686,7 +694,7 @@ def compile_object(program: Program, target: Target, loops: Sequence[Loop]) -> b
     # Stack frames are aligned to whole registers; otherwise registers spilled to the stack would straddle two
     # cache lines.
     module = llvm.parse_assembly(re.sub(r"(?m)^define .*$", r'\g<0> "stackrealign"', text))
-    _optimise(module, _target_machine(target))
+    _optimise(module, _target_machine(target), 1 if len(text) >= LONG else 2)
     return bytes(_machine(target).emit_object(module))
 
 
@@ -705,7 +713,7 @@ def compile_ptx(program: Program, bits: int, capability: tuple[int, int], loops:
     chosen = max(number for number, since in ARCHITECTURES.items() if since <= version and number <= most)
     features = "+ptx60" if chosen < 70 else ""  # has the barrier of a warp
     machine = _gpu_target().create_target_machine(cpu=f"sm_{chosen}", features=features, opt=3)
-    _optimise(module, machine)
+    _optimise(module, machine, 2)
     return str(machine.emit_assembly(module)).encode()
 
 
@@ -741,12 +749,12 @@ def _kind(letter: str, lanes: Lanes) -> ir.Type:
     return number.as_pointer() if is_array(letter) else number
 
 
-def _optimise(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> None:
+def _optimise(module: llvm.ModuleRef, machine: llvm.TargetMachine, runs: int) -> None:
     module.data_layout = str(machine.target_data)
     options = llvm.create_pipeline_tuning_options(speed_level=3)
     options.loop_vectorization, options.slp_vectorization = True, False
     builder = llvm.create_pass_builder(machine, options)
-    for _ in range(2):
+    for _ in range(runs):
         builder.getModulePassManager().run(module, builder)
 
 
