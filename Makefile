@@ -11,8 +11,9 @@ SUDO := $(if $(filter 0,$(shell id -u)),,sudo)
 
 # The tests of the studio drive a browser; Ubuntu has none as a package, and leaves them out.
 BROWSER := $(shell grep -q '^ID=debian' /etc/os-release && echo chromium)
-# The compiler and OpenVDB's headers (they include Boost's); Python's headers; what draws without a screen, and a screen for the tests of windows.
-PACKAGES := g++ cmake ninja-build python3-dev python3-venv libopenvdb-dev libtbb-dev libimath-dev libboost-dev zlib1g-dev doctest-dev \
+# The compiler, and what it has compiled for another Python; OpenVDB's headers (they include Boost's); Python's headers; what draws
+# without a screen, and a screen for the tests of windows.
+PACKAGES := g++ ccache cmake ninja-build python3-dev python3-venv libopenvdb-dev libtbb-dev libimath-dev libboost-dev zlib1g-dev doctest-dev \
 	libgl1 libegl1 libgl1-mesa-dri libopenvdb-tools xvfb libxtst6 $(BROWSER)
 MISSING = $(shell for p in $(PACKAGES); do dpkg -s $$p >/dev/null 2>&1 || echo $$p; done)
 NATIVE := CMakeLists.txt $(wildcard cmake/* fracslice/native/* fracslice/native/*/*)
@@ -88,7 +89,7 @@ $(VENV)/.locked: requirements.lock | packages
 	touch $@
 
 $(VENV)/.installed: $(VENV)/.locked pyproject.toml $(NATIVE)
-	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation -e .
+	CMAKE_CXX_COMPILER_LAUNCHER=$$(command -v ccache) $(BIN)/python -m pip install --quiet --no-deps --no-build-isolation -e .
 	touch $@
 
 clean:

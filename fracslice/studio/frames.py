@@ -102,12 +102,21 @@ class Frames:
             views.walk_to(self.mouse)
             return
         self._pressed, self._pressed_at = now, self.mouse
+        handle, live = self._studio.handle, self._studio.live
+        if around and handle and handle.is_at(self.mouse, live.camera, live.size):
+            self._drag = self._drag_handle
+            return
         if inside.is_flat:
             self._drag = inside.drag
             return
         self._drag = views.orbit if around else views.look_around
         if around:
             views.grip(self.mouse)
+
+    def _drag_handle(self, *_: float) -> None:
+        """Move the light that is chosen to the mouse."""
+        self._studio.drag_handle(self.mouse)
+        self._act("moved")
 
     def key(self, key: str, down: bool, control: bool = False) -> None:
         """Press or release a key."""
@@ -137,7 +146,7 @@ class Frames:
     async def send(self) -> None:
         """Send the picture if there is a new one, and a page to send it to."""
         shown, inside = self._studio.shown, self._studio.inside
-        now = shown, inside.overlay
+        now = shown, inside.overlay, self._studio.handle
         if now == self._sent or self._streamer is None:
             return
         self._sent = now

@@ -42,6 +42,7 @@ from ..volume.extent import extent
 from ..work import Work
 from .cut_face import CutFace
 from .document import Document
+from .handles import LightHandle
 from .layer_view import LayerImage, PrintLayers, Window
 from .measuring import Mark, Overlay, Tracer, outline, readout
 from .solid import SceneSolid, legend, thickness_at
@@ -79,6 +80,10 @@ class Host(Protocol):
     @property
     def cut_plane(self) -> Plane | None:
         """The plane that cuts the picture open."""
+
+    @property
+    def handle(self) -> LightHandle | None:
+        """Handle of the light that is chosen."""
 
     def run(self, name: str, make: Callable[[Work], str]) -> None:
         """Begin a job in the background, if none is running; it says what it made."""
@@ -265,7 +270,9 @@ class Inside:
         pixels, size = shown.pixels, self._host.live.size
         if face := self.face:
             pixels = face.over(pixels, shown.camera, size)
-        return self.overlay.over(pixels, shown.camera, size) if self.overlay.marks else pixels
+        handle = self._host.handle if self.mode == "field" else None
+        marks = (*self.overlay.marks, handle.mark(shown.camera)) if handle else self.overlay.marks
+        return Overlay(marks).over(pixels, shown.camera, size) if marks else pixels
 
     # the mesh
 

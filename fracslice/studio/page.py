@@ -143,12 +143,14 @@ class Page:
         self.refresh()
 
     def act(self, key: str) -> None:
-        """Do what a key of the picture or of the page means."""
+        """Do what a key of the picture or of the page means, or follow what was done in the picture."""
         document = self.studio.document
         if key == "v":
             self.studio.views.home()
         elif key == "x":
             self.studio.focus_on(self.frames.mouse)
+            self.refresh()
+        elif key == "moved":
             self.refresh()
         elif key in (",", "."):
             self.studio.views.back(1 if key == "," else -1)

@@ -37,6 +37,7 @@ from ..work import Work
 from . import keyframes
 from .bookmarks import Bookmarks, between, is_worth_a_look
 from .document import Document, Place, Tag, with_attribute
+from .handles import LightHandle
 from .inside import Inside
 from .keyframes import Player
 from .panels import controls
@@ -468,6 +469,18 @@ class Session:
         lens = camera.aperture or float(f"{LENS * depth:.2g}")
         focused = replace(rounded(camera), aperture=lens, focus=float(f"{depth:.6g}"))
         self.edit(self.document.write_part, focused)
+
+    @property
+    def handle(self) -> LightHandle | None:
+        """Handle of the light that is chosen."""
+        return LightHandle.of(self.document)
+
+    def drag_handle(self, at: Pixel) -> None:
+        """Move the light that is chosen to a pixel of the picture."""
+        if handle := self.handle:
+            moved = handle.dragged(at, self.live.camera, self.live.size)
+            text = " ".join(f"{number:g}" for number in moved.light.position)
+            self.edit(self.document.set_value, moved.place, "position", text)
 
     def save(self) -> None:
         """Write the text into its file."""

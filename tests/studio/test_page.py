@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import random
 import re
 import shutil
 import subprocess
@@ -10,6 +12,7 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -40,12 +43,17 @@ SCENE = """<scene version="1">
 """
 
 
+SOAK = 1800.0
+"""Time of random input, seconds."""
+
+
 class Served(NamedTuple):
     """A studio that is served."""
 
     page: playwright.Page
     address: str
     folder: Path
+    process: int
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +86,7 @@ def served(browser: playwright.Browser, tmp_path: Path) -> Iterator[Served]:
         page.goto(address)
         try:
             row(page, "sphere").wait_for()
-            yield Served(page, address, tmp_path)
+            yield Served(page, address, tmp_path, process.pid)
         finally:
             process.send_signal(2)
         assert process.wait(60) in (0, 130)
@@ -229,6 +237,66 @@ def test_other_sites_and_those_without_the_token_are_refused(
     time.sleep(2)
     assert row(stranger, "sphere").count() == 0
     stranger.close()
+
+
+def act_at_random(page: playwright.Page, chance: random.Random) -> None:
+    """Do one of the things that a person does."""
+    x, y = chance.uniform(400, 1100), chance.uniform(120, 580)
+    what = chance.choice(("drag", "wheel", "key", "row", "slider", "number", "undo", "cut", "view"))
+    if what == "drag":
+        page.mouse.move(x, y)
+        page.mouse.down(button=chance.choice(("left", "right")))
+        page.mouse.move(x + chance.uniform(-90, 90), y + chance.uniform(-90, 90), steps=5)
+        page.mouse.up(button="left")
+        page.mouse.up(button="right")
+    elif what == "wheel":
+        page.mouse.move(x, y)
+        page.mouse.wheel(0, chance.choice((-100, 100)))
+    elif what == "key":
+        page.mouse.move(x, y)
+        page.keyboard.press(chance.choice(tuple("wsadrfqe12v,.")), delay=chance.uniform(0, 200))
+    elif what == "row":
+        page.get_by_role("list", name="Elements").locator(".v-list-item").nth(chance.randrange(5)).click()
+    elif what == "slider":
+        thumb = page.locator(".v-navigation-drawer .v-slider-thumb").first
+        box = thumb.bounding_box() if thumb.count() else None
+        if box:
+            page.mouse.move(box["x"] + 10, box["y"] + 10)
+            page.mouse.down()
+            page.mouse.move(box["x"] + chance.uniform(-40, 60), box["y"] + 10, steps=5)
+            page.mouse.up()
+    elif what == "number":
+        field = page.locator(".v-navigation-drawer input[type=number]").first
+        if field.count():
+            field.fill(chance.choice(("", "0", "-1", "0.5", "0.9", "1e9", "3")))
+            field.press("Enter")
+    elif what == "undo":
+        page.get_by_label(chance.choice(("Undo", "Redo")), exact=True).click(force=True)
+    elif what == "cut":
+        page.get_by_label(f"Cut across {chance.choice('xyz')}").click()
+    else:
+        page.get_by_label(chance.choice(("First view", "View before", "View after"))).click()
+
+
+@pytest.mark.nightly
+def test_half_an_hour_of_random_input_takes_no_memory(served: Served) -> None:
+    page, chance, memory = served.page, random.Random(1), Path(f"/proc/{served.process}/statm")
+    session = page.context.new_cdp_session(page)
+    page.set_default_timeout(3000)
+    begin, marks = time.monotonic(), []
+    while (now := time.monotonic() - begin) < SOAK:
+        with suppress(playwright.TimeoutError):  # what was there a moment before may be gone
+            act_at_random(page, chance)
+        if now > len(marks) * SOAK / 6:
+            session.send("HeapProfiler.collectGarbage")
+            heap = session.send("Runtime.getHeapUsage")["usedSize"]
+            pages = int(memory.read_text().split()[1])
+            marks.append((pages * os.sysconf("SC_PAGE_SIZE") / 1e6, heap / 1e6))
+    page.set_default_timeout(30000)
+    page.get_by_label("First view").click()
+    picture(page)
+    for first, last in zip(marks[1], marks[-1], strict=True):
+        assert last < 1.1 * first + 20, marks  # megabytes
 
 
 def test_a_film_is_made_of_views(served: Served) -> None:
