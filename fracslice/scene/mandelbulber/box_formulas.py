@@ -1,0 +1,391 @@
+"""The Mandelbox of Mandelbulber and its relatives: folds into boxes, out of balls, and scales."""
+
+from __future__ import annotations
+
+import math
+
+from .folds import absolute
+from .step_text import ORDERS, FormulaStep, known
+
+LOWE = "Lowe 2010, fractalforums.com: Amazing Fractal"
+
+
+def is_plain(s: FormulaStep) -> bool:
+    """True if a Mandelbox has the box and the ball of ours."""
+    values = [
+        s.value(f"mandelbox_{name}") for name in ("folding_limit", "folding_value", "folding_fixed_radius")
+    ]
+    inner, scale = s.value("mandelbox_folding_min_radius"), s.value("mandelbox_scale")
+    return values == [1, 2, 1] and 0 < inner <= 1 and 1 < abs(scale) <= 10
+
+
+def mandelbox_ball(s: FormulaStep, offset: str | None) -> None:
+    """Ball of the values of a Mandelbox."""
+    inner, outer = s.value("mandelbox_folding_min_radius"), s.value("mandelbox_folding_fixed_radius")
+    s.ball(inner * inner, outer * outer, offset)
+
+
+@known(8, "Mandelbox", LOWE)
+def mandelbox(s: FormulaStep) -> None:
+    """Folds may be turned, each on its own, as may be the whole."""
+    turned = s.on("mandelbox_rotations_enabled")
+    main = s.on("mandelbox_main_rotation_enabled") and any(s.vector("mandelbox_rotation_main"))
+    if is_plain(s) and not turned and not main and not any(s.vector("mandelbox_offset")):
+        s.replace(
+            "mandelbox", scale=s.value("mandelbox_scale"), inner=s.value("mandelbox_folding_min_radius")
+        )
+    if turned and any(
+        any(s.vector(f"mandelbox_rotation_{sign}_{k}")) for sign in ("neg", "pos") for k in (1, 2, 3)
+    ):
+        turned_folds(s)
+    else:
+        s.fold_apart("mandelbox_folding_limit", "mandelbox_folding_value")
+    mandelbox_ball(s, "mandelbox_offset")
+    if main:
+        s.turn("mandelbox_rotation_main")
+    s.scale("mandelbox_scale")
+
+
+def turned_folds(s: FormulaStep) -> None:
+    """Fold each coordinate in a frame of its own, above and below."""
+    limit, value = s.number("mandelbox_folding_limit"), s.number("mandelbox_folding_value")
+    for k, axis in enumerate("xyz", 1):
+        s.write("x, y, z = w", "before = w")
+        s.turn(f"mandelbox_rotation_neg_{k}")
+        s.write("x, y, z = w", f"above = {axis} > {limit}", f"{axis} = {value} - {axis}", "w = (x, y, z)")
+        turn_back(s, f"mandelbox_rotation_neg_{k}")
+        s.write("u, v, t = w", "w = before")
+        s.turn(f"mandelbox_rotation_pos_{k}")
+        s.write("x, y, z = w", f"below = {axis} < -{limit}", f"{axis} = -{value} - {axis}", "w = (x, y, z)")
+        turn_back(s, f"mandelbox_rotation_pos_{k}")
+        s.write("x, y, z = w", "a, b, d = before")
+        parts = (
+            f"where(above, {p}, where(below, {q}, {r}))" for p, q, r in zip("uvt", "xyz", "abd", strict=True)
+        )
+        s.write(f"w = ({', '.join(parts)})")
+
+
+def turn_back(s: FormulaStep, name: str) -> None:
+    """Undo `FormulaStep.turn`."""
+    for axis, text, angle in (("z", "(0, 0, 1)", 2), ("y", "(0, 1, 0)", 1), ("x", "(1, 0, 0)", 0)):
+        if s.vector(name)[angle]:
+            s.write(f"w = turn(w, {text}, -{name.lower()}_{axis})")
+
+
+@known(9, "Mandelbox fast", LOWE)
+def mandelbox_fast(s: FormulaStep) -> None:
+    """The box is that of the unit."""
+    main = s.on("mandelbox_main_rotation_enabled") and any(s.vector("mandelbox_rotation_main"))
+    if is_plain(s) and not main:
+        s.replace(
+            "mandelbox", scale=s.value("mandelbox_scale"), inner=s.value("mandelbox_folding_min_radius")
+        )
+    s.write("w = fold(w, 1)")
+    mandelbox_ball(s, None)
+    if main:
+        s.turn("mandelbox_rotation_main")
+    s.scale("mandelbox_scale")
+
+
+def vary_scale(s: FormulaStep) -> float:
+    """Scale that changes from step to step: scale + vary (|last| - 1)."""
+    scale, vary = s.value("mandelbox_scale"), s.value("mandelbox_vary_scale_vary")
+    last = s.state.get("scale", scale)
+    s.state["scale"] = scale + vary * (abs(last) - 1)
+    return s.state["scale"]
+
+
+def add_vary(s: FormulaStep, base: str, toward: str, switch: bool, resets: bool) -> float:
+    """Scale with an addition that changes from step to step towards a size."""
+    added = s.state.get("added", 0.0)
+    if switch:
+        vary = s.value("transf_scale_vary_0") * (abs(added) - s.value(toward))
+        s.state["added"] = -vary if resets else added - vary
+    return s.value(base) + added
+
+
+def scale_by(s: FormulaStep, value: float) -> None:
+    """Multiply by a number of this iteration."""
+    if value != 1:
+        s.write(f"w = {s.parameter('scale', value)} * w")
+
+
+def fold_ball(s: FormulaStep, offset: str | None) -> None:
+    """Ball whose radii are squared in the file."""
+    s.ball(s.value("transf_minR2_p25"), s.value("transf_maxR2_1"), offset)
+
+
+def swap(s: FormulaStep, switch: str, image: str) -> None:
+    """Swap coordinates if a switch is on."""
+    if s.on(switch):
+        s.write("x, y, z = w", f"w = {image}")
+
+
+@known(119, "Abox - Mod 11", "Sandercoe after Lowe 2010, fractalforums.org")
+def abox_mod_11(s: FormulaStep) -> None:
+    """A Mandelbox with a box of three sizes and a scale that varies."""
+    scale = vary_scale(s)
+    if s.during("transf_start_iterations_B", "transf_stop_iterations_B"):
+        s.fold("transf_addition_constant_111") if s.on("transf_function_enabled") else s.fold_flat(
+            "transf_addition_constant_111"
+        )
+        if s.during("transf_start_iterations_D", "transf_stop_iterations_D1"):
+            s.refuse("transf_function_enabled_false")
+    swap(s, "transf_function_enabledSw_false", "(z, y, x)")
+    if s.during("transf_start_iterations_S", "transf_stop_iterations_S"):
+        s.refuse("transf_function_enabledy_false")
+        fold_ball(s, "mandelbox_offset")
+    if s.during("transf_start_iterations_A", "transf_stop_iterations_A"):
+        scale_by(s, scale)
+    s.add("transf_addition_constant")
+    if s.on("transf_addCpixel_enabled_false") and s.during(
+        "transf_start_iterations_E", "transf_stop_iterations_E"
+    ):
+        s.add_constant(
+            "mandelbulbMulti_order_of_xyz", "transf_constant_multiplier_111", "transf_alternate_enabled_false"
+        )
+    if s.on("transf_rotation_enabled") and s.during("transf_start_iterations_R", "transf_stop_iterations_R"):
+        s.turn("transf_rotation")
+    if s.during("transf_start_iterations_C", "transf_stop_iterations_C1"):
+        s.scale("transf_scaleG_1")
+
+
+@known(132, "Amazing Surf - Mod 2", "Kali 2011 after Lowe 2010, fractalforums.com")
+def amazing_surf_mod_2(s: FormulaStep) -> None:
+    """Folds along x and y in turn, a ball or a cylinder, and a scale that varies."""
+    if s.on("transf_addCpixel_enabled_false") and s.during(
+        "transf_start_iterations_H", "transf_stop_iterations_H"
+    ):
+        if s.during("transf_start_iterations_G", "transf_stop_iterations_G"):
+            s.refuse("transf_rotation_enabled")
+        s.add_constant(
+            "mandelbulbMulti_order_of_xyz", "transf_constant_multiplier_111", "transf_alternate_enabled_false"
+        )
+    if s.during("transf_start_iterations_F", "transf_stop_iterations_F"):
+        s.refuse("transf_function_enabledCx_false")
+    switches = (
+        "transf_function_enabledAx",
+        "transf_function_enabledAy_false",
+        "transf_function_enabledAz_false",
+    )
+    for k, (switch, letter) in enumerate(zip(switches, "ABC", strict=True), 1):
+        during = s.during(f"transf_start_iterations_{letter}", f"transf_stop_iterations_{letter}")
+        if s.on(switch) and during:
+            surf_fold(s, f"aSurf3Folds_order_of_folds_{k}")
+    if s.on("transf_function_enabledAx_false"):
+        x, y, z = s.vector("transf_addition_constant_111")
+        s.write(f"w = fold_to(w, (1e6, 1e6, {s.parameter('transf_addition_constant_111_z', z)}))")
+    swap(s, "transf_function_enabledSw_false", "(y, x, z)")
+    if s.on("transf_function_enabledBz_false") and s.during(
+        "transf_start_iterations_X", "transf_stop_iterations_X"
+    ):
+        s.refuse("transf_function_enabledBx_false", "transf_function_enabledBy_false")
+    s.add("transf_addition_constant")
+    if s.on("transf_function_enabledAy"):
+        s.refuse("transf_function_enabled_false")
+        if s.during("transf_start_iterations_M", "transf_stop_iterations_M"):
+            fold_ball(s, "mandelbox_offset")
+    resets = s.on("transf_function_enabledM_false")
+    vary = s.on("transf_function_enabledF_false") and s.during(
+        "transf_start_iterations_Y", "transf_stop_iterations_Y"
+    )
+    scaled = s.during("transf_start_iterations_S", "transf_stop_iterations_S")
+    scale = add_vary(s, "mandelbox_scale", "transf_scaleC_1", vary, resets)
+    if scaled:
+        scale_by(s, scale)
+    if s.on("mandelbox_main_rotation_enabled") and s.during(
+        "transf_start_iterations_R", "transf_stop_iterations_R"
+    ):
+        s.turn("mandelbox_rotation_main")
+
+
+def surf_fold(s: FormulaStep, name: str) -> None:
+    """One of the folds of an Amazing Surf along x and y."""
+    word = s.values.one_of(name, ("type1", "type2", "type3"))
+    if word == "type1":
+        s.fold_flat("transf_addition_constant_111")
+        if s.during("transf_start_iterations_T", "transf_stop_iterationsT_1"):
+            s.refuse("transf_function_enabledCz_false")
+    elif word == "type2":
+        fold_back(s, "transf_offset_111")
+    else:
+        fold_moved(s, "transf_offsetA_111")
+
+
+def fold_back(s: FormulaStep, name: str) -> None:
+    """Fold of the absolute x and y at a limit: a - ||x| - a|."""
+    x, y, _ = s.vector(name)
+    a, b = s.parameter(f"{name}_x", x), s.parameter(f"{name}_y", y)
+    s.write("x, y, z = w", f"w = ({a} - absolute(absolute(x) - {a}), {b} - absolute(absolute(y) - {b}), z)")
+
+
+def fold_moved(s: FormulaStep, name: str) -> None:
+    """Fold of x and y about another point: d - ||x + a| - d| - a."""
+    x, y, _ = s.vector(name)
+    a, b, d = s.parameter(f"{name}_x", x), s.parameter(f"{name}_y", y), s.number("transf_offset_2")
+    first, second = (f"{d} - absolute(absolute({p} + {q}) - {d}) - {q}" for p, q in (("x", a), ("y", b)))
+    s.write("x, y, z = w", f"w = ({first}, {second}, z)")
+
+
+@known(186, "Amazing Surf - Mod 4", "Kali 2011 after Lowe 2010, fractalforums.com")
+def amazing_surf_mod_4(s: FormulaStep) -> None:
+    """An Amazing Surf whose scale is divided by the square of the radius."""
+    inversion(s, "transf_start_iterations_X", "transf_stop_iterations_1")
+    if s.on("transf_function_enabledJ_false"):
+        s.fold("transf_addition_constant_111")
+    else:
+        s.fold_flat("transf_addition_constant_111")
+    s.add("transf_offsetA_000")
+    scale = add_vary(s, "transf_scale_2", "transf_scaleC_1", s.on("transf_function_enabledK_false"), False)
+    s.ball(s.value("transf_minR2_p25"), 1.0)
+    scale_by(s, scale)
+    if s.on("transf_rotation2_enabled_false"):
+        s.turn("transf_rotation")
+    if s.on("transf_addCpixel_enabled_false"):
+        add_swapped(s)
+    s.add("transf_addition_constantA_000")
+    s.turn("transf_rotation2")
+
+
+def add_swapped(s: FormulaStep) -> None:
+    """Add the constant with x and y swapped."""
+    own = s.point("transf_constant_multiplier_111")
+    s.write("cx, cy, cz = c", f"u, v, t = {own}", "w = w + (u * cy, v * cx, t * cz)")
+
+
+def inversion(s: FormulaStep, start: str, stop: str) -> None:
+    """Invert in a sphere, in some iterations, if the file says so."""
+    if s.on("transf_sphere_inversion_enabled_false") and s.during(start, stop):
+        s.invert("transf_offset_000", "transf_scaleG_1", "transf_addition_constant")
+        s.scale("transf_scaleA_1")
+
+
+@known(226, "Abox - Mod 15", "Sandercoe after Lowe 2010, fractalforums.org")
+def abox_mod_15(s: FormulaStep) -> None:
+    """A Mandelbox after an inversion, between two turns."""
+    if s.on("transf_function_enabled_false"):
+        if s.during("transf_start_iterations", "transf_stop_iterations"):
+            absolute(s, *("transf_function_enabled" + axis for axis in "xyz"))
+        if s.during("transf_start_iterations_T", "transf_stop_iterations_T"):
+            word = s.values.one_of("mandelbulbMulti_order_of_xyz", ORDERS)
+            signs = [s.on(f"transf_function_enabled{axis}_false") for axis in "xyz"]
+            parts = (f"-{axis}" if minus else axis for axis, minus in zip(word, signs, strict=True))
+            s.write("x, y, z = w", f"w = ({', '.join(parts)})")
+    inversion(s, "transf_start_iterations_X", "transf_stop_iterations_1")
+    if s.during("transf_start_iterations_B", "transf_stop_iterations_B"):
+        if s.on("transf_function_enabled"):
+            s.fold("transf_addition_constant_111")
+        else:
+            s.fold_flat("transf_addition_constant_111")
+    if s.during("transf_start_iterations_M", "transf_stop_iterations_M"):
+        s.add("transf_offsetA_000")
+    if s.during("transf_start_iterations_S", "transf_stop_iterations_S"):
+        fold_ball(s, None)
+    if s.during("transf_start_iterations_E", "transf_stop_iterations_E"):
+        scale_by(
+            s, add_vary(s, "transf_scale_2", "transf_scaleC_1", s.on("transf_function_enabledK_false"), True)
+        )
+    if s.on("transf_rotation2_enabled_false") and s.during(
+        "transf_start_iterations_C", "transf_stop_iterations_C"
+    ):
+        s.turn("transf_rotation")
+    if s.on("transf_addCpixel_enabled_false") and s.during(
+        "transf_start_iterations_G", "transf_stop_iterations_G"
+    ):
+        s.add_constant("", "transf_constant_multiplier_111")
+    if s.during("transf_start_iterations_F", "transf_stop_iterations_F"):
+        s.add("transf_addition_constantA_000")
+    if s.during("transf_start_iterations_R", "transf_stop_iterations_R"):
+        s.turn("transf_rotation2")
+    if s.during("transf_start_iterations_N", "transf_stop_iterations_N"):
+        s.refuse("transf_function_enabledN_false")
+
+
+@known(77, "Amazing Surf - Mod 1", "Kali 2011 after Lowe 2010, fractalforums.com")
+def amazing_surf_mod_1(s: FormulaStep) -> None:
+    """Folds along x and y of several kinds, a ball, and a scale that varies."""
+    scale = vary_scale(s)
+    s.refuse("transf_function_enabledx_false", "transf_function_enabled_false")
+    if s.on("transf_function_enabledAx"):
+        s.fold_flat("transf_addition_constant_111")
+    if s.on("transf_function_enabledAy_false"):
+        fold_back(s, "transf_addition_constant_111")
+    if s.on("transf_function_enabledAz_false"):
+        x, y, _ = s.vector("transf_addition_constant_111")
+        a, b = (s.parameter(f"transf_addition_constant_111_{p}", v) for p, v in (("x", x), ("y", y)))
+        s.write("x, y, z = w", f"w = (absolute(x + {a}), absolute(y + {b}), z)")
+    if s.on("transf_function_enabledy_false"):
+        fold_moved(s, "transf_addition_constant_111")
+    s.add("transf_addition_constant")
+    inner = s.value("transf_minimum_radius_05")
+    s.ball(math.sqrt(max(inner, 0.0)), 1.0)
+    share = s.value("transf_scale_1")
+    scale_by(s, scale * share + (1 - share))
+    s.turn("transf_rotation")
+
+
+@known(16, "Box Fold Bulb Pow 2", "Buddhi 2010 after Lowe and White, fractalforums.com")
+def box_fold_bulb(s: FormulaStep) -> None:
+    """A Mandelbox and a square in turn."""
+    s.write(f"w = fold(w, {s.number('boxfold_bulbpow2_folding_factor')})", "w = 2 * ball(w, 0.5)")
+    s.square("boxfold_bulbpow2_z_factor")
+
+
+def box_ball_scale(s: FormulaStep) -> None:
+    """Box, ball and scale of the second and third kind of a box with a square."""
+    if s.during("transf_start_iterations_B", "transf_stop_iterations_B"):
+        s.fold("transf_addition_constant_111")
+    if s.during("transf_start_iterations_S", "transf_stop_iterations_S"):
+        fold_ball(s, "mandelbox_offset")
+    if s.during("transf_start_iterations_C", "transf_stop_iterations_C"):
+        vary = s.during("transf_start_iterations_X", "transf_stop_iterations_X")
+        resets = s.on("transf_function_enabledM_false")
+        scale_by(s, add_vary(s, "transf_scale", "transf_scaleB_1", vary, resets))
+
+
+def doubled_square(s: FormulaStep) -> None:
+    """Square of twice the point."""
+    if s.during("transf_start_iterations_A", "transf_stop_iterations_A"):
+        s.write("w = 2 * w")
+        s.square("boxfold_bulbpow2_z_factor")
+
+
+@known(125, "Box Fold Bulb Pow 2 - V2", "Buddhi 2010 after Lowe and White, fractalforums.com")
+def box_fold_bulb_2(s: FormulaStep) -> None:
+    """Box, ball, scale and square, each in its iterations."""
+    box_ball_scale(s)
+    doubled_square(s)
+
+
+@known(126, "Box Fold Bulb Pow 2 - V3", "Buddhi 2010 after Lowe and White, fractalforums.com")
+def box_fold_bulb_3(s: FormulaStep) -> None:
+    """As the second kind, with an inversion, a tetrahedron's fold and a sponge's."""
+    inversion(s, "transf_start_iterations", "transf_stop_iterations_1")
+    box_ball_scale(s)
+    if s.during("transf_start_iterationsTM", "transf_stop_iterationsTM_1"):
+        s.refuse("transf_function_enabledX_false")
+    if s.on("transf_function_enabledD_false") and s.during(
+        "transf_start_iterations_D", "transf_stop_iterations_D"
+    ):
+        s.write("w = mirror(w, (1, 1, 0))", "w = mirror(w, (1, 0, 1))")
+        s.write(
+            "w = mirror(w, (1, -1, 0))", "w = mirror(w, (1, 0, -1))", "x, y, z = w", "w = (absolute(x), y, z)"
+        )
+        a, o = s.number("transf_scaleA_2"), s.point("transf_offset_100")
+        s.write(f"w = {a} * w - ({a} - 1) * {o}")
+    if s.on("transf_function_enabledR_false") and s.during(
+        "transf_start_iterations_R", "transf_stop_iterations_R"
+    ):
+        s.turn("transf_rotation")
+    if s.on("transf_function_enabledF_false") and s.during(
+        "transf_start_iterations_M", "transf_stop_iterations_M"
+    ):
+        s.add("transf_addition_constantA_000")
+        s.write("w = positive(w)")
+        if s.on("transf_function_enabled"):
+            s.menger("transf_scale_3", "transf_constant_multiplier_111")
+        else:
+            s.sort()
+            s.scale("transf_scale_3")
+            s.write(f"w = w - 2 * {s.point('transf_constant_multiplier_111')}")
+    doubled_square(s)

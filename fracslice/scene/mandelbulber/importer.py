@@ -1,0 +1,150 @@
+"""Scenes of Mandelbulber 2 as scenes of ours, with a list of what was not understood."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from ...common.parameters import printable
+from ...errors import KernelError, SceneError
+from ...formulas import Node, get
+from ..model import Scene, scene
+from . import appearance
+from .names import NAMES
+from .sequences import Orbit, Slot, hybrid_slots, nodes, steps_of
+from .settings import Settings, read_settings
+from .step_text import UnknownError
+
+IGNORED = (
+    "flight_",
+    "keyframe_",
+    "image_proportion",
+    "camera_rotation",
+    "camera_distance_to_target",
+    "detail_level",
+    "DE_",
+    "delta_DE",
+    "antialiasing",
+    "opencl",
+    "use_default_bailout",
+    "bailout",
+    "smoothness",
+    "view_distance",
+    "voxel_",
+    "MC_",
+    "frames_per",
+    "show_",
+    "mesh_",
+    "anim_",
+)
+"""Beginnings of names that change neither shape nor appearance here: how a picture is computed there."""
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A scene of another program, and what is not in it."""
+
+    scene: Scene
+    formulas: tuple[str, ...]  # names of the formulas that it has
+    missing: tuple[str, ...]  # formulas that were left out, "file:line: name"
+    notes: tuple[str, ...]  # what is not as in the file, "file:line: what"
+    ignored: tuple[str, ...]  # names of values that were not understood
+
+
+def import_scene(path: str | os.PathLike[str], leave_out: bool = False) -> Imported:
+    """Read a scene of Mandelbulber 2.
+
+    Parameters
+    ----------
+    path : str or path
+        A settings file, ``.fract``.
+    leave_out : bool
+        Whether formulas that are not known here are left out; else they are an error.
+
+    Returns
+    -------
+    Imported
+        The scene, and what was not understood.
+
+    Raises
+    ------
+    SceneError
+        If the file is invalid, or has a formula that is not known here: "file:line: message".
+    """
+    settings = read_settings(path)
+    try:
+        return _imported(settings, orbit_of(settings, leave_out))
+    except UnknownError as error:
+        raise SceneError(f"{error}: this variant is not known here") from None
+    except (SceneError, KernelError) as error:
+        message = " ".join(str(error).split())
+        raise SceneError(
+            message if message.startswith(settings.path) else f"{settings.path}: {message}"
+        ) from None
+
+
+def _imported(settings: Settings, orbit: Orbit) -> Imported:
+    """Scene of settings; its errors may lack the name of the file."""
+    node = appearance.material(_clipped(nodes(orbit), settings), settings, 1, orbit.slots[0].number)
+    name = printable(Path(settings.path).stem)
+    made = scene(node, size="60mm", name=name, view=appearance.view(settings))
+    orbit.notes += [f"{settings.path}: section [{name}] is left out" for name in settings.others]
+    known = tuple(dict.fromkeys(s.known.name for s in orbit.slots if s.known))
+    return Imported(
+        made, known, tuple(orbit.missing), tuple(orbit.notes), tuple(_ignored(settings, orbit.slots))
+    )
+
+
+def unknown(path: str | os.PathLike[str]) -> str | None:
+    """Return the message about the first formula of a file, or variant of one, that is not known here."""
+    try:
+        steps_of(orbit_of(read_settings(path), leave_out=False))
+    except (SceneError, UnknownError) as error:
+        return str(error)
+    return None
+
+
+def orbit_of(settings: Settings, leave_out: bool = False) -> Orbit:
+    """Formulas of a file with what they share."""
+    main = settings.main
+    if main.flag("boolean_operators", "false"):
+        raise SceneError(f"{main.place('boolean_operators')}: boolean_operators true: expected false")
+    slots = hybrid_slots(settings)
+    if not slots:
+        raise SceneError(f"{settings.path}: expected at least one formula")
+    missing = [_named(s) for s in slots if s.known is None]
+    if missing and not leave_out:
+        raise SceneError(f"{missing[0]}: not known here; --leave-out imports the rest")
+    kept = [s for s in slots if s.known]
+    if not kept:
+        raise SceneError(f"{missing[0]}: not known here, and no other formula is left")
+    julia = main.vector("julia_c", "0 0 0") if main.flag("julia_mode", "false") else None
+    factor = main.vector("fractal_constant_factor", "1 1 1")
+    hybrid = main.flag("hybrid_fractal_enable", "false")
+    orbit = Orbit(settings, kept, hybrid, max(main.whole("N", "250"), 1), julia, factor)
+    orbit.missing += missing
+    return orbit
+
+
+def _named(s: Slot) -> str:
+    return f"{s.line}: formula_{s.place} {s.number} ({NAMES.get(s.number, 'no name')})"
+
+
+def _clipped(node: Node, settings: Settings) -> Node:
+    """The part within the limits of the file."""
+    main = settings.main
+    if not main.flag("limits_enabled", "false"):
+        return node
+    low, high = main.vector("limit_min", "-10 -10 -10"), main.vector("limit_max", "10 10 10")
+    return get("bounds")(node, min=low, max=high)
+
+
+def _ignored(settings: Settings, slots: list[Slot]) -> Iterator[str]:
+    used = {settings.main.name, *(s.values.name for s in slots)}
+    for section in settings.sections:
+        if section.name in used:
+            for name, value in section.unasked():
+                if not name.startswith(IGNORED):
+                    yield f"{settings.path}:{value.line}: {name}"

@@ -1,0 +1,492 @@
+"""Formulas of Mandelbulber in NumPy, from their published mathematics: functions of points [3, n], the start
+points [3, n], values by name, and the number of the iteration.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+Points = np.ndarray
+Values = Mapping[str, Any]
+Formula = Callable[[Points, Points, Values, int], Points]
+
+X, Y, Z = np.eye(3)
+
+
+def about(axis: int, degrees: float) -> np.ndarray:
+    """Matrix of a rotation about an axis."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    i, j = [(1, 2), (2, 0), (0, 1)][axis]
+    matrix = np.eye(3)
+    matrix[i, i] = matrix[j, j] = c
+    matrix[i, j], matrix[j, i] = -s, s
+    return matrix
+
+
+def rotation(angles: Any) -> np.ndarray:
+    """Matrix of a turn about x, then y, then z."""
+    return about(2, angles[2]) @ about(1, angles[1]) @ about(0, angles[0])
+
+
+def column(values: Any) -> np.ndarray:
+    return np.array(values, float)[:, None]
+
+
+def length2(w: Points) -> np.ndarray:
+    return (w**2).sum(0)
+
+
+def box(w: Points, limit: Any, value: Any | None = None) -> Points:
+    """Reflect at a limit, towards a value."""
+    limit = np.broadcast_to(np.asarray(limit, float).reshape(-1, 1), (3, 1))
+    value = 2 * limit if value is None else value
+    return np.where(abs(w) > limit, np.sign(w) * value - w, w)
+
+
+def ball(w: Points, inner2: float, outer2: float, offset: Any = (0, 0, 0)) -> Points:
+    """Scale within the inner radius, invert within the outer one, about an offset."""
+    r2, o = length2(w), column(offset)
+    k = np.where(r2 < inner2, outer2 / inner2, np.where(r2 < outer2, outer2 / np.maximum(r2, 1e-300), 1.0))
+    return k * (w + o) - o
+
+
+def sorted_down(w: Points) -> Points:
+    return np.sort(w, axis=0)[::-1]
+
+
+def bulb(w: Points, power: float, alpha: float = 0.0, beta: float = 0.0) -> Points:
+    """Power in polar coordinates whose angle is that to the equator."""
+    r = np.sqrt(length2(w))
+    theta = power * (np.arcsin(w[2] / r) + np.radians(beta))
+    phi = power * (np.arctan2(w[1], w[0]) + np.radians(alpha))
+    return r**power * np.array([np.cos(theta) * np.cos(phi), np.cos(theta) * np.sin(phi), np.sin(theta)])
+
+
+def mandelbulb(w: Points, c: Points, v: Values, _: int) -> Points:
+    return bulb(w, v["power"], v["alpha_angle_offset"], v["beta_angle_offset"])
+
+
+def mandelbulb_square(w: Points, c: Points, v: Values, _: int) -> Points:
+    return bulb(w, 2) * column((1, 1, -1))
+
+
+def quaternion(w: Points, c: Points, v: Values, _: int) -> Points:
+    q = np.array([w[0] ** 2 - w[1] ** 2 - w[2] ** 2, 2 * w[0] * w[1], 2 * w[0] * w[2]])
+    return q
+
+
+def bristorbrot(w: Points, c: Points, v: Values, _: int) -> Points:
+    x, y, z = w
+    return np.array([x * x - y * y - z * z, y * (2 * x - z), z * (2 * x + y)])
+
+
+def xenodreambuie(w: Points, c: Points, v: Values, _: int) -> Points:
+    r, n = np.sqrt(length2(w)), v["power"]
+    phi = n * (np.arctan2(w[1], w[0]) + np.radians(v["beta_angle_offset"]))
+    theta = np.arccos(w[2] / r) + np.radians(v["alpha_angle_offset"])
+    theta = n * np.where(abs(theta) > np.pi / 2, np.sign(theta) * np.pi - theta, theta)
+    return r**n * np.array([np.cos(phi) * np.sin(theta), np.sin(phi) * np.sin(theta), np.cos(theta)])
+
+
+def mandelbox(w: Points, c: Points, v: Values, _: int) -> Points:
+    limit, value = v["mandelbox_folding_limit"], v["mandelbox_folding_value"]
+    if v["mandelbox_rotations_enabled"]:
+        for k in range(3):
+            for_neg, for_pos = (rotation(v[f"mandelbox_rotation_{s}_{k + 1}"]) for s in ("neg", "pos"))
+            above, below = for_neg @ w, for_pos @ w
+            first, second = above[k] > limit, (for_pos @ w)[k] < -limit
+            above[k], below[k] = value - above[k], -value - below[k]
+            w = np.where(first, for_neg.T @ above, np.where(second, for_pos.T @ below, w))
+    else:
+        w = box(w, limit, value)
+    inner, outer = v["mandelbox_folding_min_radius"] ** 2, v["mandelbox_folding_fixed_radius"] ** 2
+    w = ball(w, inner, outer, v["mandelbox_offset"])
+    if v["mandelbox_main_rotation_enabled"]:
+        w = rotation(v["mandelbox_rotation_main"]) @ w
+    return v["mandelbox_scale"] * w
+
+
+def menger(w: Points, scale: float, offset: Any = (1, 1, 1), always: bool = False) -> Points:
+    w = scale * sorted_down(abs(w)) - 2 * column((*offset[:2], 0))
+    w[2] -= np.where(always | (w[2] > 1), 2 * offset[2], 0)
+    return w
+
+
+def menger_sponge(w: Points, c: Points, v: Values, _: int) -> Points:
+    return menger(w, v["transf_scale_3"])
+
+
+def menger_3(w: Points, c: Points, v: Values, _: int) -> Points:
+    o = column(v["transf_offset_111"])
+    w = rotation(v["transf_rotation2"]) @ sorted_down(rotation(v["transf_rotation"]) @ abs(w))
+    w[2] = abs(w[2] - o[2] / 3) + o[2] / 3
+    return v["transf_scale_3"] * w - o * (v["transf_scale_3"] - 1)
+
+
+def menger_mod_1(w: Points, c: Points, v: Values, i: int) -> Points:
+    w = menger(w, v["transf_scale_3"], v["transf_constant_multiplier_111"])
+    if v["transf_rotation_enabled"] and v["transf_start_iterations"] <= i < v["transf_stop_iterations"]:
+        w = rotation(v["transf_rotation"]) @ w
+    w = w + column(v["transf_addition_constant"])
+    if v["transf_function_enabledx_false"]:
+        w = w + np.where(w < 0, -1, 1) * column(v["transf_addition_constantA_000"])
+    return w
+
+
+def menger_smooth(w: Points, c: Points, v: Values, _: int) -> Points:
+    scale, e = v["transf_scale_3"], v["transf_offset_0005"]
+    a, b, d = v["transf_offset_1105"]
+    w = np.sqrt(w * w + e)
+    for p, q in ((0, 1), (0, 2), (1, 2)):
+        t = 0.5 * (w[p] - w[q] - np.sqrt((w[p] - w[q]) ** 2 + e))
+        w[p], w[q] = w[p] - t, w[q] + t
+    t = d * (scale - 1) / scale
+    w[2] = t - np.sqrt((w[2] - t) ** 2 + e)
+    w = scale * w - (scale - 1) * column((a, b, 0))
+    return rotation(v["transf_rotation"]) @ w if v["transf_rotation_enabled"] else w
+
+
+def kaleidoscope(w: Points, c: Points, v: Values, _: int) -> Points:
+    w = np.array([abs(p) if v[f"IFS_abs_{a}"] else p for a, p in zip("xyz", w, strict=True)])
+    for k in range(9):
+        if v[f"IFS_enabled_{k}"]:
+            w = rotation(v[f"IFS_rotations_{k}"][::-1]) @ w
+            n = np.array(v[f"IFS_direction_{k}"], float)
+            n /= np.linalg.norm(n)
+            depth = np.minimum(n @ w - v[f"IFS_distance_{k}"], 0)
+            w = w - 2 * v[f"IFS_intensity_{k}"] * n[:, None] * depth
+    o, scale = column(v["IFS_offset"]), v["IFS_scale"]
+    if v["IFS_rotation_enabled"]:
+        w = rotation(v["IFS_rotation"][::-1]) @ (w - o) + o
+    if v["IFS_edge_enabled"]:
+        e = column(v["IFS_edge"])
+        w = np.where(e > 0, e - abs(e - w), w)
+    if not v["IFS_menger_sponge_mode"]:
+        return scale * w - o * (scale - 1)
+    w, t = scale * w, o[:, 0] * (scale - 1)
+    return w - np.array([t[0] + 0 * w[0], t[1] + 0 * w[1], np.where(w[2] > 0.5 * t[2], t[2], 0)])
+
+
+def sierpinski(w: Points, c: Points, v: Values, _: int) -> Points:
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        low = w[i] + w[j] < 0
+        w = w.copy()
+        w[i], w[j] = np.where(low, -w[j], w[i]), np.where(low, -w[i], w[j])
+    return v["transf_scaleA_2"] * w - column(v["transf_offset_111"])
+
+
+def flat(w: Points, limit: Any) -> Points:
+    return box(w, (limit[0], limit[1], 1e9))
+
+
+def box_fold_bulb(w: Points, c: Points, v: Values, _: int) -> Points:
+    w = 2 * ball(box(w, v["boxfold_bulbpow2_folding_factor"]), 0.25, 1)
+    return bulb(w, 2) * column((1, 1, -v["boxfold_bulbpow2_z_factor"]))
+
+
+def box_fold_bulb_2(w: Points, c: Points, v: Values, i: int) -> Points:
+    w = box(w, v["transf_addition_constant_111"])
+    w = ball(w, v["transf_minR2_p25"], v["transf_maxR2_1"], v["mandelbox_offset"])
+    w = v["transf_scale"] * w
+    if v["transf_start_iterations_A"] <= i < v["transf_stop_iterations_A"]:
+        w = bulb(2 * w, 2) * column((1, 1, -v["boxfold_bulbpow2_z_factor"]))
+    return w
+
+
+def abox_mod_11(w: Points, c: Points, v: Values, i: int) -> Points:
+    scale = v["mandelbox_scale"]
+    for _ in range(i + 1):
+        last = scale
+        scale = v["mandelbox_scale"] + v["mandelbox_vary_scale_vary"] * (abs(last) - 1)
+    w = box(w, v["transf_addition_constant_111"])
+    w = ball(w, v["transf_minR2_p25"], v["transf_maxR2_1"], v["mandelbox_offset"])
+    w = scale * w + column(v["transf_addition_constant"])
+    return rotation(v["transf_rotation"]) @ w if v["transf_rotation_enabled"] else w
+
+
+def amazing_surf_mod_2(w: Points, c: Points, v: Values, _: int) -> Points:
+    w = flat(w, v["transf_addition_constant_111"]) + column(v["transf_addition_constant"])
+    w = ball(w, v["transf_minR2_p25"], v["transf_maxR2_1"], v["mandelbox_offset"])
+    w = v["mandelbox_scale"] * w
+    return rotation(v["mandelbox_rotation_main"]) @ w if v["mandelbox_main_rotation_enabled"] else w
+
+
+def amazing_surf_mod_4(w: Points, c: Points, v: Values, _: int) -> Points:
+    w = flat(w, v["transf_addition_constant_111"]) + column(v["transf_offsetA_000"])
+    w = v["transf_scale_2"] * ball(w, v["transf_minR2_p25"], 1)
+    return rotation(v["transf_rotation2"]) @ (w + column(v["transf_addition_constantA_000"]))
+
+
+def amazing_surf_mod_1(w: Points, c: Points, v: Values, _: int) -> Points:
+    w = flat(w, v["transf_addition_constant_111"]) + column(v["transf_addition_constant"])
+    w = v["mandelbox_scale"] * ball(w, np.sqrt(v["transf_minimum_radius_05"]), 1)
+    return rotation(v["transf_rotation"]) @ w
+
+
+def abox_mod_15(w: Points, c: Points, v: Values, i: int) -> Points:
+    if v["transf_sphere_inversion_enabled_false"] and i < v["transf_stop_iterations_1"]:
+        o = column(v["transf_offset_000"])
+        w = (w + o) * v["transf_scaleG_1"] / length2(w + o) + column(v["transf_addition_constant"]) - o
+    w = box(w, v["transf_addition_constant_111"]) + column(v["transf_offsetA_000"])
+    w = v["transf_scale_2"] * ball(w, v["transf_minR2_p25"], v["transf_maxR2_1"])
+    return rotation(v["transf_rotation2"]) @ (w + column(v["transf_addition_constantA_000"]))
+
+
+def ifs(w: Points, c: Points, v: Values, _: int) -> Points:
+    w = v["transf_scale_2"] * (abs(w) - column(v["transf_offset_111"]))
+    w = rotation(v["transf_rotation"]) @ w + column(v["transf_offset_000"])
+    return rotation(v["transf_rotation2"]) @ w
+
+
+def koch_ifs(w: Points, c: Points, v: Values, _: int) -> Points:
+    x, y, z = abs(w[0]), abs(w[1]), w[2]
+    x, y = np.maximum(x, y), np.minimum(x, y)
+    y = v["transf_scale_1"] / 3 - abs(y - v["transf_scale_1"] / 3)
+    for t in (1 / 3, -1 / 3):
+        x, z = np.maximum(x + t, z) - t, np.minimum(x + t, z)
+    w, o = np.array([x, y, z]) - column(v["transf_offset_100"]), column(v["transf_addition_constant_neg100"])
+    return v["transf_scale_2"] * (w - o) + o
+
+
+def add_constant(w: Points, c: Points, v: Values, _: int) -> Points:
+    return w + column(v["transf_addition_constant"]) + column(v["transf_addition_constantA_000"])
+
+
+def turned(w: Points, c: Points, v: Values, _: int) -> Points:
+    return rotation(v["transf_rotation"]) @ w
+
+
+def turned_back(w: Points, c: Points, v: Values, _: int) -> Points:
+    x, y, z = v["transf_rotationXYZ"]
+    return about(0, x) @ about(1, y) @ about(2, z) @ w
+
+
+def turned_more(w: Points, c: Points, v: Values, i: int) -> Points:
+    start, stop = v["transf_start_iterations_250"], v["transf_stop_iterations"]
+    share = 0.0 if i < start else min((i - start) / (stop - start), 1)
+    return rotation(np.array(v["transf_rotation"]) + share * np.array(v["transf_offset_000"])) @ w
+
+
+def scaled(w: Points, c: Points, v: Values, _: int) -> Points:
+    return v["transf_scale"] * w
+
+
+def scaled_3d(w: Points, c: Points, v: Values, _: int) -> Points:
+    return column(v["transf_scale3D_111"]) * w
+
+
+def box_offset(w: Points, c: Points, v: Values, _: int) -> Points:
+    return w + np.sign(w) * column(v["transf_addition_constant"])
+
+
+def radial_offset(w: Points, c: Points, v: Values, _: int) -> Points:
+    return v["transf_scale"] * (1 - v["transf_offset"] / np.sqrt(length2(w))) * w
+
+
+def add_start(w: Points, c: Points, v: Values, _: int) -> Points:
+    return w + c * column(v["transf_constant_multiplier_111"])
+
+
+def box_fold(w: Points, c: Points, v: Values, _: int) -> Points:
+    return box(w, v["mandelbox_folding_limit"], v["mandelbox_folding_value"])
+
+
+def spherical_fold(w: Points, c: Points, v: Values, _: int) -> Points:
+    r2, o = length2(w), column(v["mandelbox_offset"])
+    m, f = v["mandelbox_folding_min_radius"] ** 2, v["mandelbox_folding_fixed_radius"] ** 2
+    k = np.where(r2 < m, f / m, np.where(r2 < f, f / r2, 1))
+    return k * v["transf_scale"] * (w + o) - o
+
+
+def zyx(w: Points, c: Points, v: Values, _: int) -> Points:
+    return w[::-1]
+
+
+def absolute_between(w: Points, c: Points, v: Values, _: int) -> Points:
+    return abs(w + column(v["transf_addition_constant"])) + column(v["transf_offsetA_000"])
+
+
+def absolute_at(w: Points, c: Points, v: Values, _: int) -> Points:
+    w = abs(w + column(v["transf_addition_constant"])) + column(v["transf_offset_000"])
+    a = column(v["transf_offsetA_000"])
+    return a - abs(a - w)
+
+
+def tglad(w: Points, c: Points, v: Values, _: int) -> Points:
+    a = column(v["transf_addition_constant"])
+    return abs(w + a) - abs(w - a) - w
+
+
+def radial_power(w: Points, c: Points, v: Values, _: int) -> Points:
+    return np.sqrt(length2(w)) ** (v["power"] - 1) * w
+
+
+def radial_cube(w: Points, c: Points, v: Values, _: int) -> Points:
+    return v["transf_scale"] * length2(w) * w
+
+
+def menger_fold(w: Points, c: Points, v: Values, _: int) -> Points:
+    return menger(w, v["transf_scale_3"], v["transf_constant_multiplier_111"])
+
+
+def inverted(w: Points, c: Points, v: Values, _: int) -> Points:
+    w = v["transf_scale"] * (w + column(v["mandelbox_offset"]))
+    return w / length2(w) - column(v["mandelbox_offset"]) - column(v["transf_addition_constant"])
+
+
+def turned_folds(w: Points, c: Points, v: Values, _: int) -> Points:
+    o = column(v["transf_offset_000"])
+    w = abs(rotation(v["transf_rotation"]) @ w + o) - o
+    return rotation(v["transf_rotation2"]) @ w
+
+
+def absolute_conditional(w: Points, c: Points, v: Values, _: int) -> Points:
+    a, b = column(v["transf_offset_111"]), column(v["transf_scale3D_000"])
+    return np.sign(w) * (a - abs(w) + b * abs(w))
+
+
+def sectors(w: Points, c: Points, v: Values, _: int) -> Points:
+    n = v["transf_int_6"]
+    number = np.trunc(-n / (2 * np.pi) * np.arctan(w[0] / w[1]))
+    a = number * 2 * np.pi / n
+    x, y = w[0] * np.cos(a) - w[1] * np.sin(a), w[0] * np.sin(a) + w[1] * np.cos(a)
+    y = np.where(number % 2 == 1, -y, y)
+    return np.array([x + v["transf_offset_0"], y + v["transf_offsetA_0"], w[2]])
+
+
+def polygon(w: Points, c: Points, v: Values, _: int) -> Points:
+    x, y, k = abs(w[0]), w[1], np.pi / v["transf_int8_X"]
+    angle = abs(np.fmod(np.arctan2(y, x) + k, 2 * k) - k)
+    r = np.hypot(x, y)
+    return np.array([r * np.cos(angle), r * np.sin(angle), w[2]]) + column(v["transf_addition_constant"])
+
+
+def diagonal(w: Points, c: Points, v: Values, _: int) -> Points:
+    return np.array([np.minimum(w[0], w[1]), np.maximum(w[0], w[1]), w[2]])
+
+
+def scale_about(w: Points, c: Points, v: Values, _: int) -> Points:
+    a = column(v["transf_addition_constant"])
+    return v["transf_scale_1"] * (w - a) + a
+
+
+def mandalay(w: Points, c: Points, v: Values, _: int) -> Points:
+    f, g, a = v["transf_addition_constant_0555"], v["transf_offsetA_000"], abs(w)
+    q = a.copy()
+    for k in range(3):
+        side = np.maximum(a[(k + 1) % 3], a[(k + 2) % 3])
+        t = a[k] - 2 * f[k]
+        gap = np.maximum(abs(t + f[k]) - f[k], side - 4 * f[k])
+        q[k] = np.minimum(np.minimum(gap, np.maximum(t - g[k], side)), a[k])
+    return np.sign(w) * q
+
+
+def add_inverse(w: Points, c: Points, v: Values, _: int) -> Points:
+    d, r = 1 / length2(w), 1 / np.sqrt(length2(w))
+    d = r + (d - r) * v["transf_scaleA_1"]
+    return v["transf_scaleB_1"] * (w + w * column(v["transf_scale3D_111"]) * d)
+
+
+def symmetric(w: Points, c: Points, v: Values, _: int) -> Points:
+    w = abs(w)
+    for k, (i, j) in enumerate(((0, 2), (0, 1), (1, 2))):
+        t = v["transf_addition_constant_0555"][k] * (w[i] - w[j] - abs(w[i] - w[j]))
+        w[i], w[j] = w[i] - t, w[j] + t
+    return v["transf_scale_1"] * (w + column(v["transf_offsetA_000"]))
+
+
+def times_square(w: Points, c: Points, v: Values, i: int) -> Points:
+    w = v["transf_scale"] * (w + column(v["mandelbox_offset"]))
+    r2 = length2(w)
+    k = r2
+    if v["transf_function_enabledP_false"] and i < v["transf_stop_iterations_P1"]:
+        k = 1 / r2
+        w = k * w
+    o = column(v["transf_offset_000"])
+    if i < v["transf_stop_iterations_C1"]:
+        w = (w + o) / k - o
+    return w - column(v["mandelbox_offset"]) - column(v["transf_addition_constant"])
+
+
+def tiled(w: Points, c: Points, v: Values, _: int) -> Points:
+    size = v["transf_offset_222"][0]
+    w = w - column(v["transf_addition_constantA_000"])
+    w[0] = w[0] - v["transf_offset_000"][0]
+    w[0] = w[0] - size * np.floor(w[0] / size + 0.5)
+    return w
+
+
+def add_start_inverted(w: Points, c: Points, v: Values, _: int) -> Points:
+    return w + column(v["transf_constant_multiplier_111"]) / c
+
+
+def sine_cosine(w: Points, c: Points, v: Values, _: int) -> Points:
+    x = 2 * np.pi * w[0]
+    s = v["transf_scaleA_1"] * np.sin(x / v["transf_constant_multiplierA_111"][0])
+    t = v["transf_scaleB_1"] * np.cos(x / v["transf_constant_multiplierB_111"][0])
+    w = w.copy()
+    w[0] = np.maximum(np.maximum(s, t), v["transf_scaleC_1"] * s * t)
+    return v["transf_scale"] * w
+
+
+FORMULAS: dict[int, Formula] = {
+    2: mandelbulb,
+    3: mandelbulb_square,
+    5: quaternion,
+    7: menger_sponge,
+    8: mandelbox,
+    9: mandelbox,
+    10: kaleidoscope,
+    11: xenodreambuie,
+    16: box_fold_bulb,
+    21: bristorbrot,
+    61: menger_mod_1,
+    77: amazing_surf_mod_1,
+    110: sierpinski,
+    113: menger_smooth,
+    119: abox_mod_11,
+    125: box_fold_bulb_2,
+    126: box_fold_bulb_2,
+    132: amazing_surf_mod_2,
+    186: amazing_surf_mod_4,
+    207: menger_3,
+    226: abox_mod_15,
+    228: ifs,
+    279: koch_ifs,
+    1001: add_constant,
+    1002: turned,
+    1003: scaled,
+    1004: scaled_3d,
+    1005: box_offset,
+    1006: radial_offset,
+    1007: add_start,
+    1020: box_fold,
+    1021: spherical_fold,
+    1022: zyx,
+    1023: absolute_between,
+    1025: tglad,
+    1027: radial_power,
+    1036: turned_more,
+    1052: menger_fold,
+    1054: radial_cube,
+    1055: inverted,
+    1064: turned_folds,
+    1065: absolute_conditional,
+    1068: radial_offset,
+    1080: sectors,
+    1084: sine_cosine,
+    1098: diagonal,
+    1100: polygon,
+    1105: scale_about,
+    1108: mandalay,
+    1129: turned_back,
+    1135: add_start_inverted,
+    1146: add_inverse,
+    1150: tiled,
+    1152: absolute_at,
+    1155: times_square,
+    1158: symmetric,
+}
