@@ -432,6 +432,158 @@ def sine_cosine(w: Points, c: Points, v: Values, _: int) -> Points:
     return v["transf_scale"] * w
 
 
+def kali(w: Points, c: Points, v: Values, _: int) -> Points:
+    w = column(v["transf_addition_constant_0555"]) - abs(w)
+    return v["transf_scale_015"] * ball(w, v["transf_minimum_radius_06"], 1)
+
+
+def kali_2(w: Points, c: Points, v: Values, _: int) -> Points:
+    w = column(v["transf_addition_constant_0555"]) - abs(w)
+    w = v["transf_scale_015"] * ball(w, v["transf_minR2_p25"], v["transf_maxR2_1"])
+    return w + 2 * column(v["transf_addition_constant"])
+
+
+def kali_3(w: Points, c: Points, v: Values, i: int) -> Points:
+    w = column(v["transf_offset_111"]) - abs(w)
+    return column(v["transf_offsetA_111"]) - v["transf_scale_015"] * ball(w, v["transf_minimum_radius_0"], 1)
+
+
+def abox_mod_1(w: Points, c: Points, v: Values, _: int) -> Points:
+    a, f = column(v["transf_addition_constant"]), v["mandelbox_folding_value"]
+    f = column((f, f, f * v["transf_scale_1"]))
+    w = f - abs(abs(w + a) - f) - abs(a)
+    return v["mandelbox_scale"] * ball(w, v["transf_minimum_radius_0"], v["transf_maxR2_1"])
+
+
+def amazing_surf(w: Points, c: Points, v: Values, _: int) -> Points:
+    w = flat(w, v["transf_addition_constant_111"])
+    r2, inner = length2(w), np.sqrt(v["transf_minimum_radius_05"])
+    m = v["mandelbox_scale"] / np.where(r2 < inner, inner, np.minimum(r2, 1))
+    return rotation(v["transf_rotation"]) @ (((m - 1) * v["transf_scale_1"] + 1) * w)
+
+
+def abox_icen(w: Points, c: Points, v: Values, _: int) -> Points:
+    k, j = column(v["transf_constant_multiplier_111"]), column(v["transf_constant_julia_c"])
+    own = v["transf_constant_julia_mode"]
+    w = box(w, v["transf_addition_constant_111"]) + (c * k if own else j)
+    inner, outer = v["mandelbox_folding_min_radius"] ** 2, v["mandelbox_folding_fixed_radius"] ** 2
+    w = v["mandelbox_scale"] * ball(w, inner, outer)
+    return w + j + (-c if own else c) * k
+
+
+def abox_mod_13(w: Points, c: Points, v: Values, i: int) -> Points:
+    w = box(w, v["transf_addition_constant_111"])
+    w = ball(w, v["transf_minR2_p25"], v["transf_maxR2_1"], v["mandelbox_offset"])
+    w = v["mandelbox_scale"] * w
+    if v["transf_start_iterations_B"] <= i:
+        w = w + column(v["transf_addition_constant"])
+    return rotation(v["transf_rotation"]) @ w if v["transf_rotation_enabled"] else w
+
+
+def fold_box_mod_1(w: Points, c: Points, v: Values, _: int) -> Points:
+    a, b = column(v["transf_addition_constant_111"]), column(v["transf_addition_constantA_111"])
+    w = abs(w + a) - abs(w - b) - w * column(v["transf_scale3D_111"])
+    inner, outer = v["mandelbox_folding_min_radius"] ** 2, v["mandelbox_folding_fixed_radius"] ** 2
+    return v["mandelbox_scale"] * ball(w, inner, outer)
+
+
+def mandelbox_menger(w: Points, c: Points, v: Values, i: int) -> Points:
+    return menger(mandelbox(w, c, v, i), v["transf_scale_3"], v["transf_constant_multiplierA_111"])
+
+
+def mandalay_box(w: Points, c: Points, v: Values, i: int) -> Points:
+    w = v["transf_scale_2"] * ball(mandalay(w, c, v, i), v["transf_minR2_p25"], 1)
+    return rotation(v["transf_rotation"]) @ w
+
+
+def amazing_surf_klein(w: Points, c: Points, v: Values, i: int) -> Points:
+    if i >= v["transf_int8_X"]:
+        return v["transf_scale_2"] * box(w, v["transf_offset_110"]) + column(v["transf_offsetA_000"])
+    w = flat(w, v["transf_addition_constant_111"])[[0, 2, 1]]
+    w = v["transf_scale_1"] * ball(w, v["transf_minimum_radius_0"], 1)
+    return w + column(v["transf_addition_constantA_000"])
+
+
+def menger_smooth_mod_1(w: Points, c: Points, v: Values, _: int) -> Points:
+    e, k, m = v["transf_offset_0005"], v["transf_scale_05"], v["transf_constant_multiplier_111"]
+    a, b, d = v["transf_constant_multiplier_221"]
+    w = np.sqrt(w * w + v["transf_offset_0"])
+    for n, (p, q) in enumerate(((0, 1), (0, 2), (1, 2))):
+        t = k * (w[p] - w[q] - np.sqrt((w[p] - w[q]) ** 2 + e * m[n]))
+        w[p], w[q] = w[p] - t, w[q] + t
+    w[2] = d / 3 - np.sqrt((w[2] - d / 3) ** 2 + e + v["transf_offsetA_0"])
+    return v["transf_scale_3"] * w - column((a, b, 0))
+
+
+def menger_cross(w: Points, c: Points, v: Values, _: int) -> Points:
+    x, y, z = w[0], abs(w[1]), abs(w[2])
+    depth = np.minimum(x * np.sqrt(0.75) - y / 2, 0)
+    x, y = x - 2 * depth * np.sqrt(0.75), abs(y + depth)
+    y, z = np.minimum(y, z), np.maximum(y, z)
+    y = 0.5 + abs(y - 0.5)
+    w, scale = np.array([x, y, z]), v["transf_scale_3"]
+    if v["transf_function_enabledx_false"]:
+        w = column(v["transf_offset_222"]) - w
+    return scale * w - (scale - 1) * column((np.sqrt(0.75), 1.5, 1.5)) + column(v["transf_offset_000"])
+
+
+def benesi(w: Points, c: Points, v: Values, _: int) -> Points:
+    x, y, z = w
+    o, s = v["transf_offset_000"], y * y + z * z
+    u = np.where((c[0] < 0) | (x < np.sqrt(s)), 1, -1) * (x * x - s + o[0])
+    k = -2 * abs(x) / np.sqrt(s)
+    return np.array([u, k * (y * y - z * z) + o[1], k * 2 * y * z + o[2]])
+
+
+def pine_tree(w: Points, c: Points, v: Values, _: int) -> Points:
+    x, y, z = w
+    a, b, d = v["transf_constant_multiplier_100"]
+    k = 2 * x / np.hypot(y, z)
+    w = np.array([x * x - y * y - z * z + a * c[0], 2 * k * y * z + d * c[2], k * (y * y - z * z) + b * c[1]])
+    return about(0, -v["transf_angle_0"]) @ w
+
+
+def absolute_square(w: Points, c: Points, v: Values, _: int) -> Points:
+    before, after = (
+        np.array([v[f"buffalo_{name}_{axis}"] for axis in "xyz"])[:, None] for name in ("preabs", "abs")
+    )
+    w = bulb(np.where(before, abs(w), w), 2) * column((1, 1, 1 if v["buffalo_pos_z"] else -1))
+    return np.where(after, abs(w), w) + column(v["transf_offset_000"])
+
+
+def mandelnest(w: Points, c: Points, v: Values, _: int) -> Points:
+    r = np.sqrt(length2(w))
+    u = np.cos(np.pi * v["transf_offset_0"] + v["power"] * np.arccos(w / r))
+    return u / np.sqrt(length2(u)) * r ** (v["power"] - v["transf_offset_1"]) + column(
+        v["transf_offsetF_000"]
+    )
+
+
+def msltoe_sym_4(w: Points, c: Points, v: Values, i: int) -> Points:
+    w = symmetric(w, c, {**v, **{n: v[n] for n in SYMMETRIC}, "transf_scale_1": 1}, i)
+    k = np.pi / v["transf_int8_Y"]
+    angle = abs(np.fmod(np.arctan2(w[2], w[1]) + np.pi + k, 2 * k) - k)
+    r = np.hypot(w[1], w[2])
+    x, y, z = w[0], r * np.cos(angle), r * np.sin(angle)
+    m = 1 - z * z / (x * x + y * y + z * z)
+    first, second = (x * x - y * y) * m * v["transf_scaleB_1"], 2 * x * y * m * v["transf_scale"]
+    w = np.array([first, second, 2 * z * np.hypot(x, y)]) + column(v["transf_addition_constant_neg100"])
+    return v["transf_scale_1"] * (1 - v["transf_offset"] / np.sqrt(length2(w))) * w
+
+
+SYMMETRIC = ("transf_addition_constant_0555", "transf_offsetA_000")
+
+
+def pupuku(w: Points, c: Points, v: Values, _: int) -> Points:
+    r, n = np.sqrt(length2(w)), v["power"]
+    t = n * v["transf_scaleA_1"] * np.arcsin(w[2] / r)
+    p = n * v["transf_scaleB_1"] * np.arctan2(w[1], w[0])
+    k = np.cos(t)
+    x = 1 + (k - 1) * v["transf_scaleB_0"] if v["transf_function_enabledB_false"] else k
+    w = np.array([x * np.cos(p), k * np.sin(p), np.sin(t)]) * r ** (n - v["transf_offset_1"] + 1)
+    return v["transf_scaleC_1"] * (w + column(v["transf_offset_000"]))
+
+
 FORMULAS: dict[int, Formula] = {
     2: mandelbulb,
     3: mandelbulb_square,
@@ -489,4 +641,23 @@ FORMULAS: dict[int, Formula] = {
     1152: absolute_at,
     1155: times_square,
     1158: symmetric,
+    20: benesi,
+    59: fold_box_mod_1,
+    60: kali,
+    64: abox_mod_1,
+    66: pine_tree,
+    73: amazing_surf,
+    76: abox_icen,
+    91: mandelbox_menger,
+    98: menger_cross,
+    114: menger_smooth_mod_1,
+    127: abox_mod_13,
+    135: kali_2,
+    136: kali_3,
+    137: absolute_square,
+    198: mandalay_box,
+    221: amazing_surf_klein,
+    229: mandelnest,
+    244: msltoe_sym_4,
+    266: pupuku,
 }

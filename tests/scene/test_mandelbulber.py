@@ -18,7 +18,7 @@ from fracslice.scene.mandelbulber import import_scene
 from fracslice.scene.mandelbulber.importer import orbit_of
 from fracslice.scene.mandelbulber.sequences import definition, element, order, steps_of
 from fracslice.scene.mandelbulber.settings import SettingsSection, default_of, parse_settings
-from fracslice.scene.mandelbulber.step_text import FORMULAS, LEFT_OUT
+from fracslice.scene.mandelbulber.step_text import ADDED, FORMULAS, SWAPPED
 from tests.examples import stamped
 
 from .mandelbulber_oracle import FORMULAS as ORACLE
@@ -41,6 +41,25 @@ VALUES = {  # of formulas whose defaults leave much out
     "transf_function_enabledx_false true; transf_addition_constantA_000 0.1 0.2 0; transf_start_iterations 1",
     77: "transf_rotation 0 0 20; transf_addition_constant 0.1 0 0.2; transf_minimum_radius_05 0.3",
     110: "transf_offset_111 1 0.8 1.1",
+    20: "transf_offset_000 0.1 0 0.2",
+    59: "transf_addition_constantA_111 0.9 1 1.1; transf_scale3D_111 1 0.9 1.2",
+    60: "transf_addition_constant_0555 0.5 0.6 0.4",
+    64: "transf_addition_constant 0.1 0.2 0; mandelbox_folding_value 1.1; transf_minimum_radius_0 0.2",
+    66: "transf_constant_multiplier_100 1 0.5 0.2; transf_angle_0 20",
+    73: "transf_scale_1 0.8; transf_rotation 0 10 0; transf_minimum_radius_05 0.2",
+    76: "transf_constant_julia_c 0.1 0.2 0; transf_constant_julia_mode true",
+    91: "mandelbox_offset 0.1 0 0; transf_constant_multiplierA_111 1 0.9 1",
+    98: "transf_function_enabledx_false true; transf_offset_000 0.1 0 0",
+    114: "transf_offset_0 0.01; transf_constant_multiplier_111 1 0.5 2",
+    127: "mandelbox_offset 0.1 0 0; transf_start_iterations_B 1; transf_addition_constant 0 0.2 0",
+    135: "transf_addition_constant 0.1 0 0",
+    136: "transf_minimum_radius_0 0.3",
+    137: "buffalo_preabs_x true; buffalo_abs_z true; buffalo_pos_z true; transf_offset_000 0.1 0 0",
+    198: "transf_offsetA_000 0.1 0 0; transf_rotation 0 0 20",
+    221: "transf_int8_X 2; transf_minimum_radius_0 0.2; transf_addition_constantA_000 0.1 0 0",
+    229: "power 4; transf_offset_0 0.2; transf_offsetF_000 0.1 0 0",
+    244: "transf_offset 0.2; transf_addition_constant_0555 0.5 0.4 0.5; transf_int8_Y 5",
+    266: "power 4; transf_scaleA_1 0.9; transf_function_enabledB_false true; transf_scaleB_0 0.5",
     113: "transf_rotation_enabled true; transf_rotation 0 10 0",
     119: "mandelbox_vary_scale_vary 0.1; mandelbox_offset 0.1 0 0; transf_rotation_enabled true; "
     "transf_rotation 0 0 15; transf_addition_constant_111 1 0.8 1.2",
@@ -132,8 +151,8 @@ def oracle_images(number: int, source: str, points: np.ndarray, count: int) -> n
     with np.errstate(all="ignore"):
         for k in range(count):
             w = ORACLE[number](w.copy(), points, values, k)
-            if FORMULAS[number].constant != LEFT_OUT:
-                w = w + points
+            if FORMULAS[number].constant in (ADDED, SWAPPED):
+                w = w + (points[[1, 0, 2]] if FORMULAS[number].constant == SWAPPED else points)
     return w
 
 

@@ -226,10 +226,21 @@ def material(node: Node, settings: Settings, number: int, formula: int = 0) -> N
     else:
         values["colour"] = main.colour(prefix + "surface_color", "ffff ffff ffff")
     values["specular"] = round(min(max(main.number(prefix + "specular", "10") / 10, 0), 100) * 0.2, 4)
-    values["reflect"] = round(min(max(main.number(prefix + "reflectance", "0"), 0), 1), 4)
+    values["reflect"] = reflection(main, prefix)
     values["glow"] = round(min(max(main.number(prefix + "luminosity", "0"), 0), 1000), 4)
     clear = round(min(max(main.number(prefix + "transparency_of_surface", "0"), 0), 1), 4)
     if clear:
         index = main.number(prefix + "transparency_index_of_refraction", "1")
         values |= {"clear": clear, "index": round(min(max(index, 1), 4), 4)}
     return get("material")(node, **values)
+
+
+def reflection(main: SettingsSection, prefix: str) -> float:
+    """Part of the light that a material mirrors head on; by Fresnel's law that of its index."""
+    share = main.number(prefix + "reflectance", "0")
+    if not main.flag("raytraced_reflections", "false"):
+        return 0.0
+    if main.flag(prefix + "fresnel_reflectance", "false"):
+        index = max(main.number(prefix + "transparency_index_of_refraction", "1.5"), 1.0)
+        share *= ((index - 1) / (index + 1)) ** 2
+    return round(min(max(share, 0), 1), 4)

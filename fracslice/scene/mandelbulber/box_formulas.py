@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from .folds import absolute
-from .step_text import ORDERS, FormulaStep, known
+from .folds import absolute, mandalay
+from .step_text import LEFT_OUT, ORDERS, SWAPPED, FormulaStep, UnknownError, known
 
 LOWE = "Lowe 2010, fractalforums.com: Amazing Fractal"
 
@@ -389,3 +389,238 @@ def box_fold_bulb_3(s: FormulaStep) -> None:
             s.scale("transf_scale_3")
             s.write(f"w = w - 2 * {s.point('transf_constant_multiplier_111')}")
     doubled_square(s)
+
+
+def own_ball(s: FormulaStep, inner: str = "transf_minimum_radius_0") -> None:
+    """Ball of radius 1 whose inner radius is squared in the file."""
+    s.ball(s.value(inner), 1.0)
+
+
+@known(60, "Abox - Mod Kali", "Kali 2010, fractalforums.com: Kaliset")
+def abox_mod_kali(s: FormulaStep) -> None:
+    """Absolute values that are subtracted, and a ball."""
+    if s.on("mandelbox_main_rotation_enabled"):
+        s.refuse("transf_function_enabledP_false")
+        s.turn("mandelbox_rotation_main")
+    s.write(f"w = {s.point('transf_addition_constant_0555')} - positive(w)")
+    own_ball(s, "transf_minimum_radius_06")
+    s.scale("transf_scale_015")
+
+
+@known(135, "Abox - Mod Kali V2", "Kali 2010, fractalforums.com: Kaliset")
+def abox_mod_kali_2(s: FormulaStep) -> None:
+    """Absolute values that are subtracted, and a ball with an outer radius."""
+    a = s.point("transf_addition_constant_0555")
+    if s.on("transf_function_enabledM"):
+        s.write(f"w = {a} - positive(w)")
+    else:
+        s.write(f"a, b, d = {a}", "x, y, z = w", "w = (a - absolute(x), b - absolute(y), z)")
+    fold_ball(s, None)
+    s.scale("transf_scale_015")
+    s.add("transf_addition_constant")
+    if s.on("transf_rotation_enabled") and s.during("transf_start_iterations", "transf_stop_iterations"):
+        s.turn("transf_rotation")
+    s.add("transf_addition_constant")
+    if s.during("transf_start_iterations_C", "transf_stop_iterations_C"):
+        s.refuse("transf_addCpixel_enabled_false")
+    if s.during("transf_start_iterations_D", "transf_stop_iterations_D"):
+        s.refuse("transf_function_enabledS_false")
+
+
+@known(136, "Abox - Mod Kali V3", "Kali 2010, fractalforums.com: Kaliset", LEFT_OUT)
+def abox_mod_kali_3(s: FormulaStep) -> None:
+    """Absolute values that are subtracted, and a ball turned about."""
+    if s.during("transf_start_iterations_A", "transf_stop_iterations_15"):
+        s.write(f"w = {s.point('transf_offset_111')} - positive(w)")
+    own_ball(s)
+    s.write(f"w = -{s.number('transf_scale_015')} * w")
+    if s.during("transf_start_iterations_B", "transf_stop_iterations_B"):
+        s.add("transf_offsetA_111")
+
+
+@known(64, "Abox - Mod 1", "DarkBeam 2010, fractalforums.com", SWAPPED)
+def abox_mod_1(s: FormulaStep) -> None:
+    """Folds about a point, a ball, and a scale that varies."""
+    scale = vary_scale(s)
+    if s.during("transf_start_iterations_K", "transf_stop_iterations_K"):
+        s.refuse("transf_function_enabled_false")
+    v, k = s.number("mandelbox_folding_value"), s.number("transf_scale_1")
+    parts = []
+    for p, a in zip("xyz", s.vector("transf_addition_constant"), strict=True):
+        own = s.parameter(f"transf_addition_constant_{p}", a)
+        most = f"{v} * {k}" if p == "z" else v
+        parts.append(f"{most} - absolute(absolute({p} + {own}) - {most}) - absolute({own})")
+    if not s.on("transf_function_enabledz"):
+        parts[2] = "z"
+    s.write("x, y, z = w", f"w = ({', '.join(parts)})")
+    s.ball(s.value("transf_minimum_radius_0"), s.value("transf_maxR2_1"))
+    scale_by(s, scale)
+    if s.on("transf_addCpixel_enabled_false") and s.during(
+        "transf_start_iterations_E", "transf_stop_iterations_E"
+    ):
+        s.add_constant(
+            "mandelbulbMulti_order_of_xyz", "transf_constant_multiplier_111", "transf_alternate_enabled_false"
+        )
+    if s.on("transf_rotation_enabled") and s.during("transf_start_iterations_R", "transf_stop_iterations_R"):
+        s.turn("transf_rotation")
+
+
+@known(73, "Amazing Surf", "Kali 2011, fractalforums.com", SWAPPED)
+def amazing_surf(s: FormulaStep) -> None:
+    """Folds along x and y, a ball, and a scale that varies."""
+    scale = vary_scale(s)
+    s.refuse("transf_function_enabled_false")
+    s.fold_flat("transf_addition_constant_111")
+    share, inner = s.value("transf_scale_1"), math.sqrt(max(s.value("transf_minimum_radius_05"), 0.0))
+    if share == 1:
+        s.ball(inner, 1.0)
+        scale_by(s, scale)
+    else:
+        a, b, m = s.parameter("scale", scale), s.number("transf_scale_1"), s.parameter("inner", inner)
+        s.write("x, y, z = w", "s = x * x + y * y + z * z", f"s = where(s < {m}, {m}, minimum(s, 1))")
+        s.write(f"w = (({a} / s - 1) * {b} + 1) * w")
+    if s.on("transf_addCpixel_enabled_false"):
+        add_swapped(s)
+    s.turn("transf_rotation")
+
+
+@known(76, "Abox - VS Icen1", "Icen 2011, fractalforums.com", LEFT_OUT)
+def abox_icen(s: FormulaStep) -> None:
+    """A Mandelbox with additions before and after the ball."""
+    scale = vary_scale(s)
+    s.fold("transf_addition_constant_111")
+    m, j = s.point("transf_constant_multiplier_111"), s.point("transf_constant_julia_c")
+    s.write(f"mx, my, mz = {m}", "cx, cy, cz = c", "t = (mx * cx, my * cy, mz * cz)")
+    own = s.on("transf_constant_julia_mode")
+    s.write("w = w + t" if own else f"w = w + {j}")
+    mandelbox_ball(s, None)
+    scale_by(s, scale)
+    if s.on("transf_rotation_enabled") and s.during("transf_start_iterations", "transf_stop_iterations"):
+        s.turn("transf_rotation")
+    s.write("cx, cy, cz = c", "t = (mx * cx, my * cy, mz * cz)", f"w = w {'-' if own else '+'} t + {j}")
+
+
+@known(127, "Abox - Mod 13", "Sandercoe after Lowe 2010, fractalforums.org")
+def abox_mod_13(s: FormulaStep) -> None:
+    """A Mandelbox with a box of three sizes, and a vector that is added in some iterations."""
+    if s.during("transf_start_iterations_E", "transf_stop_iterations_E"):
+        s.refuse("transf_function_enabledAz_false")
+    if s.during("transf_start_iterations_A", "transf_stop_iterations_A"):
+        if s.on("transf_function_enabled"):
+            s.fold("transf_addition_constant_111")
+        else:
+            s.fold_flat("transf_addition_constant_111")
+    if s.during("transf_start_iterations_D", "transf_stop_iterations_D1"):
+        s.refuse("transf_function_enabled_false")
+    swap(s, "transf_function_enabledSw_false", "(z, y, x)")
+    if s.during("transf_start_iterations_S", "transf_stop_iterations_S"):
+        fold_ball(s, "mandelbox_offset")
+    vary = s.on("transf_function_enabledX_false") and s.during(
+        "transf_start_iterations_X", "transf_stop_iterations_X"
+    )
+    added = s.state.get("added", 0.0)
+    scale = add_vary(s, "mandelbox_scale", "transf_scaleB_1", vary, s.on("transf_function_enabledM_false"))
+    scale_by(s, scale if vary else scale - added)
+    if s.during("transf_start_iterations_B", "transf_stop_iterations_B"):
+        s.refuse("transf_function_enabledAx_false")
+        s.add("transf_addition_constant")
+    if s.on("transf_addCpixel_enabled_false") and s.during(
+        "transf_start_iterations_C", "transf_stop_iterations_C"
+    ):
+        s.add_constant(
+            "mandelbulbMulti_order_of_xyz", "transf_constant_multiplier_111", "transf_alternate_enabled_false"
+        )
+    if s.on("transf_rotation_enabled") and s.during("transf_start_iterations_R", "transf_stop_iterations_R"):
+        s.turn("transf_rotation")
+
+
+@known(59, "Fold Box - Mod 1", "Lowe 2010, fractalforums.com")
+def fold_box_mod_1(s: FormulaStep) -> None:
+    """A Mandelbox whose fold is a difference of two absolute values, each with its own limit."""
+    if s.during("transf_start_iterations", "transf_stop_iterations"):
+        absolute_fold(s)
+    if s.during("transf_start_iterations_A", "transf_stop_iterations_A"):
+        s.refuse("transf_function_enabled_false")
+    if s.during("transf_start_iterations_B", "transf_stop_iterations_B"):
+        mandelbox_ball(s, None)
+    if s.during("transf_start_iterations_D", "transf_stop_iterations_D"):
+        s.refuse("transf_function_enabledX_false")
+    s.scale("mandelbox_scale")
+    if s.on("mandelbox_main_rotation_enabled") and s.during(
+        "transf_start_iterations_C", "transf_stop_iterations_C"
+    ):
+        s.turn("mandelbox_rotation_main")
+
+
+def absolute_fold(s: FormulaStep) -> None:
+    """|x + a| - |x - b| - k x, without the terms whose switches are off."""
+    columns = (
+        s.vector(f"transf_{name}_111") for name in ("addition_constant", "addition_constantA", "scale3D")
+    )
+    parts = []
+    for p, a, b, k in zip("xyz", *columns, strict=True):
+        one = f"absolute({p} + {s.parameter(f'a_{p}', a)})" if s.on(f"transf_function_enabled{p}") else "0"
+        two = f"absolute({p} - {s.parameter(f'b_{p}', b)})" if s.on(f"transf_function_enabledA{p}") else "0"
+        parts.append(f"{one} - {two} - {s.parameter(f'k_{p}', k)} * {p}")
+    s.write("x, y, z = w", f"w = ({', '.join(parts)})")
+
+
+@known(91, "Mandelbox - Menger", "Lowe 2010 and Menger 1926")
+def mandelbox_menger(s: FormulaStep) -> None:
+    """A Mandelbox and a sponge in each step."""
+    s.refuse(
+        "mandelbox_rotations_enabled", "transf_addCpixel_enabled_false", "transf_function_enabledx_false"
+    )
+    if s.during("transf_start_iterations_A", "transf_stop_iterations_A"):
+        if s.value("transf_scale_1") != 1:
+            raise UnknownError(f"{s.values.place('transf_scale_1')}: transf_scale_1")
+        s.fold_apart("mandelbox_folding_limit", "mandelbox_folding_value")
+    if s.during("transf_start_iterations_B", "transf_stop_iterations_B"):
+        mandelbox_ball(s, "mandelbox_offset")
+    if s.on("mandelbox_main_rotation_enabled") and s.during(
+        "transf_start_iterations_R", "transf_stop_iterations_R"
+    ):
+        s.turn("mandelbox_rotation_main")
+    if s.during("transf_start_iterations_S", "transf_stop_iterations_S"):
+        s.scale("mandelbox_scale")
+    if s.on("transf_function_enabled") and s.during("transf_start_iterations_M", "transf_stop_iterations_M"):
+        for _ in range(min(s.values.whole("transf_int_1"), 4)):
+            s.write("w = positive(w)")
+            s.menger("transf_scale_3", "transf_constant_multiplierA_111")
+    s.add("transf_addition_constantA_000")
+
+
+@known(198, "Mandalay Box V1", "Knighty and DarkBeam 2015, fractalforums.com")
+def mandalay_box(s: FormulaStep) -> None:
+    """A Mandalay fold, a ball and a scale."""
+    if s.on("transf_function_enabledA_false"):
+        s.fold("transf_addition_constant_111")
+    mandalay(s, s.on("transf_function_enabledSw_false"))
+    s.ball(s.value("transf_minR2_p25"), 1.0)
+    s.scale("transf_scale_2")
+    s.turn("transf_rotation")
+
+
+@known(221, "Amazing Surf - Klein", "Kali 2011, fractalforums.com", LEFT_OUT)
+def amazing_surf_klein(s: FormulaStep) -> None:
+    """An Amazing Surf for some iterations, then a box and a scale."""
+    inversion(s, "transf_start_iterations_X", "transf_stop_iterations_1")
+    if s.index >= s.values.whole("transf_int8_X"):
+        if s.on("transf_function_enabled"):
+            s.fold("transf_offset_110")
+        s.scale("transf_scale_2")
+        s.add("transf_offsetA_000")
+        return
+    s.fold_flat("transf_addition_constant_111")
+    swap(s, "transf_function_enabledSw_false", "(y, x, z)")
+    if s.on("transf_function_enabledJ_false"):
+        z = s.parameter("transf_addition_constant_111_z", s.vector("transf_addition_constant_111")[2])
+        s.write(f"w = fold_to(w, (1e6, 1e6, {z}))")
+    swap(s, "transf_function_enabledCz", "(x, z, y)")
+    own_ball(s)
+    scale_by(
+        s, add_vary(s, "transf_scale_1", "transf_scaleC_1", s.on("transf_function_enabledK_false"), False)
+    )
+    if s.on("transf_rotation2_enabled_false"):
+        s.turn("transf_rotation")
+    s.add("transf_addition_constantA_000")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from .folds import PI
-from .step_text import FormulaStep, known
+from .folds import PI, absolute, sector, symmetric
+from .step_text import LEFT_OUT, OWN, FormulaStep, known
 
 NYLANDER = "White and Nylander 2009, fractalforums.com"
 
@@ -64,3 +64,133 @@ def bristorbrot(s: FormulaStep) -> None:
     """The Bristorbrot."""
     s.replace("bristorbrot")
     s.write("x, y, z = w", "w = (x * x - y * y - z * z, y * (2 * x - z), z * (2 * x + y))")
+
+
+@known(20, "Benesi", "Benesi 2010, fractalforums.com")
+def benesi(s: FormulaStep) -> None:
+    """A square about the x axis, whose sign of x depends on the side of a cone and of the start point."""
+    side = "0.1" if s.on("transf_function_enabledE_false") else "cx"
+    s.write(
+        f"ox, oy, oz = {s.point('transf_offset_000')}",
+        "cx, cy, cz = c",
+        "x, y, z = w",
+        "s = maximum(y * y + z * z, 1e-30)",
+        "r = sqrt(s)",
+        "u = x * x - s + ox",
+        f"u = where({side} < 0, u, where(x < r, u, -u))",
+        "k = -2 * absolute(x) / r",
+        "w = (u, k * (y * y - z * z) + oy, 2 * k * y * z + oz)",
+    )
+
+
+@known(66, "Benesi Pine Tree", "Benesi 2010, fractalforums.com", OWN)
+def benesi_pine_tree(s: FormulaStep) -> None:
+    """A square about the x axis; the start point is added with y and z swapped, each with a factor."""
+    s.write(
+        f"kx, ky, kz = {s.point('transf_constant_multiplier_100')}",
+        "cx, cy, cz = c",
+        "x, y, z = w",
+        "s = maximum(y * y + z * z, 1e-30)",
+        "k = 2 * x / sqrt(s)",
+        "w = (x * x - s + kx * cx, 2 * k * y * z + kz * cz, k * (y * y - z * z) + ky * cy)",
+    )
+    if s.value("transf_angle_0"):
+        s.write(f"w = turn(w, (1, 0, 0), -{s.number('transf_angle_0')})")
+
+
+@known(137, "Mandelbulb Abs Power 2", NYLANDER)
+def mandelbulb_abs_2(s: FormulaStep) -> None:
+    """The square with absolute values before and after, and turns."""
+    if s.on("transf_rotation_enabled") and s.during("transf_start_iterations_R", "transf_stop_iterations_R"):
+        s.turn("transf_rotation")
+    if s.on("transf_function_enabledD_false") and s.during(
+        "transf_start_iterations_D", "transf_stop_iterations_D"
+    ):
+        s.add("transf_offsetA_000")
+    absolute(s, *(f"buffalo_preabs_{axis}" for axis in "xyz"))
+    s.square()
+    if s.on("buffalo_pos_z"):
+        s.write("x, y, z = w", "w = (x, y, -z)")
+    absolute(s, *(f"buffalo_abs_{axis}" for axis in "xyz"))
+    if s.on("transf_function_enabledM") and s.during("transf_start_iterations_M", "transf_stop_iterations_M"):
+        s.add("transf_offset_000")
+    if s.on("transf_function_enabled") and s.during("transf_start_iterations_S", "transf_stop_iterations_S"):
+        s.turn("mandelbox_rotation_main")
+    if s.during("transf_start_iterations_E", "transf_stop_iterations_E"):
+        s.refuse("transf_addCpixel_enabled_false")
+    if s.during("transf_start_iterations_H", "transf_stop_iterations_H"):
+        s.refuse("transf_function_enabledP_false")
+
+
+@known(229, "Mandelnest", "Mermelada 2020, fractalforums.org")
+def mandelnest(s: FormulaStep) -> None:
+    """Cosines of multiples of the angles to the three axes, made as long as a power of the radius."""
+    s.refuse("transf_function_enabled_false")
+    n, shift = s.number("power"), s.number("transf_offset_0")
+    s.write("x, y, z = w", "s = maximum(x * x + y * y + z * z, 1e-30)")
+    for p in "xyz":
+        s.write(f"u{p} = cos({PI} * {shift} + {n} * atan2(sqrt(maximum(s - {p} * {p}, 1e-30)), {p}))")
+    s.write(f"r = exp(0.5 * ({n} - {s.number('transf_offset_1')}) * log(s))")
+    if not s.on("transf_function_enabledA_false"):
+        s.write("r = r / sqrt(maximum(ux * ux + uy * uy + uz * uz, 1e-30))")
+    s.write("w = (r * ux, r * uy, r * uz)")
+    if s.during("transf_start_iterations_S", "transf_stop_iterations_S"):
+        s.add("transf_offsetF_000")
+
+
+@known(244, "Msltoe Sym4 - Mod 1", "Msltoe 2010, fractalforums.com", LEFT_OUT)
+def msltoe_sym_4(s: FormulaStep) -> None:
+    """Reflections, a polygon's fold about x, a square, and an offset along the radius."""
+    if s.during("transf_start_iterations_K", "transf_stop_iterations_K"):
+        symmetric(s)
+    n = s.values.whole("transf_int8_Y")
+    if s.on("transf_function_enabledB_false") and s.during(
+        "transf_start_iterations_B", "transf_stop_iterations_B"
+    ):
+        n += s.values.whole("transf_int_1")
+    sector(s, "yz", s.parameter("transf_int8_Y", max(n, 1)), PI)
+    a, b = s.number("transf_scaleB_1"), s.number("transf_scale")
+    s.write(
+        "x, y, z = w",
+        "s = maximum(x * x + y * y, 1e-30)",
+        "m = 1 - z * z / maximum(s + z * z, 1e-30)",
+        f"w = ((x * x - y * y) * m * {a}, 2 * x * y * m * {b}, 2 * z * sqrt(s))",
+    )
+    s.add("transf_addition_constant_neg100")
+    if s.during("transf_start_iterations_C", "transf_stop_iterations_C"):
+        s.refuse("transf_addCpixel_enabled_false")
+    if s.value("transf_offset"):
+        s.write("x, y, z = w", "r = sqrt(maximum(x * x + y * y + z * z, 1e-30))")
+        s.write(f"w = (1 - {s.number('transf_offset')} / r) * w")
+    s.scale("transf_scale_1")
+
+
+@known(266, "Mandelbulb - Pupuku", "Pupukuusikko 2021, fractalforums.org")
+def pupuku(s: FormulaStep) -> None:
+    """The Mandelbulb with factors of its angles and of their sines and cosines."""
+    s.refuse("transf_function_enabledC_false", "transf_function_enabledBz_false")
+    if s.on("transf_function_enabledP_false") and s.during(
+        "transf_start_iterations_P", "transf_stop_iterations_P"
+    ):
+        absolute(s, *(f"transf_function_enabledC{axis}_false" for axis in "xyz"))
+        s.add("transf_offsetA_000")
+    n, a, b = s.number("power"), s.number("transf_scaleA_1"), s.number("transf_scaleB_1")
+    own = "sqrt(s), z" if s.on("transf_function_enabledSw_false") else "z, sqrt(s)"
+    s.write("x, y, z = w", "s = maximum(x * x + y * y, 1e-30)")
+    s.write(f"t = {n} * {a} * (atan2({own}){offset(s, 'beta_angle_offset')})")
+    s.write(f"p = {n} * {b} * (atan2(y, x){offset(s, 'alpha_angle_offset')})")
+    if s.on("transf_function_enabledX_false") and s.during(
+        "transf_start_iterations_X", "transf_stop_iterations_X"
+    ):
+        s.write(f"p = p + where(cos(t) < 0, {PI}, 0)")
+    sine, cosine = ("cos(t)", "sin(t)") if s.on("transf_function_enabledD_false") else ("sin(t)", "cos(t)")
+    s.write(f"u = {cosine}", f"r = exp(0.5 * ({n} - {s.number('transf_offset_1')} + 1) * log(s + z * z))")
+    parts = ["u", "u"]
+    for k, (letter, name) in enumerate((("B", "transf_scaleB_0"), ("A", "transf_scaleA_0"))):
+        now = s.during(f"transf_start_iterations_{letter}", f"transf_stop_iterations_{letter}")
+        if s.on(f"transf_function_enabled{letter}_false") and now:
+            parts[k] = f"(1 + (u - 1) * {s.number(name)})"
+    s.write(f"w = (r * {parts[0]} * cos(p), r * {parts[1]} * sin(p), r * {sine})")
+    s.add("transf_offset_000")
+    if s.during("transf_start_iterations_S", "transf_stop_iterations_S"):
+        s.scale("transf_scaleC_1")

@@ -18,7 +18,17 @@ from ...fields.definitions import Definition, formula
 from ...fields.orbits import REPEAT
 from ...formulas import Node, get
 from .settings import FRACTALS, Settings, SettingsSection, Triple
-from .step_text import ADDED, FORMULAS, LEFT_OUT, Element, FormulaStep, KnownFormula, UnknownError
+from .step_text import (
+    ADDED,
+    FORMULAS,
+    LEFT_OUT,
+    OWN,
+    SWAPPED,
+    Element,
+    FormulaStep,
+    KnownFormula,
+    UnknownError,
+)
 
 NEVER = 250
 """Iterations of a file that does not limit them, and the last one of a formula that does not stop."""
@@ -87,7 +97,7 @@ def slot(settings: Settings, place: int, hybrid: bool) -> Slot | None:
     (e, begin), (f, end) = where("formula_start_iteration"), where("formula_stop_iteration")
     switched = a.flag(stay, "false")
     constant = known.constant if known else ADDED
-    adds = constant != "own" and switched == (constant == LEFT_OUT)
+    adds = constant != OWN and switched == (constant == LEFT_OUT)
     return Slot(
         place,
         number,
@@ -150,7 +160,7 @@ def one(orbit: Orbit, slot: Slot, index: int, state: dict[str, float], even: boo
     if slot.weight < 1:
         step.lines.insert(0, "start = w")
     if slot.adds:
-        constant(step, orbit)
+        constant(step, orbit, slot.known.constant == SWAPPED)
     if slot.weight < 1:
         share = step.parameter("formula_weight", slot.weight)
         step.write(f"w = {share} * w + (1 - {share}) * start")
@@ -158,11 +168,15 @@ def one(orbit: Orbit, slot: Slot, index: int, state: dict[str, float], even: boo
     return "\n".join(step.lines), tuple(step.parameters.items()), element, slot.place
 
 
-def constant(step: FormulaStep, orbit: Orbit) -> None:
-    """Add the constant of a Julia set, or the start point, times a factor."""
+def constant(step: FormulaStep, orbit: Orbit, swapped: bool) -> None:
+    """Add the constant of a Julia set, or the start point, times a factor; x and y may be swapped."""
     if orbit.julia is not None:
         x, y, z = (a * b for a, b in zip(orbit.julia, orbit.factor, strict=True))
+        x, y = (y, x) if swapped else (x, y)
         step.write(f"w = w + {step.parameter('julia_c', (x, y, z))}")
+    elif swapped:
+        own = step.parameter("fractal_constant_factor", orbit.factor)
+        step.write(f"fx, fy, fz = {own}", "cx, cy, cz = c", "w = w + (fx * cy, fy * cx, fz * cz)")
     elif orbit.factor == (1, 1, 1):
         step.write("w = w + c")
     else:

@@ -254,3 +254,69 @@ def koch_options(s: FormulaStep) -> None:
 def koch_ifs(s: FormulaStep) -> None:
     """The snowflake's folds, with the radius for its field."""
     koch(s)
+
+
+@known(114, "Menger Smooth - Mod 1", "Knighty 2010 and Eiffie 2012, fractalforums.com", LEFT_OUT)
+def menger_smooth_mod_1(s: FormulaStep) -> None:
+    """A sponge whose folds are round, each by its own measure."""
+    if s.on("transf_function_enabled"):
+        a = s.number("transf_offset_0")
+        s.write("x, y, z = w", *(f"{p} = sqrt({p} * {p} + {a})" for p in "xyz"), "w = (x, y, z)")
+    if s.on("transf_function_enabledF_false"):
+        t = s.number("transf_offset")
+        s.write(f"w = positive(w) + ({t}, {t}, {t})")
+    e, k, m = (
+        s.number("transf_offset_0005"),
+        s.number("transf_scale_05"),
+        s.point("transf_constant_multiplier_111"),
+    )
+    s.write(f"mx, my, mz = {m}", "x, y, z = w")
+    for p, q, of in (("x", "y", "mx"), ("x", "z", "my"), ("y", "z", "mz")):
+        s.write(
+            f"t = {p} - {q}", f"t = {k} * (t - sqrt(t * t + {e} * {of}))", f"{p} = {p} - t", f"{q} = {q} + t"
+        )
+    x, y, z = s.vector("transf_constant_multiplier_221")
+    a, b = (
+        s.parameter("transf_constant_multiplier_221_x", x),
+        s.parameter("transf_constant_multiplier_221_y", y),
+    )
+    third, scale = s.parameter("third", z / 3), s.number("transf_scale_3")
+    s.write(f"z = z - {third}", f"z = {third} - sqrt(z * z + {e} + {s.number('transf_offsetA_0')})")
+    s.write(f"w = ({scale} * x - {a}, {scale} * y - {b}, {scale} * z)")
+    if s.on("transf_rotation_enabled") and s.during("transf_start_iterations_R", "transf_stop_iterations_R"):
+        s.turn("transf_rotation")
+    if s.on("transf_function_enabledx_false") and s.during(
+        "transf_start_iterations_A", "transf_stop_iterations_A"
+    ):
+        box_offset(s, "transf_addition_constantA_000")
+    weigh(s, "transf_function_enabledz_false", "transf_offsetA_0", "transf_offsetB_0")
+
+
+SLOPE = "0.8660254037844386"
+"""sqrt(3) / 2."""
+
+
+@known(98, "Menger Cross KIFS", "Knighty 2010, fractalforums.com", LEFT_OUT)
+def menger_cross(s: FormulaStep) -> None:
+    """Reflections of a prism's cross, a scale and an offset."""
+    if s.during("transf_start_iterations", "transf_stop_iterations_1"):
+        s.refuse("transf_function_enabled_false")
+    if not (
+        s.on("transf_function_enabled") and s.during("transf_start_iterations_A", "transf_stop_iterations_A")
+    ):
+        return
+    absolute_of(s, [s.on("transf_function_enabledz_false"), True, True])
+    s.write(f"w = mirror(w, ({SLOPE}, -0.5, 0))", "w = mirror(w, (0, 1, 0))", "w = mirror(w, (0, -1, 1))")
+    s.write("w = mirror(w - (0, 0.5, 0), (0, 1, 0)) + (0, 0.5, 0)")
+    if s.on("transf_function_enabledx_false"):
+        s.write(f"w = {s.point('transf_offset_222')} - w")
+    k = s.number("transf_scale_3")
+    s.write(f"w = {k} * w - ({k} - 1) * ({SLOPE}, 1.5, 1.5)")
+    s.add("transf_offset_000")
+    if s.on("transf_function_enabledP_false"):
+        a, b = s.number("transf_offset"), s.number("transf_offset_0")
+        s.write("x, y, z = w", f"w = (absolute(x + {a}) + {b}, y, z)")
+    if s.on("transf_function_enabledR_false") and s.during(
+        "transf_start_iterations_R", "transf_stop_iterations_R"
+    ):
+        s.turn("transf_rotation2")

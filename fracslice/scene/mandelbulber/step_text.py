@@ -17,9 +17,10 @@ from .settings import SettingsSection, Triple
 
 X, Y, Z = "(1, 0, 0)", "(0, 1, 0)", "(0, 0, 1)"
 
-ADDED, LEFT_OUT, OWN = "added", "left out", "own"
+ADDED, LEFT_OUT, OWN, SWAPPED = "added", "left out", "own", "swapped"
 """What becomes of the constant after a formula: it is added unless the file says not to, it is added only if
-the file says so, or the formula has taken it itself.
+the file says so, the formula has taken it itself, or it is added with x and y swapped unless the file says
+not to.
 """
 
 ORDERS = ("xyz", "xzy", "yxz", "yzx", "zxy", "zyx")

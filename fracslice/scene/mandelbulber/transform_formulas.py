@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .folds import PI, absolute, absolute_of, polygon
+from .folds import PI, absolute, absolute_of, mandalay, polygon, symmetric
 from .sponge_formulas import box_offset
 from .step_text import LEFT_OUT, ORDERS, FormulaStep, known
 
@@ -294,27 +294,10 @@ def scale_offset(s: FormulaStep) -> None:
     s.add("transf_addition_constant")
 
 
-MANDALAY = (("x", "y", "z"), ("y", "z", "x"), ("z", "x", "y"))
-"""Order of the coordinates in each of the three parts of a Mandalay fold."""
-
-
 @known(1108, "T>Mandalay Fold V1", "Knighty and DarkBeam 2015, fractalforums.com", LEFT_OUT)
 def mandalay_fold(s: FormulaStep) -> None:
     """Fold of the absolute coordinates along each axis, where the others sort in a gap."""
     mandalay(s, s.on("transf_function_enabledSw_false"))
-
-
-def mandalay(s: FormulaStep, serial: bool) -> None:
-    """Folds of a Mandalay box; serial ones take the coordinates of those before."""
-    f, g = s.point("transf_addition_constant_0555"), s.point("transf_offsetA_000")
-    s.write(f"fx, fy, fz = {f}", f"gx, gy, gz = {g}", "x, y, z = w")
-    s.write("ax, ay, az = absolute(x), absolute(y), absolute(z)", "qx, qy, qz = ax, ay, az")
-    for p, q, r in MANDALAY:
-        a = "q" if serial else "a"
-        s.write(f"u, v = {a}{p}, maximum({a}{q}, {a}{r})")
-        s.write(f"t, m = u - 2 * f{p}, v - 4 * f{p}", f"m = maximum(absolute(t + f{p}) - f{p}, m)")
-        s.write(f"q{p} = minimum(minimum(m, maximum(t - g{p}, v)), u)")
-    s.write(*(f"{p} = where({p} < 0, -q{p}, q{p})" for p in "xyz"), "w = (x, y, z)")
 
 
 @known(1129, "T>Rotation M3D", MANDELBULBER, LEFT_OUT)
@@ -343,15 +326,7 @@ def abs_sym_3(s: FormulaStep) -> None:
         absolute(s, *(f"transf_function_enabled{axis}" for axis in "xyz"))
         s.add("transf_offset_000")
     if s.during("transf_start_iterations_K", "transf_stop_iterations_K"):
-        absolute(s, *(f"transf_function_enabledB{axis}" for axis in "xyz"))
-        shares = dict(zip("xyz", s.vector("transf_addition_constant_0555"), strict=True))
-        planes = (("x", "x", "z"), ("y", "x", "y"), ("z", "y", "z"))
-        for name, first, second in planes:
-            if s.on(f"transf_function_enabledA{name}"):
-                k = s.parameter(f"transf_addition_constant_0555_{name}", shares[name])
-                s.write("x, y, z = w", f"t = 2 * {k} * minimum({first} - {second}, 0)")
-                s.write(f"{first} = {first} - t", f"{second} = {second} + t", "w = (x, y, z)")
-        s.add("transf_offsetA_000")
+        symmetric(s)
     if s.on("transf_function_enabledB_false") and s.during(
         "transf_start_iterations_B", "transf_stop_iterations_B"
     ):
