@@ -36,7 +36,7 @@ NEVER = 250
 DEEP = 24
 """Most iterations that stand in a scene as in the file; more are automatic."""
 
-UNROLLED = 10
+UNROLLED = 6
 """Most iterations of an orbit whose steps do not recur."""
 
 LONGEST = 32

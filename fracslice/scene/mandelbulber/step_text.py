@@ -195,8 +195,8 @@ class FormulaStep:
             "x, y, z = w",
             "s = maximum(x * x + y * y, 1e-30)",
             "r = sqrt(s)",
-            "t = 1 - z * z / s",
-            f"w = ((x * x - y * y) * t, 2 * x * y * t, {last})",
+            "t = s - z * z",
+            f"w = (t * (1 - 2 * y * y / s), t * 2 * x * y / s, {last})",
         )
 
     def sort(self) -> None:
