@@ -15,13 +15,14 @@ from fracslice.fields.orbits import growth_of, steps
 from fracslice.formulas import Node
 from fracslice.scene import reads, to_xml
 from fracslice.scene.mandelbulber import import_scene
-from fracslice.scene.mandelbulber.importer import orbit_of
+from fracslice.scene.mandelbulber.objects import orbits
 from fracslice.scene.mandelbulber.sequences import definition, element, order, steps_of
 from fracslice.scene.mandelbulber.settings import SettingsSection, default_of, parse_settings
 from fracslice.scene.mandelbulber.step_text import ADDED, FORMULAS, SWAPPED
 from tests.examples import stamped
 
 from .mandelbulber_oracle import FORMULAS as ORACLE
+from .mandelbulber_oracle import rotation as oracle_rotation
 
 HEADER = "# Mandelbulber settings file\n# version 2.33\n# only modified parameters\n"
 
@@ -117,7 +118,7 @@ def lines(values: str) -> str:
 
 def orbit_nodes(source: str) -> list[Node]:
     """Element of each iteration."""
-    orbit = orbit_of(parse_settings(source, "x.fract"))
+    orbit = orbits(parse_settings(source, "x.fract"))[0]
     return [element(orbit, s, definition(orbit, s, f"t{k}", 0, 1)) for k, s in enumerate(steps_of(orbit))]
 
 
@@ -235,7 +236,7 @@ def test_formulas_are_taken_in_turn_within_their_iterations() -> None:
         "hybrid_fractal_enable true; formula_1 8; formula_2 7; formula_3 1002; formula_iterations_1 2; "
         "formula_start_iteration_2 4; formula_stop_iteration_3 5; repeat_from 2"
     )
-    orbit = orbit_of(parse_settings(source, "x"))
+    orbit = orbits(parse_settings(source, "x"))[0]
     assert [s.number for s in order(orbit.slots, 2, 9)] == [8, 8, 1002, 1002, 7, 1002, 7, 7, 7]
 
 
@@ -361,3 +362,24 @@ def test_mutated_files_are_imported_or_refused(tmp_path: Path, count: int) -> No
     for _ in range(count):
         path.write_bytes(mutated(source, rng))
         assert "\n" not in refusal(path, str(path))
+
+
+def test_objects_are_placed_and_joined(tmp_path: Path) -> None:
+    """A fractal less another that is turned, scaled and moved, united with primitives in their places."""
+    source = text(
+        "boolean_operators true; N 3; formula_1 5; formula_2 5; boolean_operator_1 2; "
+        "formula_position_2 0.5 0.1 0; formula_rotation_2 10 20 30; formula_scale_2 0.5; "
+        "primitive_box_1_enabled true; primitive_box_1_position 2 0 0; primitive_box_1_rotation 0 0 45; "
+        "primitive_box_1_size 1 0.5 0.2; primitive_water_1_enabled true"
+    )
+    made = imported(tmp_path, source)
+    assert made.scene.root.formula.name == "union"
+    assert "primitive_water_1: left out" in made.notes[0]
+    first, second = made.scene.root.children[0].children
+    points = np.random.default_rng(1).uniform(-1, 1, (3, 400))
+    turned = oracle_rotation((10, 20, 30)) @ (points - [[0.5], [0.1], [0]]) / 0.5
+    inside = second.distance(points.T) < 0
+    assert (inside == (first.distance(turned.T) < 0)).all() and inside.any()
+    corner = np.array([2 + 0.45 * np.cos(np.pi / 4), -0.45 * np.sin(np.pi / 4), 0.05])
+    box = made.scene.root.children[1]
+    assert box.distance(corner[None])[0] < 0 < box.distance((corner * [1, -1, 1])[None])[0]

@@ -12,8 +12,8 @@ from ...errors import KernelError, SceneError
 from ...formulas import Node, get
 from ..model import Scene, scene
 from . import appearance
-from .names import NAMES
-from .sequences import Orbit, Slot, hybrid_slots, nodes, steps_of
+from .objects import orbits, solid
+from .sequences import Orbit, Slot, steps_of
 from .settings import Settings, read_settings
 from .step_text import UnknownError
 
@@ -75,7 +75,7 @@ def import_scene(path: str | os.PathLike[str], leave_out: bool = False) -> Impor
     """
     settings = read_settings(path)
     try:
-        return _imported(settings, orbit_of(settings, leave_out))
+        return _imported(settings, orbits(settings, leave_out))
     except UnknownError as error:
         raise SceneError(f"{error}: this variant is not known here") from None
     except (SceneError, KernelError) as error:
@@ -85,51 +85,27 @@ def import_scene(path: str | os.PathLike[str], leave_out: bool = False) -> Impor
         ) from None
 
 
-def _imported(settings: Settings, orbit: Orbit) -> Imported:
+def _imported(settings: Settings, made: list[Orbit]) -> Imported:
     """Scene of settings; its errors may lack the name of the file."""
-    node = appearance.material(_clipped(nodes(orbit), settings), settings, 1, orbit.slots[0].number)
+    node = _clipped(solid(settings, made), settings)
     name = printable(Path(settings.path).stem)
-    made = scene(node, size="60mm", name=name, view=appearance.view(settings))
-    orbit.notes += [f"{settings.path}: section [{name}] is left out" for name in settings.others]
-    known = tuple(dict.fromkeys(s.known.name for s in orbit.slots if s.known))
-    return Imported(
-        made, known, tuple(orbit.missing), tuple(orbit.notes), tuple(_ignored(settings, orbit.slots))
-    )
+    seen = scene(node, size="60mm", name=name, view=appearance.view(settings))
+    slots = [slot for orbit in made for slot in orbit.slots]
+    known = tuple(dict.fromkeys(slot.known.name for slot in slots if slot.known))
+    missing = tuple(line for orbit in made for line in orbit.missing)
+    notes = [line for orbit in made for line in orbit.notes]
+    notes += [f"{settings.path}: section [{name}] is left out" for name in settings.others]
+    return Imported(seen, known, missing, tuple(notes), tuple(_ignored(settings, slots)))
 
 
 def unknown(path: str | os.PathLike[str]) -> str | None:
     """Return the message about the first formula of a file, or variant of one, that is not known here."""
     try:
-        steps_of(orbit_of(read_settings(path), leave_out=False))
+        for orbit in orbits(read_settings(path)):
+            steps_of(orbit)
     except (SceneError, UnknownError) as error:
         return str(error)
     return None
-
-
-def orbit_of(settings: Settings, leave_out: bool = False) -> Orbit:
-    """Formulas of a file with what they share."""
-    main = settings.main
-    if main.flag("boolean_operators", "false"):
-        raise SceneError(f"{main.place('boolean_operators')}: boolean_operators true: expected false")
-    slots = hybrid_slots(settings)
-    if not slots:
-        raise SceneError(f"{settings.path}: expected at least one formula")
-    missing = [_named(s) for s in slots if s.known is None]
-    if missing and not leave_out:
-        raise SceneError(f"{missing[0]}: not known here; --leave-out imports the rest")
-    kept = [s for s in slots if s.known]
-    if not kept:
-        raise SceneError(f"{missing[0]}: not known here, and no other formula is left")
-    julia = main.vector("julia_c", "0 0 0") if main.flag("julia_mode", "false") else None
-    factor = main.vector("fractal_constant_factor", "1 1 1")
-    hybrid = main.flag("hybrid_fractal_enable", "false")
-    orbit = Orbit(settings, kept, hybrid, max(main.whole("N", "250"), 1), julia, factor)
-    orbit.missing += missing
-    return orbit
-
-
-def _named(s: Slot) -> str:
-    return f"{s.line}: formula_{s.place} {s.number} ({NAMES.get(s.number, 'no name')})"
 
 
 def _clipped(node: Node, settings: Settings) -> Node:

@@ -119,6 +119,12 @@ def hybrid_slots(settings: Settings) -> list[Slot]:
     return [found for place in places if (found := slot(settings, place, hybrid))]
 
 
+def all_slots(settings: Settings) -> list[Slot]:
+    """All formulas of a file that is no hybrid."""
+    places = range(1, FRACTALS + 1)
+    return [found for place in places if (found := slot(settings, place, False))]
+
+
 def order(slots: Sequence[Slot], repeat_from: int, count: int) -> list[Slot]:
     """Formula of each iteration; fewer than asked for where none is left."""
     taken: list[Slot] = []
