@@ -584,6 +584,80 @@ def pupuku(w: Points, c: Points, v: Values, _: int) -> Points:
     return v["transf_scaleC_1"] * (w + column(v["transf_offset_000"]))
 
 
+def abox_klein(w: Points, c: Points, v: Values, i: int) -> Points:
+    if i >= v["transf_stop_iterations_15"]:
+        return v["transf_scale_2"] * box(w, v["transf_offset_110"]) + column(v["transf_offsetA_000"])
+    w = ball(box(w, v["transf_addition_constant_111"]), v["transf_minimum_radius_0"], 1)
+    return v["transf_scale_1"] * w + column(v["transf_addition_constantA_000"])
+
+
+def mandalay_box_2(w: Points, c: Points, v: Values, i: int) -> Points:
+    return v["transf_scale_2"] * ball(mandalay(w, c, v, i), v["transf_minR2_p25"], v["transf_maxR2_1"])
+
+
+def polygon_mixed(w: Points, c: Points, v: Values, i: int) -> Points:
+    if i >= v["transf_stop_iterations_D1"]:
+        return w + column(v["transf_addition_constant"])
+    x, y, z = np.array([abs(w[0]), abs(w[1]), w[2]]) + column(v["transf_offset_000"])
+    k = np.pi / v["transf_int8_X"]
+    angle, r = abs(np.fmod(np.arctan2(y, x) + k, 2 * k) - k), np.hypot(x, y)
+    p, q = r * np.cos(angle), r * np.sin(angle)
+    mixed = [q + (p - q) * v["transf_scaleF_1"], p + (q - p) * v["transf_scaleG_1"], z]
+    return np.array(mixed) + column(v["transf_addition_constant"])
+
+
+def menger_fold_2(w: Points, c: Points, v: Values, _: int) -> Points:
+    w, o, scale = abs(w) + column(v["transf_offset_000"]), v["transf_offset_1105"], v["transf_scale_3"]
+    for k, (i, j) in enumerate(((0, 2), (0, 1), (1, 2))):
+        t = v["transf_addition_constant_0555"][k] * (w[i] - w[j] - abs(w[i] - w[j]))
+        w[i], w[j] = w[i] - t, w[j] + t
+    middle = o[2] * (scale - 1) / scale
+    w[2] = middle - abs(w[2] - middle)
+    return scale * w - column((o[0], o[1], 0)) * (scale - 1) + column(v["transf_addition_constantA_000"])
+
+
+def mandelbar(w: Points, c: Points, v: Values, _: int) -> Points:
+    x, y, z = w
+    m = 1 - z * z / (x * x + y * y)
+    w = np.array([-2 * x * y * m, (y * y - x * x) * m, 2 * z * np.hypot(x, y)])
+    return w * v["transf_scaleA_1"] if v["transf_function_enabledS_false"] else w
+
+
+def mandelnest_full(w: Points, c: Points, v: Values, _: int) -> Points:
+    r = np.sqrt(length2(w))
+    u = np.sin(v["power"] * np.arcsin(w / r))
+    u = u / np.sqrt(length2(u)) * r ** v["power"]
+    added = column(v["transf_offsetA_000"]) + c * column(v["transf_constant_multiplierA_111"])
+    return np.where(length2(u + added) < length2(added - u), u, -u) + added
+
+
+def kali_bulb(w: Points, c: Points, v: Values, _: int) -> Points:
+    r, n = np.sqrt(length2(w)), v["transf_pwr_8"]
+    t = n * v["transf_scaleA_1"] * (np.arccos(w[2] / r) + np.radians(v["beta_angle_offset"]))
+    p = np.arctan(w[1] / w[0]) + np.radians(v["alpha_angle_offset"])
+    w = r * np.array([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)])
+    t, p = np.arccos(w[2] / r), n * v["transf_scaleB_1"] * np.arctan(w[1] / w[0])
+    return r**n * np.array([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)])
+
+
+def moved_square(w: Points, c: Points, v: Values, _: int) -> Points:
+    r2, theta = length2(w), np.arctan2(w[2], np.hypot(w[0], w[1]))
+    phi = 2 * np.arctan2(w[1], w[0]) + np.pi
+    theta = 2 * theta + np.pi / 4 if v["transf_function_enabledB_false"] else theta + 1.5 * np.pi
+    x, y = r2 * np.sin(theta) * np.cos(phi), r2 * np.sin(theta) * np.sin(phi)
+    return np.array([x, y, r2 * np.cos(theta) * v["transf_scale_1"]]) + column(v["transf_offset_000"])
+
+
+def squares(w: Points, c: Points, v: Values, _: int) -> Points:
+    x, y, z = w
+    m = y * y / (x * x + z * z) - 1
+    x, y, z = 2 * x * z * m, 2 * y * np.hypot(x, z), (z * z - x * x) * m
+    if v["transf_function_enabledAz_false"]:
+        m = 1 - z * z / (x * x + y * y)
+        x, y, z = 2 * x * y * m, (y * y - x * x) * m, 2 * z * np.hypot(x, y)
+    return np.array([x, y, z])
+
+
 FORMULAS: dict[int, Formula] = {
     2: mandelbulb,
     3: mandelbulb_square,
@@ -660,4 +734,13 @@ FORMULAS: dict[int, Formula] = {
     229: mandelnest,
     244: msltoe_sym_4,
     266: pupuku,
+    222: abox_klein,
+    199: mandalay_box_2,
+    1140: polygon_mixed,
+    1145: menger_fold_2,
+    282: mandelbar,
+    259: mandelnest_full,
+    92: kali_bulb,
+    240: moved_square,
+    262: squares,
 }

@@ -624,3 +624,47 @@ def amazing_surf_klein(s: FormulaStep) -> None:
     if s.on("transf_rotation2_enabled_false"):
         s.turn("transf_rotation")
     s.add("transf_addition_constantA_000")
+
+
+@known(222, "Abox - Klein", "Lowe 2010 and Theli-at 2011, fractalforums.com", LEFT_OUT)
+def abox_klein(s: FormulaStep) -> None:
+    """A Mandelbox for some iterations, then a box and a scale."""
+    inversion(s, "transf_start_iterations_X", "transf_stop_iterations_1")
+    if s.index >= s.values.whole("transf_stop_iterations_15"):
+        if s.on("transf_function_enabled"):
+            s.fold("transf_offset_110")
+        s.scale("transf_scale_2")
+        s.add("transf_offsetA_000")
+        return
+    s.fold("transf_addition_constant_111")
+    swap(s, "transf_function_enabledSw_false", "(y, x, z)")
+    own_ball(s)
+    scale_by(
+        s, add_vary(s, "transf_scale_1", "transf_scaleC_1", s.on("transf_function_enabledK_false"), False)
+    )
+    if s.on("transf_rotation2_enabled_false"):
+        s.turn("transf_rotation")
+    s.add("transf_addition_constantA_000")
+
+
+@known(199, "Mandalay Box V2", "Knighty and DarkBeam 2015, fractalforums.com")
+def mandalay_box_2(s: FormulaStep) -> None:
+    """A box, a Mandalay fold, a ball and a scale, in their iterations."""
+    if s.on("transf_function_enabledA_false") and s.during(
+        "transf_start_iterations_A", "transf_stop_iterations_A"
+    ):
+        if s.on("transf_function_enabled"):
+            s.fold("transf_addition_constant_111")
+        else:
+            s.fold_flat("transf_addition_constant_111")
+    if s.during("transf_start_iterations_P", "transf_stop_iterations_P"):
+        s.refuse("transf_function_enabledP_false")
+    mandalay(s, s.on("transf_function_enabledSw_false"))
+    if s.during("transf_start_iterations_S", "transf_stop_iterations_S"):
+        fold_ball(s, None)
+    vary = s.on("transf_function_enabledK_false") and s.during(
+        "transf_start_iterations_K", "transf_stop_iterations_K"
+    )
+    scale_by(s, add_vary(s, "transf_scale_2", "transf_scaleC_1", vary, False))
+    if s.on("transf_rotation_enabled") and s.during("transf_start_iterations_R", "transf_stop_iterations_R"):
+        s.turn("transf_rotation")

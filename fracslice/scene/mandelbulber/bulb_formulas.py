@@ -194,3 +194,132 @@ def pupuku(s: FormulaStep) -> None:
     s.add("transf_offset_000")
     if s.during("transf_start_iterations_S", "transf_stop_iterations_S"):
         s.scale("transf_scaleC_1")
+
+
+@known(282, "Mandelbar V3", "Crowe et al. 1989, after White and Nylander 2009")
+def mandelbar_3(s: FormulaStep) -> None:
+    """A square with the signs of its coordinates turned about."""
+    if s.on("transf_function_enabled_false"):
+        absolute(s, *(f"transf_function_enabledA{axis}_false" for axis in "xyz"))
+    s.refuse("transf_function_enabledAw_false")
+    s.write("x, y, z = w", "s = maximum(x * x + y * y, 1e-30)", "m = 1 - z * z / s")
+    s.write("t = 2 * x * y * m", "y = (y * y - x * x) * m", "z = 2 * sqrt(s) * z")
+    signs = (
+        ("M", "A", "x = -t"),
+        ("B_false", "B", "x, z = -t, -z"),
+        ("C_false", "C", "x = t"),
+        ("D_false", "D", "x, z = t, -z"),
+    )
+    for switch, letter, line in signs:
+        now = s.during(f"transf_start_iterations_{letter}", f"transf_stop_iterations_{letter}")
+        if s.on(f"transf_function_enabled{switch}") and now:
+            s.write(line)
+    s.write("w = (x, y, z)")
+    later = {
+        "P": lambda: s.write("x, y, z = w", f"w = (x, y, {s.number('transf_scale_1')} * z)"),
+        "S": lambda: s.scale("transf_scaleA_1"),
+        "J": lambda: s.add("transf_addition_constant"),
+        "R": lambda: s.turn("transf_rotation"),
+        "X": lambda: s.add_constant("", "transf_constant_multiplier_111"),
+    }
+    for letter, act in later.items():
+        now = s.during(f"transf_start_iterations_{letter}", f"transf_stop_iterations_{letter}")
+        if s.on(f"transf_function_enabled{letter}_false") and now:
+            act()
+
+
+@known(259, "Mandelnest Full", "Mermelada 2020, fractalforums.org", LEFT_OUT)
+def mandelnest_full(s: FormulaStep) -> None:
+    """Sines of multiples of the angles to the three planes, with the sign that stays nearer."""
+    s.refuse("transf_function_enabled_false")
+    n, o, k = s.number("power"), s.point("transf_offsetA_000"), s.point("transf_constant_multiplierA_111")
+    s.write("x, y, z = w", "s = maximum(x * x + y * y + z * z, 1e-30)")
+    for p in "xyz":
+        s.write(f"u{p} = sin({n} * atan2({p}, sqrt(maximum(s - {p} * {p}, 1e-30))))")
+    s.write(f"r = exp(0.5 * {n} * log(s)) / sqrt(maximum(ux * ux + uy * uy + uz * uz, 1e-30))")
+    s.write(f"ox, oy, oz = {o}", f"kx, ky, kz = {k}", "cx, cy, cz = c")
+    inside = not s.on("transf_function_enabledA_false")
+    for p in "xyz":
+        added = f"o{p} + k{p} * c{p}" if inside else f"o{p}"
+        s.write(f"a{p} = {added}")
+    s.write("d = r * (ux * ax + uy * ay + uz * az)", "r = where(d < 0, r, -r)")
+    s.write("w = (r * ux + ax, r * uy + ay, r * uz + az)")
+    if not inside:
+        s.write("w = w + (kx * cx, ky * cy, kz * cz)")
+
+
+def kali_angles(s: FormulaStep, beta: str, alpha: str) -> None:
+    """Write the angles of a point to the pole and about z, the latter in half of a turn, and its radius."""
+    s.write("x, y, z = w", "s = maximum(x * x + y * y, 1e-30)", "q = sqrt(s + z * z)")
+    s.write(f"t = atan2(sqrt(s), z){beta}")
+    s.write(f"p = atan2(y * where(x < 0, -1, 1), maximum(absolute(x), 1e-30)){alpha}")
+
+
+def kali_point(s: FormulaStep, radius: str) -> None:
+    """Write the point of angles."""
+    s.write(f"w = ({radius} * sin(t) * cos(p), {radius} * sin(t) * sin(p), {radius} * cos(t))")
+
+
+@known(92, "Mandelbulb - Kali", "Kali 2010, fractalforums.com")
+def mandelbulb_kali(s: FormulaStep) -> None:
+    """A Mandelbulb of two steps: one angle is multiplied, then the other, of the image."""
+    if s.on("transf_function_enabled_false"):
+        absolute(s, *(f"transf_function_enabledA{axis}_false" for axis in "xyz"))
+    n, a, b = s.number("transf_pwr_8"), s.number("transf_scaleA_1"), s.number("transf_scaleB_1")
+    kali_angles(s, offset(s, "beta_angle_offset"), offset(s, "alpha_angle_offset"))
+    s.write(f"t = {n} * {a} * t")
+    kali_point(s, "q")
+    kali_angles(s, offset(s, "transf_beta_angle_offset"), "")
+    s.write(f"p = {n} * {b} * p", f"r = exp({n} * log(q))")
+    kali_point(s, "r")
+
+
+@known(240, "Mandelbulb Pow2 V3", NYLANDER)
+def mandelbulb_pow2_3(s: FormulaStep) -> None:
+    """A square in polar coordinates whose angle is moved."""
+    if s.during("transf_start_iterations_B", "transf_stop_iterations_B"):
+        x, y, z = s.vector("transf_addition_constant_111")
+        limits = [
+            s.parameter(f"limit_{p}", abs(v)) if s.on(f"transf_function_enabledB{p}_false") else "1e6"
+            for p, v in zip("xyz", (x, y, z), strict=True)
+        ]
+        if limits != ["1e6"] * 3:
+            s.write(f"w = fold_to(w, ({', '.join(limits)}))")
+    if s.on("transf_function_enabledA_false") and s.during(
+        "transf_start_iterations_A", "transf_stop_iterations_A"
+    ):
+        absolute(s, *(f"transf_function_enabledA{axis}_false" for axis in "xyz"))
+    s.scale("transf_scaleA_1")
+    angle = f"t + 1.5 * {PI}"
+    for letter, part in (("B", "0.25"), ("C", "0.5"), ("D", "1")):
+        angle = f"2 * t + {part} * {PI}" if s.on(f"transf_function_enabled{letter}_false") else angle
+    s.write("x, y, z = w", "s = maximum(x * x + y * y, 1e-30)", "r = s + z * z", "t = atan2(z, sqrt(s))")
+    s.write(f"t = {angle}", "m = r * sin(t) / s")
+    s.write(f"w = (m * (y * y - x * x), -2 * m * x * y, r * cos(t) * {s.number('transf_scale_1')})")
+    s.add("transf_offset_000")
+    if s.on("transf_rotation2_enabled_false") and s.during(
+        "transf_start_iterations_C", "transf_stop_iterations_C"
+    ):
+        s.turn("transf_rotation")
+
+
+@known(262, "Mandelbulb Pow2 V1", NYLANDER)
+def mandelbulb_pow2_1(s: FormulaStep) -> None:
+    """Squares about y and about z, each in its iterations."""
+    if s.on("transf_function_enabledAx_false") and s.during(
+        "transf_start_iterations_A", "transf_stop_iterations_A"
+    ):
+        absolute(s, *(f"transf_function_enabledC{axis}_false" for axis in "xyz"))
+    s.refuse("transf_function_enabledD_false", "transf_function_enabledF_false")
+    if s.on("transf_function_enabledAy") and s.during(
+        "transf_start_iterations_B", "transf_stop_iterations_B"
+    ):
+        sign = "-" if s.on("transf_function_enabledB_false") else ""
+        s.write("x, y, z = w", "s = maximum(x * x + z * z, 1e-30)", "m = y * y / s - 1")
+        s.write(f"w = ({sign}2 * x * z * m, 2 * sqrt(s) * y, (z * z - x * x) * m)")
+    if s.on("transf_function_enabledAz_false") and s.during(
+        "transf_start_iterations_C", "transf_stop_iterations_C"
+    ):
+        sign = "-" if s.on("transf_function_enabledA_false") else ""
+        s.write("x, y, z = w", "s = maximum(x * x + y * y, 1e-30)", "m = 1 - z * z / s")
+        s.write(f"w = ({sign}2 * x * y * m, (y * y - x * x) * m, 2 * sqrt(s) * z)")

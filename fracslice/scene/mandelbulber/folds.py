@@ -48,13 +48,18 @@ def sector(s: FormulaStep, axes: str, count: str, turn: str) -> None:
 def symmetric(s: FormulaStep) -> None:
     """Absolute values, reflections in three diagonal planes, in part, and an offset."""
     absolute(s, *(f"transf_function_enabledB{axis}" for axis in "xyz"))
+    diagonals(s)
+    s.add("transf_offsetA_000")
+
+
+def diagonals(s: FormulaStep) -> None:
+    """Reflections in three diagonal planes, in part."""
     shares = dict(zip("xyz", s.vector("transf_addition_constant_0555"), strict=True))
     for name, first, second in (("x", "x", "z"), ("y", "x", "y"), ("z", "y", "z")):
         if s.on(f"transf_function_enabledA{name}"):
             k = s.parameter(f"transf_addition_constant_0555_{name}", shares[name])
             s.write("x, y, z = w", f"t = 2 * {k} * minimum({first} - {second}, 0)")
             s.write(f"{first} = {first} - t", f"{second} = {second} + t", "w = (x, y, z)")
-    s.add("transf_offsetA_000")
 
 
 MANDALAY = (("x", "y", "z"), ("y", "z", "x"), ("z", "x", "y"))

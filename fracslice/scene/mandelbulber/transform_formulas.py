@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .folds import PI, absolute, absolute_of, mandalay, polygon, symmetric
+from .folds import PI, absolute, absolute_of, diagonals, mandalay, polygon, symmetric
 from .sponge_formulas import box_offset
 from .step_text import LEFT_OUT, ORDERS, FormulaStep, known
 
@@ -475,3 +475,54 @@ def diagonal_fold(s: FormulaStep) -> None:
         now = not timed or s.during(f"transf_start_iterations_{letter}", f"transf_stop_iterations_{letter}")
         if s.on(f"transf_function_enabled{switch}") and now:
             s.write(f"w = mirror(w, {normal})")
+
+
+@known(1140, "T>PolyXY Fold V1", "Sandercoe and Luca 2016, fractalforums.com", LEFT_OUT)
+def poly_fold(s: FormulaStep) -> None:
+    """Fold into a sector of a polygon, and mix x and y of the image."""
+    if s.during("transf_start_iterations_D", "transf_stop_iterations_D1"):
+        absolute(s, "transf_function_enabledx", "transf_function_enabledy", "transf_function_enabledz_false")
+        s.add("transf_offset_000")
+        polygon(s, "xy", "transf_int8_X")
+        a, b = s.number("transf_scaleF_1"), s.number("transf_scaleG_1")
+        s.write("x, y, z = w", f"w = (y + (x - y) * {a}, x + (y - x) * {b}, z)")
+    if s.on("transf_rotation2_enabled_false") and s.during(
+        "transf_start_iterations_R", "transf_stop_iterations_R"
+    ):
+        s.turn("transf_rotation")
+    if s.during("transf_start_iterations_A", "transf_stop_iterations_A"):
+        s.add("transf_addition_constant")
+
+
+@known(1145, "T>Menger Fold V2", "Knighty 2010, fractalforums.com", LEFT_OUT)
+def menger_fold_2(s: FormulaStep) -> None:
+    """A sponge's folds, in part, with turns between, a scale and an offset."""
+    s.write("w = positive(w)")
+    s.add("transf_offset_000")
+    if s.on("transf_rotation_enabled_false") and s.during(
+        "transf_start_iterations_R", "transf_stop_iterations_R"
+    ):
+        s.turn("transf_rotation")
+    diagonals(s)
+    if s.on("transf_function_enabled_false"):
+        s.turn("transf_rotation2")
+    scale = s.value("transf_scale_3")
+    if s.on("transf_function_enabledX_false") and s.during(
+        "transf_start_iterations_X", "transf_stop_iterations_X"
+    ):
+        added = s.state.get("added", 0.0)
+        scale += added
+        s.state["added"] = -s.value("transf_scale_vary_0") * (abs(added) - s.value("transf_scaleB_1"))
+    a = s.parameter("transf_scale_3", scale)
+    if s.on("transf_function_enabledSw_false"):
+        s.write(f"w = {a} * w")
+    else:
+        o = s.point("transf_offset_1105")
+        s.write(
+            f"ox, oy, oz = {o}",
+            "x, y, z = w",
+            f"k = {a} - 1",
+            f"z = oz * k / {a} - absolute(z - oz * k / {a})",
+        )
+        s.write(f"w = ({a} * x - ox * k, {a} * y - oy * k, {a} * z)")
+    s.add("transf_addition_constantA_000")
