@@ -51,10 +51,6 @@ def camera(settings: Settings) -> Camera:
     kind = KINDS[main.one_of("perspective_type", tuple(KINDS))]
     eye, target = main.vector("camera", "3 -6 2"), main.vector("target", "0 0 0")
     up = main.vector("camera_top", "-0.1277753 0.2555506 0.958314")
-    if main.flag("legacy_coordinate_system", "false"):
-        raise SceneError(
-            f"{main.place('legacy_coordinate_system')}: legacy_coordinate_system true: expected false"
-        )
     try:
         return Camera(kind=kind, eye=eye, target=target, up=up, fov=field_of_view(settings, kind))
     except SceneError as error:

@@ -21,6 +21,7 @@ IGNORED = (
     "flight_",
     "keyframe_",
     "image_proportion",
+    "legacy_coordinate_system",
     "camera_rotation",
     "camera_distance_to_target",
     "detail_level",
