@@ -392,3 +392,22 @@ def test_objects_are_placed_and_joined(tmp_path: Path) -> None:
     corner = np.array([2 + 0.45 * np.cos(np.pi / 4), -0.45 * np.sin(np.pi / 4), 0.05])
     box = made.scene.root.children[1]
     assert box.distance(corner[None])[0] < 0 < box.distance((corner * [1, -1, 1])[None])[0]
+
+
+def test_keyframes_are_tracks_of_a_film(tmp_path: Path) -> None:
+    """Columns of three are vectors; what does not change has no track; the rest is noted."""
+    table = (
+        "[keyframes]\nframe;main_camera_x;main_camera_y;main_camera_z;fractal0_power;main_gamma;main_fov\n"
+        "0;0;-3;0;8;1;50\n1;1;-3;0,5;9,5;2;50\n2;2;-3;1;10;2;50\n"
+    )
+    source = text("formula_1 2; N 3; frames_per_keyframe 60") + table
+    made = imported(tmp_path, source)
+    assert made.scene.animation.duration == 4
+    assert {track.of: track.keys[1] for track in made.scene.tracks} == {
+        "camera.eye": (2.0, "1.0 -3.0 0.5"),
+        "mandelbulb_m.power_of": (2.0, "9.5"),
+    }
+    assert any("main_gamma: its keyframes are left out" in note for note in made.notes)
+    assert reads(to_xml(made.scene)) == made.scene
+    with pytest.raises(SceneError, match=r"x\.fract:13: keyframe of 2 values: expected 7"):
+        imported(tmp_path, source + "3;4\n")

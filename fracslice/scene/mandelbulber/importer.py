@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ...common.parameters import printable
@@ -12,6 +12,7 @@ from ...errors import KernelError, SceneError
 from ...formulas import Node, get
 from ..model import Scene, scene
 from . import appearance
+from .films import film
 from .objects import orbits, solid
 from .sequences import Orbit, Slot, steps_of
 from .settings import Settings, read_settings
@@ -91,6 +92,8 @@ def _imported(settings: Settings, made: list[Orbit]) -> Imported:
     node = _clipped(solid(settings, made), settings)
     name = printable(Path(settings.path).stem)
     seen = scene(node, size="60mm", name=name, view=appearance.view(settings))
+    animation, tracks = film(settings, node, made[0].notes)
+    seen = replace(seen, animation=animation, tracks=tracks)
     slots = [slot for orbit in made for slot in orbit.slots]
     known = tuple(dict.fromkeys(slot.known.name for slot in slots if slot.known))
     missing = tuple(line for orbit in made for line in orbit.missing)

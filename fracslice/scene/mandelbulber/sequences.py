@@ -160,7 +160,12 @@ def one(orbit: Orbit, slot: Slot, index: int, state: dict[str, float], even: boo
     slot.known.write(step)
     if slot.weight <= 0:
         return "return w", (), None, slot.place
-    element = step.element if slot.weight >= 1 and slot.adds and orbit.factor == (1, 1, 1) else None
+    animated = any(f"fractal{slot.place - 1}_" in line for _, line in orbit.settings.keyframes[:1])
+    element = (
+        step.element
+        if not animated and slot.weight >= 1 and slot.adds and orbit.factor == (1, 1, 1)
+        else None
+    )
     if step.element and element and orbit.settings.main.flag("box_folding", "false"):
         element = None
     if slot.weight < 1:

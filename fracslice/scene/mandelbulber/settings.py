@@ -31,6 +31,9 @@ DEEPEST = 99_999
 MAIN, FRACTALS = "main_parameters", 9
 """Section of the scene, and the most formulas of a file, each with a section ``fractal_1`` and so on."""
 
+KEYFRAMES = "keyframes"
+"""Section of a table of what changes from keyframe to keyframe."""
+
 Triple = tuple[float, float, float]
 
 _VERSION = re.compile(r"#\s*version\s+(\d+)[.,](\d+)", re.IGNORECASE)
@@ -154,7 +157,8 @@ class Settings:
     version: float
     main: SettingsSection  # the scene
     fractals: tuple[SettingsSection, ...]  # parameters of each formula
-    others: tuple[str, ...] = ()  # names of the other sections, such as keyframes
+    others: tuple[str, ...] = ()  # names of the other sections, such as frames
+    keyframes: tuple[tuple[int, str], ...] = ()  # lines of their table with their numbers
 
     @property
     def sections(self) -> tuple[SettingsSection, ...]:
@@ -199,6 +203,7 @@ def parse_settings(text: str, source: str) -> Settings:
     if len(lines) > MOST_LINES:
         raise SceneError(f"{source}: expected settings of at most {MOST_LINES} lines")
     version, found, current = _version(lines), dict[str, dict[str, Setting]](), ""
+    keyframes: list[tuple[int, str]] = []
     for number, line in enumerate(lines, 1):
         if match := _SECTION.fullmatch(line.strip()):
             current = match[1]
@@ -207,13 +212,15 @@ def parse_settings(text: str, source: str) -> Settings:
             name, value = _line(line, f"{source}:{number}")
             for new, changed in _renamed(name, value, version):
                 found[current][new] = Setting(changed, number)
+        elif current == KEYFRAMES:
+            keyframes.append((number, line))
     if MAIN not in found:
         raise SceneError(f"{source}: expected a section [{MAIN}]")
     main = SettingsSection(source, MAIN, found[MAIN])
     numbered = tuple(f"fractal_{k}" for k in range(1, FRACTALS + 1))
     fractals = tuple(SettingsSection(source, name, found.get(name, {})) for name in numbered)
-    others = tuple(name for name in found if name not in (MAIN, "description", *numbered))
-    return Settings(source, version, main, fractals, others)
+    others = tuple(name for name in found if name not in (MAIN, KEYFRAMES, "description", *numbered))
+    return Settings(source, version, main, fractals, others, tuple(keyframes))
 
 
 def _fractal(name: str) -> bool:
