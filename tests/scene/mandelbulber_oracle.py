@@ -458,6 +458,7 @@ def abox_mod_1(w: Points, c: Points, v: Values, _: int) -> Points:
 def amazing_surf(w: Points, c: Points, v: Values, _: int) -> Points:
     w = flat(w, v["transf_addition_constant_111"])
     r2, inner = length2(w), np.sqrt(v["transf_minimum_radius_05"])
+    r2 = r2 - w[2] ** 2 if v["transf_function_enabled_false"] else r2
     m = v["mandelbox_scale"] / np.where(r2 < inner, inner, np.minimum(r2, 1))
     return rotation(v["transf_rotation"]) @ (((m - 1) * v["transf_scale_1"] + 1) * w)
 
@@ -472,6 +473,8 @@ def abox_icen(w: Points, c: Points, v: Values, _: int) -> Points:
 
 
 def abox_mod_13(w: Points, c: Points, v: Values, i: int) -> Points:
+    if v["transf_function_enabledAz_false"]:
+        w = w + c * column(v["transf_scale3D_111"]) / length2(c * column(v["transf_scale3D_111"]))
     w = box(w, v["transf_addition_constant_111"])
     w = ball(w, v["transf_minR2_p25"], v["transf_maxR2_1"], v["mandelbox_offset"])
     w = v["mandelbox_scale"] * w
@@ -658,6 +661,88 @@ def squares(w: Points, c: Points, v: Values, _: int) -> Points:
     return np.array([x, y, z])
 
 
+def buffalo(w: Points, c: Points, v: Values, i: int) -> Points:
+    return absolute_square(w, c, {**v, "transf_offset_000": (0, 0, 0), **{n: v[n] for n in SIGNS}}, i)
+
+
+SIGNS = ("buffalo_pos_z", *(f"buffalo_{name}_{axis}" for name in ("preabs", "abs") for axis in "xyz"))
+
+
+def iq_bulb(w: Points, c: Points, v: Values, _: int) -> Points:
+    r = np.sqrt(length2(w))
+    t, p = v["transf_pwr_8"] * np.arccos(w[1] / r), v["transf_pwr_8a"] * np.arctan2(w[0], w[2])
+    return r ** v["transf_pwr_8"] * np.array([np.sin(t) * np.sin(p), np.cos(t), np.sin(t) * np.cos(p)])
+
+
+def eye(w: Points, c: Points, v: Values, _: int) -> Points:
+    q = np.hypot(w[0], w[1])
+    t = v["transf_scaleB_1"] * np.arctan2(q, w[2]) + v["transf_scaleC_1"] * np.arctan2(q, -w[2])
+    p = v["transf_scale_1"] * np.arctan2(w[1], w[0]) + np.arctan2(-w[1], w[0])
+    point = np.array([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)])
+    return length2(w) * point + column(v["transf_addition_constantA_000"])
+
+
+def doubled(w: Points, i: int, j: int) -> Points:
+    """Double the angle in a plane."""
+    r, angle = np.hypot(w[i], w[j]), 2 * np.arctan2(w[j], w[i])
+    w = w.copy()
+    w[i], w[j] = r * np.cos(angle), r * np.sin(angle)
+    return w
+
+
+def three_planes(w: Points, c: Points, v: Values, _: int) -> Points:
+    return np.sqrt(length2(w)) * doubled(doubled(doubled(w, 0, 1), 1, 2), 0, 2)
+
+
+def two_planes(w: Points, c: Points, v: Values, _: int) -> Points:
+    first = doubled(w, 0, 1)
+    second = doubled(first, 0, 2)
+    signs = np.array([np.where(first[0] < 0, -1, 1), np.ones_like(w[0]), np.where(w[0] < 0, -1, 1)])
+    return np.sqrt(length2(w)) * second * signs
+
+
+def eiffie(w: Points, c: Points, v: Values, _: int) -> Points:
+    k, r = np.pi / 8, np.hypot(w[1], w[2])
+    angle = abs(np.fmod(np.arctan2(w[2], w[1]) + np.pi + k, 2 * k) - k)
+    x, y, z = w[0], r * np.cos(angle), r * np.sin(angle)
+    m = 1 - z * z / (x * x + y * y + z * z)
+    w = np.array([(x * x - y * y) * m, 2 * x * y * m * v["transf_scale"], 2 * z * np.hypot(x, y)])
+    w = w + column(v["transf_addition_constant"])
+    return v["transf_scale_1"] * (1 - v["transf_offset"] / np.sqrt(length2(w))) * w
+
+
+def dot_fold(w: Points, c: Points, v: Values, _: int) -> Points:
+    a, b = np.radians(v["transf_angle_deg_A"]), np.radians(v["transf_angle_deg_B"])
+    n = np.array([np.cos(a) * np.sin(b), np.sin(a), np.cos(a) * np.cos(b)]) + v["transf_offset_000"]
+    n /= np.linalg.norm(n)
+    return rotation(v["transf_rotation"]) @ (w - 2 * n[:, None] * np.maximum(n @ w, 0))
+
+
+def octo_fold(w: Points, c: Points, v: Values, _: int) -> Points:
+    for j, sign in ((1, -1), (2, -1), (1, 1), (2, 1)):
+        low = w[0] < sign * w[j]
+        w = w.copy()
+        w[0], w[j] = np.where(low, sign * w[j], w[0]), np.where(low, sign * w[0], w[j])
+    w[0] = abs(w[0])
+    return v["transf_scale_2"] * w - (v["transf_scale_2"] - 1) * column(v["transf_offset_100"])
+
+
+def folding_planes(w: Points, c: Points, v: Values, _: int) -> Points:
+    limit, value = v["mandelbox_folding_limit"], v["mandelbox_folding_value"]
+    for k in range(3):
+        back, forth = (rotation(v[f"mandelbox_rotation_{s}_{k + 1}"]) for s in ("neg", "pos"))
+        above, below = back @ w, forth @ w
+        first, second = above[k] > limit, below[k] < -limit
+        above[k], below[k] = value - above[k], -value - below[k]
+        w = np.where(first, back.T @ above, np.where(second, forth.T @ below, w))
+    return w
+
+
+def absolute_differences(w: Points, c: Points, v: Values, _: int) -> Points:
+    a, b = column(v["transf_addition_constant"]), column(v["transf_offset_000"])
+    return abs(w + a) - abs(w - b) - column(v["transf_scale3D_111"]) * w + column(v["transf_offsetA_000"])
+
+
 FORMULAS: dict[int, Formula] = {
     2: mandelbulb,
     3: mandelbulb_square,
@@ -743,4 +828,14 @@ FORMULAS: dict[int, Formula] = {
     92: kali_bulb,
     240: moved_square,
     262: squares,
+    41: buffalo,
+    83: iq_bulb,
+    800: eye,
+    13: three_planes,
+    14: two_planes,
+    70: eiffie,
+    1151: dot_fold,
+    1059: octo_fold,
+    1048: folding_planes,
+    1029: absolute_differences,
 }

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from .folds import absolute, mandalay
-from .step_text import LEFT_OUT, ORDERS, SWAPPED, FormulaStep, UnknownError, known
+from .step_text import CYLINDER, LEFT_OUT, ORDERS, SQUARE, SWAPPED, FormulaStep, UnknownError, known
 
 LOWE = "Lowe 2010, fractalforums.com: Amazing Fractal"
 
@@ -72,7 +72,7 @@ def turn_back(s: FormulaStep, name: str) -> None:
             s.write(f"w = turn(w, {text}, -{name.lower()}_{axis})")
 
 
-@known(9, "Mandelbox fast", LOWE)
+@known(9, "Mandelbox Fast", LOWE)
 def mandelbox_fast(s: FormulaStep) -> None:
     """The box is that of the unit."""
     main = s.on("mandelbox_main_rotation_enabled") and any(s.vector("mandelbox_rotation_main"))
@@ -161,8 +161,10 @@ def amazing_surf_mod_2(s: FormulaStep) -> None:
         s.add_constant(
             "mandelbulbMulti_order_of_xyz", "transf_constant_multiplier_111", "transf_alternate_enabled_false"
         )
-    if s.during("transf_start_iterations_F", "transf_stop_iterations_F"):
-        s.refuse("transf_function_enabledCx_false")
+    if s.on("transf_function_enabledCx_false") and s.during(
+        "transf_start_iterations_F", "transf_stop_iterations_F"
+    ):
+        add_inverse(s, "transf_function_enabledCy_false")
     switches = (
         "transf_function_enabledAx",
         "transf_function_enabledAy_false",
@@ -197,6 +199,14 @@ def amazing_surf_mod_2(s: FormulaStep) -> None:
         "transf_start_iterations_R", "transf_stop_iterations_R"
     ):
         s.turn("mandelbox_rotation_main")
+
+
+def add_inverse(s: FormulaStep, alternates: str) -> None:
+    """Add the start point, its coordinates scaled, inverted in the unit sphere."""
+    s.refuse(alternates)
+    s.write(f"kx, ky, kz = {s.point('transf_scale3D_111')}", "cx, cy, cz = c")
+    s.write("cx, cy, cz = kx * cx, ky * cy, kz * cz", "t = maximum(cx * cx + cy * cy + cz * cz, 1e-18)")
+    s.write("w = w + (cx / t, cy / t, cz / t)")
 
 
 def surf_fold(s: FormulaStep, name: str) -> None:
@@ -305,7 +315,7 @@ def abox_mod_15(s: FormulaStep) -> None:
 def amazing_surf_mod_1(s: FormulaStep) -> None:
     """Folds along x and y of several kinds, a ball, and a scale that varies."""
     scale = vary_scale(s)
-    s.refuse("transf_function_enabledx_false", "transf_function_enabled_false")
+    s.refuse("transf_function_enabledx_false")
     if s.on("transf_function_enabledAx"):
         s.fold_flat("transf_addition_constant_111")
     if s.on("transf_function_enabledAy_false"):
@@ -318,7 +328,7 @@ def amazing_surf_mod_1(s: FormulaStep) -> None:
         fold_moved(s, "transf_addition_constant_111")
     s.add("transf_addition_constant")
     inner = s.value("transf_minimum_radius_05")
-    s.ball(math.sqrt(max(inner, 0.0)), 1.0)
+    s.ball(math.sqrt(max(inner, 0.0)), 1.0, square=radius(s))
     share = s.value("transf_scale_1")
     scale_by(s, scale * share + (1 - share))
     s.turn("transf_rotation")
@@ -350,14 +360,14 @@ def doubled_square(s: FormulaStep) -> None:
         s.square("boxfold_bulbpow2_z_factor")
 
 
-@known(125, "Box Fold Bulb Pow 2 - V2", "Buddhi 2010 after Lowe and White, fractalforums.com")
+@known(125, "Box Fold Bulb Pow 2 V2", "Buddhi 2010 after Lowe and White, fractalforums.com")
 def box_fold_bulb_2(s: FormulaStep) -> None:
     """Box, ball, scale and square, each in its iterations."""
     box_ball_scale(s)
     doubled_square(s)
 
 
-@known(126, "Box Fold Bulb Pow 2 - V3", "Buddhi 2010 after Lowe and White, fractalforums.com")
+@known(126, "Box Fold Bulb Pow 2 V3", "Buddhi 2010 after Lowe and White, fractalforums.com")
 def box_fold_bulb_3(s: FormulaStep) -> None:
     """As the second kind, with an inversion, a tetrahedron's fold and a sponge's."""
     inversion(s, "transf_start_iterations", "transf_stop_iterations_1")
@@ -391,6 +401,11 @@ def box_fold_bulb_3(s: FormulaStep) -> None:
     doubled_square(s)
 
 
+def radius(s: FormulaStep) -> str:
+    """Square of a radius, that of a cylinder if a switch is on."""
+    return CYLINDER if s.on("transf_function_enabled_false") else SQUARE
+
+
 def own_ball(s: FormulaStep, inner: str = "transf_minimum_radius_0") -> None:
     """Ball of radius 1 whose inner radius is squared in the file."""
     s.ball(s.value(inner), 1.0)
@@ -407,7 +422,7 @@ def abox_mod_kali(s: FormulaStep) -> None:
     s.scale("transf_scale_015")
 
 
-@known(135, "Abox - Mod Kali V2", "Kali 2010, fractalforums.com: Kaliset")
+@known(135, "Abox - Mod Kali-V2", "Kali 2010, fractalforums.com: Kaliset")
 def abox_mod_kali_2(s: FormulaStep) -> None:
     """Absolute values that are subtracted, and a ball with an outer radius."""
     a = s.point("transf_addition_constant_0555")
@@ -427,7 +442,7 @@ def abox_mod_kali_2(s: FormulaStep) -> None:
         s.refuse("transf_function_enabledS_false")
 
 
-@known(136, "Abox - Mod Kali V3", "Kali 2010, fractalforums.com: Kaliset", LEFT_OUT)
+@known(136, "Abox - Mod Kali-V3", "Kali 2010, fractalforums.com: Kaliset", LEFT_OUT)
 def abox_mod_kali_3(s: FormulaStep) -> None:
     """Absolute values that are subtracted, and a ball turned about."""
     if s.during("transf_start_iterations_A", "transf_stop_iterations_15"):
@@ -442,8 +457,6 @@ def abox_mod_kali_3(s: FormulaStep) -> None:
 def abox_mod_1(s: FormulaStep) -> None:
     """Folds about a point, a ball, and a scale that varies."""
     scale = vary_scale(s)
-    if s.during("transf_start_iterations_K", "transf_stop_iterations_K"):
-        s.refuse("transf_function_enabled_false")
     v, k = s.number("mandelbox_folding_value"), s.number("transf_scale_1")
     parts = []
     for p, a in zip("xyz", s.vector("transf_addition_constant"), strict=True):
@@ -453,7 +466,12 @@ def abox_mod_1(s: FormulaStep) -> None:
     if not s.on("transf_function_enabledz"):
         parts[2] = "z"
     s.write("x, y, z = w", f"w = ({', '.join(parts)})")
-    s.ball(s.value("transf_minimum_radius_0"), s.value("transf_maxR2_1"))
+    square = SQUARE
+    if s.on("transf_function_enabled_false") and s.during(
+        "transf_start_iterations_K", "transf_stop_iterations_K"
+    ):
+        square = f"exp({s.number('mandelbox_vary_rpower')} * log(maximum({SQUARE}, 1e-30)))"
+    s.ball(s.value("transf_minimum_radius_0"), s.value("transf_maxR2_1"), square=square)
     scale_by(s, scale)
     if s.on("transf_addCpixel_enabled_false") and s.during(
         "transf_start_iterations_E", "transf_stop_iterations_E"
@@ -469,22 +487,21 @@ def abox_mod_1(s: FormulaStep) -> None:
 def amazing_surf(s: FormulaStep) -> None:
     """Folds along x and y, a ball, and a scale that varies."""
     scale = vary_scale(s)
-    s.refuse("transf_function_enabled_false")
     s.fold_flat("transf_addition_constant_111")
     share, inner = s.value("transf_scale_1"), math.sqrt(max(s.value("transf_minimum_radius_05"), 0.0))
     if share == 1:
-        s.ball(inner, 1.0)
+        s.ball(inner, 1.0, square=radius(s))
         scale_by(s, scale)
     else:
         a, b, m = s.parameter("scale", scale), s.number("transf_scale_1"), s.parameter("inner", inner)
-        s.write("x, y, z = w", "s = x * x + y * y + z * z", f"s = where(s < {m}, {m}, minimum(s, 1))")
+        s.write("x, y, z = w", f"s = {radius(s)}", f"s = where(s < {m}, {m}, minimum(s, 1))")
         s.write(f"w = (({a} / s - 1) * {b} + 1) * w")
     if s.on("transf_addCpixel_enabled_false"):
         add_swapped(s)
     s.turn("transf_rotation")
 
 
-@known(76, "Abox - VS Icen1", "Icen 2011, fractalforums.com", LEFT_OUT)
+@known(76, "Abox - VS icen1", "Icen 2011, fractalforums.com", LEFT_OUT)
 def abox_icen(s: FormulaStep) -> None:
     """A Mandelbox with additions before and after the ball."""
     scale = vary_scale(s)
@@ -503,8 +520,10 @@ def abox_icen(s: FormulaStep) -> None:
 @known(127, "Abox - Mod 13", "Sandercoe after Lowe 2010, fractalforums.org")
 def abox_mod_13(s: FormulaStep) -> None:
     """A Mandelbox with a box of three sizes, and a vector that is added in some iterations."""
-    if s.during("transf_start_iterations_E", "transf_stop_iterations_E"):
-        s.refuse("transf_function_enabledAz_false")
+    if s.on("transf_function_enabledAz_false") and s.during(
+        "transf_start_iterations_E", "transf_stop_iterations_E"
+    ):
+        add_inverse(s, "transf_function_enabledAy_false")
     if s.during("transf_start_iterations_A", "transf_stop_iterations_A"):
         if s.on("transf_function_enabled"):
             s.fold("transf_addition_constant_111")
@@ -626,7 +645,7 @@ def amazing_surf_klein(s: FormulaStep) -> None:
     s.add("transf_addition_constantA_000")
 
 
-@known(222, "Abox - Klein", "Lowe 2010 and Theli-at 2011, fractalforums.com", LEFT_OUT)
+@known(222, "Abox- Klein", "Lowe 2010 and Theli-at 2011, fractalforums.com", LEFT_OUT)
 def abox_klein(s: FormulaStep) -> None:
     """A Mandelbox for some iterations, then a box and a scale."""
     inversion(s, "transf_start_iterations_X", "transf_stop_iterations_1")

@@ -30,7 +30,7 @@ def offset(s: FormulaStep, name: str) -> str:
     return f" + {s.number(name)} * 0.017453292519943295" if s.value(name) else ""
 
 
-@known(3, "Mandelbulb Power 2", NYLANDER)
+@known(3, "Mandelbulb - Power 2", NYLANDER)
 def mandelbulb_2(s: FormulaStep) -> None:
     """The square by products."""
     s.square()
@@ -66,7 +66,7 @@ def bristorbrot(s: FormulaStep) -> None:
     s.write("x, y, z = w", "w = (x * x - y * y - z * z, y * (2 * x - z), z * (2 * x + y))")
 
 
-@known(20, "Benesi", "Benesi 2010, fractalforums.com")
+@known(20, "Benesi - Pwr2", "Benesi 2010, fractalforums.com")
 def benesi(s: FormulaStep) -> None:
     """A square about the x axis, whose sign of x depends on the side of a cone and of the start point."""
     side = "0.1" if s.on("transf_function_enabledE_false") else "cx"
@@ -83,7 +83,7 @@ def benesi(s: FormulaStep) -> None:
     )
 
 
-@known(66, "Benesi Pine Tree", "Benesi 2010, fractalforums.com", OWN)
+@known(66, "Benesi - Pine Tree", "Benesi 2010, fractalforums.com", OWN)
 def benesi_pine_tree(s: FormulaStep) -> None:
     """A square about the x axis; the start point is added with y and z swapped, each with a factor."""
     s.write(
@@ -98,7 +98,7 @@ def benesi_pine_tree(s: FormulaStep) -> None:
         s.write(f"w = turn(w, (1, 0, 0), -{s.number('transf_angle_0')})")
 
 
-@known(137, "Mandelbulb Abs Power 2", NYLANDER)
+@known(137, "Mandelbulb - Abs Power 2", NYLANDER)
 def mandelbulb_abs_2(s: FormulaStep) -> None:
     """The square with absolute values before and after, and turns."""
     if s.on("transf_rotation_enabled") and s.during("transf_start_iterations_R", "transf_stop_iterations_R"):
@@ -118,8 +118,10 @@ def mandelbulb_abs_2(s: FormulaStep) -> None:
         s.turn("mandelbox_rotation_main")
     if s.during("transf_start_iterations_E", "transf_stop_iterations_E"):
         s.refuse("transf_addCpixel_enabled_false")
-    if s.during("transf_start_iterations_H", "transf_stop_iterations_H"):
-        s.refuse("transf_function_enabledP_false")
+    if s.on("transf_function_enabledP_false") and s.during(
+        "transf_start_iterations_H", "transf_stop_iterations_H"
+    ):
+        absolute(s, *(f"transf_function_enabledC{axis}_false" for axis in "xyz"))
 
 
 @known(229, "Mandelnest", "Mermelada 2020, fractalforums.org")
@@ -138,7 +140,7 @@ def mandelnest(s: FormulaStep) -> None:
         s.add("transf_offsetF_000")
 
 
-@known(244, "Msltoe Sym4 - Mod 1", "Msltoe 2010, fractalforums.com", LEFT_OUT)
+@known(244, "Msltoe - Sym4 Mod1", "Msltoe 2010, fractalforums.com", LEFT_OUT)
 def msltoe_sym_4(s: FormulaStep) -> None:
     """Reflections, a polygon's fold about x, a square, and an offset along the radius."""
     if s.during("transf_start_iterations_K", "transf_stop_iterations_K"):
@@ -165,10 +167,10 @@ def msltoe_sym_4(s: FormulaStep) -> None:
     s.scale("transf_scale_1")
 
 
-@known(266, "Mandelbulb - Pupuku", "Pupukuusikko 2021, fractalforums.org")
+@known(266, "Mandelbulb Pupuku", "Pupukuusikko 2021, fractalforums.org")
 def pupuku(s: FormulaStep) -> None:
     """The Mandelbulb with factors of its angles and of their sines and cosines."""
-    s.refuse("transf_function_enabledC_false", "transf_function_enabledBz_false")
+    s.refuse("transf_function_enabledBz_false")
     if s.on("transf_function_enabledP_false") and s.during(
         "transf_start_iterations_P", "transf_stop_iterations_P"
     ):
@@ -274,7 +276,7 @@ def mandelbulb_kali(s: FormulaStep) -> None:
     kali_point(s, "r")
 
 
-@known(240, "Mandelbulb Pow2 V3", NYLANDER)
+@known(240, "Mandelbulb - Pow2 V3", NYLANDER)
 def mandelbulb_pow2_3(s: FormulaStep) -> None:
     """A square in polar coordinates whose angle is moved."""
     if s.during("transf_start_iterations_B", "transf_stop_iterations_B"):
@@ -303,7 +305,7 @@ def mandelbulb_pow2_3(s: FormulaStep) -> None:
         s.turn("transf_rotation")
 
 
-@known(262, "Mandelbulb Pow2 V1", NYLANDER)
+@known(262, "Mandelbulb - Pow2 V1", NYLANDER)
 def mandelbulb_pow2_1(s: FormulaStep) -> None:
     """Squares about y and about z, each in its iterations."""
     if s.on("transf_function_enabledAx_false") and s.during(
@@ -323,3 +325,91 @@ def mandelbulb_pow2_1(s: FormulaStep) -> None:
         sign = "-" if s.on("transf_function_enabledA_false") else ""
         s.write("x, y, z = w", "s = maximum(x * x + y * y, 1e-30)", "m = 1 - z * z / s")
         s.write(f"w = ({sign}2 * x * y * m, (y * y - x * x) * m, 2 * sqrt(s) * z)")
+
+
+@known(41, "Buffalo", "Kali 2011, fractalforums.com")
+def buffalo(s: FormulaStep) -> None:
+    """The square with absolute values before and after."""
+    absolute(s, *(f"buffalo_preabs_{axis}" for axis in "xyz"))
+    s.square()
+    if s.on("buffalo_pos_z"):
+        s.write("x, y, z = w", "w = (x, y, -z)")
+    absolute(s, *(f"buffalo_abs_{axis}" for axis in "xyz"))
+
+
+@known(83, "IQ Bulb", "Quilez 2009, iquilezles.org: Mandelbulb")
+def iq_bulb(s: FormulaStep) -> None:
+    """The power about the y axis, with a number for each angle."""
+    n, m = s.number("transf_pwr_8"), s.number("transf_pwr_8a")
+    s.write(
+        "x, y, z = w",
+        "s = maximum(x * x + z * z, 1e-30)",
+        f"t = {n} * atan2(sqrt(s), y)",
+        f"p = {m} * atan2(x, z)",
+        f"r = exp(0.5 * {n} * log(s + y * y))",
+        "w = (r * sin(t) * sin(p), r * cos(t), r * sin(t) * cos(p))",
+    )
+
+
+@known(800, "Mandelbulb - Eye", NYLANDER)
+def mandelbulb_eye(s: FormulaStep) -> None:
+    """A square whose angles are sums of two, each with a factor."""
+    absolute(s, *(f"buffalo_preabs_{axis}" for axis in "xyz"))
+    other = f"{PI} - p" if s.on("transf_function_enabled_false") else "atan2(-y, x)"
+    s.write(
+        "x, y, z = w",
+        "s = maximum(x * x + y * y, 1e-30)",
+        "q, r = sqrt(s), s + z * z",
+        f"t = {s.number('transf_scaleB_1')} * atan2(q, z) + {s.number('transf_scaleC_1')} * atan2(q, -z)",
+        "p = atan2(y, x)",
+        f"p = {s.number('transf_scale_1')} * p + {other}",
+        "w = (r * sin(t) * cos(p), r * sin(t) * sin(p), r * cos(t))",
+    )
+    absolute(s, *(f"buffalo_abs_{axis}" for axis in "xyz"))
+    s.add("transf_addition_constantA_000")
+
+
+def doubled_angle(s: FormulaStep, first: str, second: str) -> None:
+    """Double the angle in a plane and keep the length; the coordinates are those of the statement before."""
+    s.write(
+        f"q = sqrt(maximum({first} * {first} + {second} * {second}, 1e-30))",
+        f"{first}, {second} = ({first} * {first} - {second} * {second}) / q, 2 * {first} * {second} / q",
+    )
+
+
+@known(13, "Mandelbulb 2", "Buddhi 2009, fractalforums.com")
+def mandelbulb_of_planes(s: FormulaStep) -> None:
+    """Angles in three planes are doubled, one after the other."""
+    s.write("x, y, z = w", "r = sqrt(x * x + y * y + z * z)")
+    doubled_angle(s, "x", "y")
+    doubled_angle(s, "y", "z")
+    doubled_angle(s, "x", "z")
+    s.write("w = (r * x, r * y, r * z)")
+
+
+@known(14, "Mandelbulb 3", "Buddhi 2009, fractalforums.com")
+def mandelbulb_of_signs(s: FormulaStep) -> None:
+    """Angles in two planes are doubled, with the signs of x before and between."""
+    s.write("x, y, z = w", "r = sqrt(x * x + y * y + z * z)", "a = where(x < 0, -1, 1)")
+    doubled_angle(s, "x", "y")
+    s.write("b = where(x < 0, -1, 1)")
+    doubled_angle(s, "x", "z")
+    s.write("w = (r * x * b, r * y, r * z * a)")
+
+
+@known(70, "Msltoe - Julia Bulb Eiffie", "Eiffie and Msltoe 2011, fractalforums.com")
+def eiffie_msltoe(s: FormulaStep) -> None:
+    """An octagon's fold about x, a square, and an offset along the radius."""
+    s.refuse("transf_addCpixel_enabled_false")
+    sector(s, "yz", "8", PI)
+    s.write(
+        "x, y, z = w",
+        "s = maximum(x * x + y * y, 1e-30)",
+        "m = 1 - z * z / maximum(s + z * z, 1e-30)",
+        f"w = ((x * x - y * y) * m, 2 * x * y * m * {s.number('transf_scale')}, 2 * z * sqrt(s))",
+    )
+    s.add("transf_addition_constant")
+    if s.value("transf_offset"):
+        s.write("x, y, z = w", "r = sqrt(maximum(x * x + y * y + z * z, 1e-30))")
+        s.write(f"w = (1 - {s.number('transf_offset')} / r) * w")
+    s.scale("transf_scale_1")

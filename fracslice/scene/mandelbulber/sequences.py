@@ -39,6 +39,9 @@ DEEP = 24
 UNROLLED = 6
 """Most iterations of an orbit whose steps do not recur."""
 
+OWN_DISTANCES = (3, 4, 5)
+"""Distances that are not of the last radius of an orbit: of Kleinian groups, and those of formulas."""
+
 LONGEST = 32
 """Most steps of a round."""
 
@@ -199,9 +202,7 @@ def foldings(step: FormulaStep, main: SettingsSection) -> None:
     """Folds of the whole file before each formula."""
     if main.flag("box_folding", "false"):
         limit, value = main.number("box_folding_limit", "1"), main.number("box_folding_value", "2")
-        if value != 2 * limit:
-            raise UnknownError(f"{main.place('box_folding_value')}: box_folding_value {value:g}")
-        step.write(f"w = fold(w, {step.parameter('box_folding_limit', limit)})")
+        step.fold_beyond("box_folding", limit, value)
     if main.flag("spherical_folding", "false"):
         inner, outer = (
             main.number("spherical_folding_inner", "0.5"),
@@ -219,10 +220,14 @@ def recurring(steps: Sequence[Text]) -> int:
 
 
 def steps_of(orbit: Orbit) -> list[Text]:
-    """Step of each iteration of a file.
+    """Step of each iteration of a file; its solid is that of escape, not of a distance of the last formula.
 
     Raises `UnknownError` for a variant of a formula that is not known here.
     """
+    main = orbit.settings.main
+    if main.whole("delta_DE_function", "0") in OWN_DISTANCES:
+        what = main.text("delta_DE_function", "0")
+        raise UnknownError(f"{main.place('delta_DE_function')}: delta_DE_function {what}")
     taken = order(orbit.slots, orbit.settings.main.whole("repeat_from", "1"), min(orbit.iterations, NEVER))
     if not taken:
         raise SceneError(f"{orbit.settings.path}: expected a formula that is taken at the first iteration")

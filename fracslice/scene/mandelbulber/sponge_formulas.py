@@ -13,7 +13,7 @@ PLANES = 9
 """Reflections of a kaleidoscope, numbered from 0."""
 
 
-@known(7, "Menger Sponge", MENGER, LEFT_OUT, even=True)
+@known(7, "Menger sponge", MENGER, LEFT_OUT, even=True)
 def menger_sponge(s: FormulaStep) -> None:
     """Menger's sponge by folds."""
     s.write("w = positive(w)")
@@ -67,7 +67,7 @@ def weigh(s: FormulaStep, switch: str, first: str, second: str) -> None:
         s.write(f"w = {s.parameter('weight', scale)} * w")
 
 
-@known(113, "Menger Smooth", "Knighty 2010 and Eiffie 2012, fractalforums.com", LEFT_OUT)
+@known(113, "Menger - Smooth", "Knighty 2010 and Eiffie 2012, fractalforums.com", LEFT_OUT)
 def menger_smooth(s: FormulaStep) -> None:
     """A sponge whose folds are round."""
     a, e = s.number("transf_scale_3"), s.number("transf_offset_0005")
@@ -160,7 +160,7 @@ def sierpinski(s: FormulaStep) -> None:
         s.turn("transf_rotation")
 
 
-@known(228, "IFS - Gen", "Sandercoe 2020, fractalforums.org", LEFT_OUT)
+@known(228, "Ifs - Gen", "Sandercoe 2020, fractalforums.org", LEFT_OUT)
 def ifs(s: FormulaStep) -> None:
     """Absolute values, an offset, a scale, a ball and turns."""
     absolute(s, *(f"transf_function_enabledA{axis}" for axis in "xyz"))
@@ -256,7 +256,7 @@ def koch_ifs(s: FormulaStep) -> None:
     koch(s)
 
 
-@known(114, "Menger Smooth - Mod 1", "Knighty 2010 and Eiffie 2012, fractalforums.com", LEFT_OUT)
+@known(114, "Menger - Smooth Mod1", "Knighty 2010 and Eiffie 2012, fractalforums.com", LEFT_OUT)
 def menger_smooth_mod_1(s: FormulaStep) -> None:
     """A sponge whose folds are round, each by its own measure."""
     if s.on("transf_function_enabled"):
@@ -296,7 +296,7 @@ SLOPE = "0.8660254037844386"
 """sqrt(3) / 2."""
 
 
-@known(98, "Menger Cross KIFS", "Knighty 2010, fractalforums.com", LEFT_OUT)
+@known(98, "Menger - Cross KIFS", "Knighty 2010, fractalforums.com", LEFT_OUT)
 def menger_cross(s: FormulaStep) -> None:
     """Reflections of a prism's cross, a scale and an offset."""
     if s.during("transf_start_iterations", "transf_stop_iterations_1"):

@@ -26,6 +26,9 @@ not to.
 ORDERS = ("xyz", "xzy", "yxz", "yzx", "zxy", "zyx")
 """Words for orders of coordinates."""
 
+SQUARE, CYLINDER = "x * x + y * y + z * z", "x * x + y * y"
+"""Squares of the distance to the origin, and to the z axis."""
+
 SMALL = 1e-9
 """Least radius within which the fold of a ball only scales."""
 
@@ -157,27 +160,41 @@ class FormulaStep:
         """Reflect each coordinate beyond a limit: to a value less it. Space is torn unless that is twice the
         limit.
         """
-        most, image = self.value(limit), self.value(value)
+        self.fold_beyond(limit.removesuffix("_limit"), self.value(limit), self.value(value))
+
+    def fold_beyond(self, name: str, most: float, image: float) -> None:
+        """`fold_apart` by numbers."""
+        limit = self.parameter(f"{name}_limit", most)
         if image == 2 * most and most > 0:
-            self.write(f"w = fold(w, {self.number(limit)})")
-            return
-        a, b = self.number(limit), self.number(value)
+            self.write(f"w = fold(w, {limit})")
+        else:
+            self._fold_beyond(limit, self.parameter(f"{name}_value", image))
+
+    def _fold_beyond(self, a: str, b: str) -> None:
         self.write("x, y, z = w")
         for x in "xyz":
             self.write(f"{x} = where({x} > {a}, {b} - {x}, where({x} < -{a}, -{b} - {x}, {x}))")
         self.write("w = (x, y, z)")
 
-    def ball(self, inner: float, outer: float, offset: str | None = None, scale: str | None = None) -> None:
+    def ball(
+        self,
+        inner: float,
+        outer: float,
+        offset: str | None = None,
+        scale: str | None = None,
+        square: str = SQUARE,
+    ) -> None:
         """Invert in a ball what is in it, and scale within the inner radius; both radii are squared. A vector
         is added before and subtracted after, where only the radius is that without it; a scale is in between.
+        `square` is the square of the radius where it is another.
         """
         a, b = self.parameter("inner", _root(inner)), self.parameter("outer", _root(outer))
         moved = offset is not None and any(self.vector(offset))
         scaled = scale is not None and self.value(scale) != 1
-        if 0 < inner <= outer and not moved and not scaled:
+        if 0 < inner <= outer and not moved and not scaled and square == SQUARE:
             self.write(f"w = ball(w, {a})" if outer == 1 else f"w = {b} * ball(w / {b}, {a} / {b})")
             return
-        self.write("x, y, z = w", "s = x * x + y * y + z * z", f"t = {b} * {b}", f"m = {a} * {a}")
+        self.write("x, y, z = w", f"s = {square}", f"t = {b} * {b}", f"m = {a} * {a}")
         ring = "where(s < t, t / maximum(s, 1e-18), 1)" if inner <= outer else "1"
         k = f"where(s < m, t / m, {ring})"
         if scaled and scale is not None:

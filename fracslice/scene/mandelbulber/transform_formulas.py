@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
+from .box_formulas import turned_folds
 from .folds import PI, absolute, absolute_of, diagonals, mandalay, polygon, symmetric
 from .sponge_formulas import box_offset
 from .step_text import LEFT_OUT, ORDERS, FormulaStep, known
@@ -86,7 +88,7 @@ def spherical_fold(s: FormulaStep) -> None:
     s.ball(inner * inner, outer * outer, "mandelbox_offset", "transf_scale")
 
 
-@known(1022, "T>Z vector Axis Swap", MANDELBULBER, LEFT_OUT)
+@known(1022, "T>Zvector Axis Swap", MANDELBULBER, LEFT_OUT)
 def axis_swap(s: FormulaStep) -> None:
     """Take the coordinates in another order."""
     word = s.values.one_of("mandelbulbMulti_order_of_xyz", ORDERS)
@@ -138,14 +140,14 @@ def tglad_fold(s: FormulaStep) -> None:
     s.fold("transf_addition_constant")
 
 
-@known(1027, "T>R Power", MANDELBULBER, LEFT_OUT)
+@known(1027, "T>R^Power", MANDELBULBER, LEFT_OUT)
 def r_power(s: FormulaStep) -> None:
     """Multiply by a power of the radius."""
     n = s.number("power")
     s.write("x, y, z = w", f"w = exp(0.5 * ({n} - 1) * log(maximum(x * x + y * y + z * z, 1e-30))) * w")
 
 
-@known(1036, "T>Rotation Vary V1", MANDELBULBER, LEFT_OUT)
+@known(1036, "T>Rotation VaryV1", MANDELBULBER, LEFT_OUT)
 def rotation_vary(s: FormulaStep) -> None:
     """Turn by angles that change over some iterations."""
     start, stop = s.values.whole("transf_start_iterations_250"), s.values.whole("transf_stop_iterations")
@@ -211,7 +213,7 @@ def switched_fold(s: FormulaStep, name: str, switches: Sequence[str]) -> None:
         s.write(f"w = fold_to(w, ({', '.join(values)}))")
 
 
-@known(1055, "T>Spherical Inv", MANDELBULBER, LEFT_OUT)
+@known(1055, "T>Spherical Invert", MANDELBULBER, LEFT_OUT)
 def spherical_inversion(s: FormulaStep) -> None:
     """Invert in the unit sphere about a point."""
     s.refuse("transf_function_enabledy_false")
@@ -249,7 +251,7 @@ def abs_conditional(s: FormulaStep) -> None:
     s.write("w = (x, y, z)")
 
 
-@known(1080, "T>PolyFold Sym XY", "Sandercoe and Luca 2016, fractalforums.com", LEFT_OUT)
+@known(1080, "T>Poly Fold Sym XY", "Sandercoe and Luca 2016, fractalforums.com", LEFT_OUT)
 def poly_fold_sym(s: FormulaStep) -> None:
     """Turn the sector of a polygon into one of two, and reflect every other."""
     absolute_of(s, [s.on(f"transf_function_enabled{axis}_false") for axis in "xy"] + [False])
@@ -264,7 +266,7 @@ def poly_fold_sym(s: FormulaStep) -> None:
     s.write(f"w = (u + {a}, v + {b}, z)")
 
 
-@known(1100, "T>PolyFold Atan2", "Sandercoe and Luca 2016, fractalforums.com", LEFT_OUT)
+@known(1100, "T>Poly Fold Atan2", "Sandercoe and Luca 2016, fractalforums.com", LEFT_OUT)
 def poly_fold_atan2(s: FormulaStep) -> None:
     """Fold into sectors of polygons."""
     absolute(
@@ -342,7 +344,7 @@ def abs_sym_3(s: FormulaStep) -> None:
         s.refuse("transf_addCpixel_enabled_false")
 
 
-@known(1155, "T>Spherical Inv V4", MANDELBULBER, LEFT_OUT)
+@known(1155, "T>Spherical Invert V4", MANDELBULBER, LEFT_OUT)
 def spherical_inversion_4(s: FormulaStep) -> None:
     """Multiply by the square of the radius or its inverse, as modes say in a shell."""
     s.refuse("transf_function_enabledy_false")
@@ -419,7 +421,7 @@ def add_cpixel_inverted(s: FormulaStep) -> None:
     s.write(f"mx, my, mz = {m}", "w = (x + mx * ux, y + my * uy, z + mz * uz)")
 
 
-@known(1068, "T>Spherical Offset VCL", MANDELBULBER, LEFT_OUT)
+@known(1068, "T>Spherical OffsetVCL", MANDELBULBER, LEFT_OUT)
 def spherical_offset_curve(s: FormulaStep) -> None:
     """Move along the radius."""
     s.refuse("transf_function_enabled")
@@ -437,7 +439,7 @@ def spherical_offset(s: FormulaStep) -> None:
     s.scale("transf_scale")
 
 
-@known(1084, "T>Sin & Cos Max", MANDELBULBER, LEFT_OUT)
+@known(1084, "T>Sin And Cos - Max", MANDELBULBER, LEFT_OUT)
 def sine_cosine(s: FormulaStep) -> None:
     """The larger of a sine, a cosine and their product, of each coordinate."""
     f, g = s.point("transf_constant_multiplierA_111"), s.point("transf_constant_multiplierB_111")
@@ -477,7 +479,7 @@ def diagonal_fold(s: FormulaStep) -> None:
             s.write(f"w = mirror(w, {normal})")
 
 
-@known(1140, "T>PolyXY Fold V1", "Sandercoe and Luca 2016, fractalforums.com", LEFT_OUT)
+@known(1140, "T>Poly XY Fold V1", "Sandercoe and Luca 2016, fractalforums.com", LEFT_OUT)
 def poly_fold(s: FormulaStep) -> None:
     """Fold into a sector of a polygon, and mix x and y of the image."""
     if s.during("transf_start_iterations_D", "transf_stop_iterations_D1"):
@@ -526,3 +528,47 @@ def menger_fold_2(s: FormulaStep) -> None:
         )
         s.write(f"w = ({a} * x - ox * k, {a} * y - oy * k, {a} * z)")
     s.add("transf_addition_constantA_000")
+
+
+@known(1151, "T>Dot Fold", "Knighty 2010, fractalforums.com", LEFT_OUT)
+def dot_fold(s: FormulaStep) -> None:
+    """Reflect the points in front of a plane through the origin behind it."""
+    normal = list(s.vector("transf_offset_000"))
+    if not s.on("transf_function_enabled_false"):
+        a, b = (math.radians(s.value(f"transf_angle_deg_{letter}")) for letter in "AB")
+        own = (math.cos(a) * math.sin(b), math.sin(a), math.cos(a) * math.cos(b))
+        normal = [p + q for p, q in zip(normal, own, strict=True)]
+    absolute(s, *(f"transf_function_enabledA{axis}_false" for axis in "xyz"))
+    if any(normal):
+        x, y, z = (-v for v in normal)
+        s.write(f"w = mirror(w, {s.parameter('normal', (x, y, z))})")
+    s.scale("transf_scale_1")
+    s.turn("transf_rotation")
+
+
+@known(1059, "T>Octo Fold", "Knighty 2010, fractalforums.com", LEFT_OUT)
+def octo_fold(s: FormulaStep) -> None:
+    """An octahedron's folds, a scale and an offset."""
+    for normal in ("(1, 1, 0)", "(1, 0, 1)", "(1, -1, 0)", "(1, 0, -1)"):
+        s.write(f"w = mirror(w, {normal})")
+    a, o = s.number("transf_scale_2"), s.point("transf_offset_100")
+    s.write("x, y, z = w", f"w = {a} * (absolute(x), y, z) - ({a} - 1) * {o}")
+
+
+@known(1048, "T>Rotation Folding Plane", "Lowe 2010", LEFT_OUT)
+def folding_planes(s: FormulaStep) -> None:
+    """Folds of each coordinate in frames of their own."""
+    turned_folds(s)
+
+
+@known(1029, "T>Abs Add Multi", MANDELBULBER, LEFT_OUT)
+def abs_add_multi(s: FormulaStep) -> None:
+    """|x + a| - |x - b| - k x, without the terms whose switches are off."""
+    columns = (s.vector(f"transf_{name}") for name in ("addition_constant", "offset_000", "scale3D_111"))
+    parts = []
+    for p, a, b, k in zip("xyz", *columns, strict=True):
+        one = f"absolute({p} + {s.parameter(f'a_{p}', a)})" if s.on(f"transf_function_enabledA{p}") else "0"
+        two = f"absolute({p} - {s.parameter(f'b_{p}', b)})" if s.on(f"transf_function_enabled{p}") else "0"
+        parts.append(f"{one} - {two} - {s.parameter(f'k_{p}', k)} * {p}")
+    s.write("x, y, z = w", f"w = ({', '.join(parts)})")
+    s.add("transf_offsetA_000")
