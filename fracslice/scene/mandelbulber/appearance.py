@@ -100,8 +100,7 @@ def sky(main: SettingsSection) -> Light:
     down = main.colour("background_color_3", "0000 2710 01f4")
     if not main.flag("background_3_colors_enable", "true"):
         down = middle
-    strength = 0.6 if main.flag("ambient_occlusion_enabled", "false") else 0.35
-    return Light(kind="sky", colour=up, horizon=middle, ground=down, strength=strength)
+    return Light(kind="sky", colour=up, horizon=middle, ground=down, strength=0.35)
 
 
 def lights(settings: Settings, seen: Camera) -> tuple[Light, ...]:
@@ -161,6 +160,15 @@ def fog(main: SettingsSection) -> Fog | None:
     return Fog(colour=colour, density=min(round(math.log(2) / distance, 6), 1e6))
 
 
+def shading(main: SettingsSection, seen: Camera) -> Shading:
+    """Ambient light, which is darker in holes; its strength there is that of the occlusion."""
+    strength = (
+        main.number("ambient_occlusion", "1") if main.flag("ambient_occlusion_enabled", "false") else 0.25
+    )
+    reach = float(f"{max(0.5 * math.dist(seen.eye, seen.target), 1e-9):.3g}")
+    return Shading(ambient=round(min(max(0.4 * strength, 0.0), 100.0), 4), occlusion=1.0, reach=reach)
+
+
 def view(settings: Settings) -> View:
     """View of a file."""
     seen = camera(settings)
@@ -169,7 +177,7 @@ def view(settings: Settings) -> View:
         film=film(settings),
         lights=lights(settings, seen),
         fog=fog(settings.main),
-        shading=Shading(),
+        shading=shading(settings.main, seen),
     )
 
 
