@@ -205,8 +205,12 @@ def agrees(number: int, count: int) -> None:
         assert (within == known)[usual & ~beside].mean() > 0.9999
 
 
-def test_every_formula_has_an_oracle() -> None:
+def test_every_formula_has_an_oracle_and_is_in_the_manual() -> None:
     assert set(ORACLE) == set(FORMULAS)
+    page = (Path(__file__).parents[2] / "docs/tasks/import.md").read_text(encoding="utf-8")
+    rows = [row.split(" | ")[1] for row in page.splitlines() if row.startswith("| ") and "; " in row]
+    listed = {name.removesuffix(" |") for row in rows for name in row.split("; ")}
+    assert {known.name for known in FORMULAS.values()} <= listed
 
 
 SOLID = "formula_1 8; N 4; hybrid_fractal_enable true; formula_2 7; formula_iterations_2 2"

@@ -125,26 +125,24 @@ def swap(s: FormulaStep, switch: str, image: str) -> None:
 def abox_mod_11(s: FormulaStep) -> None:
     """A Mandelbox with a box of three sizes and a scale that varies."""
     scale = vary_scale(s)
-    if s.during("transf_start_iterations_B", "transf_stop_iterations_B"):
+    if s.within("B"):
         s.fold("transf_addition_constant_111") if s.on("transf_function_enabled") else s.fold_flat(
             "transf_addition_constant_111"
         )
         if s.during("transf_start_iterations_D", "transf_stop_iterations_D1"):
             s.refuse("transf_function_enabled_false")
     swap(s, "transf_function_enabledSw_false", "(z, y, x)")
-    if s.during("transf_start_iterations_S", "transf_stop_iterations_S"):
+    if s.within("S"):
         s.refuse("transf_function_enabledy_false")
         fold_ball(s, "mandelbox_offset")
-    if s.during("transf_start_iterations_A", "transf_stop_iterations_A"):
+    if s.within("A"):
         scale_by(s, scale)
     s.add("transf_addition_constant")
-    if s.on("transf_addCpixel_enabled_false") and s.during(
-        "transf_start_iterations_E", "transf_stop_iterations_E"
-    ):
+    if s.on("transf_addCpixel_enabled_false") and s.within("E"):
         s.add_constant(
             "mandelbulbMulti_order_of_xyz", "transf_constant_multiplier_111", "transf_alternate_enabled_false"
         )
-    if s.on("transf_rotation_enabled") and s.during("transf_start_iterations_R", "transf_stop_iterations_R"):
+    if s.on("transf_rotation_enabled") and s.within("R"):
         s.turn("transf_rotation")
     if s.during("transf_start_iterations_C", "transf_stop_iterations_C1"):
         s.scale("transf_scaleG_1")
@@ -153,17 +151,13 @@ def abox_mod_11(s: FormulaStep) -> None:
 @known(132, "Amazing Surf - Mod 2", "Kali 2011 after Lowe 2010, fractalforums.com")
 def amazing_surf_mod_2(s: FormulaStep) -> None:
     """Folds along x and y in turn, a ball or a cylinder, and a scale that varies."""
-    if s.on("transf_addCpixel_enabled_false") and s.during(
-        "transf_start_iterations_H", "transf_stop_iterations_H"
-    ):
-        if s.during("transf_start_iterations_G", "transf_stop_iterations_G"):
+    if s.on("transf_addCpixel_enabled_false") and s.within("H"):
+        if s.within("G"):
             s.refuse("transf_rotation_enabled")
         s.add_constant(
             "mandelbulbMulti_order_of_xyz", "transf_constant_multiplier_111", "transf_alternate_enabled_false"
         )
-    if s.on("transf_function_enabledCx_false") and s.during(
-        "transf_start_iterations_F", "transf_stop_iterations_F"
-    ):
+    if s.on("transf_function_enabledCx_false") and s.within("F"):
         add_inverse(s, "transf_function_enabledCy_false")
     switches = (
         "transf_function_enabledAx",
@@ -171,33 +165,27 @@ def amazing_surf_mod_2(s: FormulaStep) -> None:
         "transf_function_enabledAz_false",
     )
     for k, (switch, letter) in enumerate(zip(switches, "ABC", strict=True), 1):
-        during = s.during(f"transf_start_iterations_{letter}", f"transf_stop_iterations_{letter}")
+        during = s.within(letter)
         if s.on(switch) and during:
             surf_fold(s, f"aSurf3Folds_order_of_folds_{k}")
     if s.on("transf_function_enabledAx_false"):
         x, y, z = s.vector("transf_addition_constant_111")
         s.write(f"w = fold_to(w, (1e6, 1e6, {s.parameter('transf_addition_constant_111_z', z)}))")
     swap(s, "transf_function_enabledSw_false", "(y, x, z)")
-    if s.on("transf_function_enabledBz_false") and s.during(
-        "transf_start_iterations_X", "transf_stop_iterations_X"
-    ):
+    if s.on("transf_function_enabledBz_false") and s.within("X"):
         s.refuse("transf_function_enabledBx_false", "transf_function_enabledBy_false")
     s.add("transf_addition_constant")
     if s.on("transf_function_enabledAy"):
         s.refuse("transf_function_enabled_false")
-        if s.during("transf_start_iterations_M", "transf_stop_iterations_M"):
+        if s.within("M"):
             fold_ball(s, "mandelbox_offset")
     resets = s.on("transf_function_enabledM_false")
-    vary = s.on("transf_function_enabledF_false") and s.during(
-        "transf_start_iterations_Y", "transf_stop_iterations_Y"
-    )
-    scaled = s.during("transf_start_iterations_S", "transf_stop_iterations_S")
+    vary = s.on("transf_function_enabledF_false") and s.within("Y")
+    scaled = s.within("S")
     scale = add_vary(s, "mandelbox_scale", "transf_scaleC_1", vary, resets)
     if scaled:
         scale_by(s, scale)
-    if s.on("mandelbox_main_rotation_enabled") and s.during(
-        "transf_start_iterations_R", "transf_stop_iterations_R"
-    ):
+    if s.on("mandelbox_main_rotation_enabled") and s.within("R"):
         s.turn("mandelbox_rotation_main")
 
 
@@ -274,40 +262,36 @@ def inversion(s: FormulaStep, start: str, stop: str) -> None:
 def abox_mod_15(s: FormulaStep) -> None:
     """A Mandelbox after an inversion, between two turns."""
     if s.on("transf_function_enabled_false"):
-        if s.during("transf_start_iterations", "transf_stop_iterations"):
+        if s.within(""):
             absolute(s, *("transf_function_enabled" + axis for axis in "xyz"))
-        if s.during("transf_start_iterations_T", "transf_stop_iterations_T"):
+        if s.within("T"):
             word = s.values.one_of("mandelbulbMulti_order_of_xyz", ORDERS)
             signs = [s.on(f"transf_function_enabled{axis}_false") for axis in "xyz"]
             parts = (f"-{axis}" if minus else axis for axis, minus in zip(word, signs, strict=True))
             s.write("x, y, z = w", f"w = ({', '.join(parts)})")
     inversion(s, "transf_start_iterations_X", "transf_stop_iterations_1")
-    if s.during("transf_start_iterations_B", "transf_stop_iterations_B"):
+    if s.within("B"):
         if s.on("transf_function_enabled"):
             s.fold("transf_addition_constant_111")
         else:
             s.fold_flat("transf_addition_constant_111")
-    if s.during("transf_start_iterations_M", "transf_stop_iterations_M"):
+    if s.within("M"):
         s.add("transf_offsetA_000")
-    if s.during("transf_start_iterations_S", "transf_stop_iterations_S"):
+    if s.within("S"):
         fold_ball(s, None)
-    if s.during("transf_start_iterations_E", "transf_stop_iterations_E"):
+    if s.within("E"):
         scale_by(
             s, add_vary(s, "transf_scale_2", "transf_scaleC_1", s.on("transf_function_enabledK_false"), True)
         )
-    if s.on("transf_rotation2_enabled_false") and s.during(
-        "transf_start_iterations_C", "transf_stop_iterations_C"
-    ):
+    if s.on("transf_rotation2_enabled_false") and s.within("C"):
         s.turn("transf_rotation")
-    if s.on("transf_addCpixel_enabled_false") and s.during(
-        "transf_start_iterations_G", "transf_stop_iterations_G"
-    ):
+    if s.on("transf_addCpixel_enabled_false") and s.within("G"):
         s.add_constant("", "transf_constant_multiplier_111")
-    if s.during("transf_start_iterations_F", "transf_stop_iterations_F"):
+    if s.within("F"):
         s.add("transf_addition_constantA_000")
-    if s.during("transf_start_iterations_R", "transf_stop_iterations_R"):
+    if s.within("R"):
         s.turn("transf_rotation2")
-    if s.during("transf_start_iterations_N", "transf_stop_iterations_N"):
+    if s.within("N"):
         s.refuse("transf_function_enabledN_false")
 
 
@@ -343,19 +327,19 @@ def box_fold_bulb(s: FormulaStep) -> None:
 
 def box_ball_scale(s: FormulaStep) -> None:
     """Box, ball and scale of the second and third kind of a box with a square."""
-    if s.during("transf_start_iterations_B", "transf_stop_iterations_B"):
+    if s.within("B"):
         s.fold("transf_addition_constant_111")
-    if s.during("transf_start_iterations_S", "transf_stop_iterations_S"):
+    if s.within("S"):
         fold_ball(s, "mandelbox_offset")
-    if s.during("transf_start_iterations_C", "transf_stop_iterations_C"):
-        vary = s.during("transf_start_iterations_X", "transf_stop_iterations_X")
+    if s.within("C"):
+        vary = s.within("X")
         resets = s.on("transf_function_enabledM_false")
         scale_by(s, add_vary(s, "transf_scale", "transf_scaleB_1", vary, resets))
 
 
 def doubled_square(s: FormulaStep) -> None:
     """Square of twice the point."""
-    if s.during("transf_start_iterations_A", "transf_stop_iterations_A"):
+    if s.within("A"):
         s.write("w = 2 * w")
         s.square("boxfold_bulbpow2_z_factor")
 
@@ -374,22 +358,16 @@ def box_fold_bulb_3(s: FormulaStep) -> None:
     box_ball_scale(s)
     if s.during("transf_start_iterationsTM", "transf_stop_iterationsTM_1"):
         s.refuse("transf_function_enabledX_false")
-    if s.on("transf_function_enabledD_false") and s.during(
-        "transf_start_iterations_D", "transf_stop_iterations_D"
-    ):
+    if s.on("transf_function_enabledD_false") and s.within("D"):
         s.write("w = mirror(w, (1, 1, 0))", "w = mirror(w, (1, 0, 1))")
         s.write(
             "w = mirror(w, (1, -1, 0))", "w = mirror(w, (1, 0, -1))", "x, y, z = w", "w = (absolute(x), y, z)"
         )
         a, o = s.number("transf_scaleA_2"), s.point("transf_offset_100")
         s.write(f"w = {a} * w - ({a} - 1) * {o}")
-    if s.on("transf_function_enabledR_false") and s.during(
-        "transf_start_iterations_R", "transf_stop_iterations_R"
-    ):
+    if s.on("transf_function_enabledR_false") and s.within("R"):
         s.turn("transf_rotation")
-    if s.on("transf_function_enabledF_false") and s.during(
-        "transf_start_iterations_M", "transf_stop_iterations_M"
-    ):
+    if s.on("transf_function_enabledF_false") and s.within("M"):
         s.add("transf_addition_constantA_000")
         s.write("w = positive(w)")
         if s.on("transf_function_enabled"):
@@ -433,12 +411,12 @@ def abox_mod_kali_2(s: FormulaStep) -> None:
     fold_ball(s, None)
     s.scale("transf_scale_015")
     s.add("transf_addition_constant")
-    if s.on("transf_rotation_enabled") and s.during("transf_start_iterations", "transf_stop_iterations"):
+    if s.on("transf_rotation_enabled") and s.within(""):
         s.turn("transf_rotation")
     s.add("transf_addition_constant")
-    if s.during("transf_start_iterations_C", "transf_stop_iterations_C"):
+    if s.within("C"):
         s.refuse("transf_addCpixel_enabled_false")
-    if s.during("transf_start_iterations_D", "transf_stop_iterations_D"):
+    if s.within("D"):
         s.refuse("transf_function_enabledS_false")
 
 
@@ -449,7 +427,7 @@ def abox_mod_kali_3(s: FormulaStep) -> None:
         s.write(f"w = {s.point('transf_offset_111')} - positive(w)")
     own_ball(s)
     s.write(f"w = -{s.number('transf_scale_015')} * w")
-    if s.during("transf_start_iterations_B", "transf_stop_iterations_B"):
+    if s.within("B"):
         s.add("transf_offsetA_111")
 
 
@@ -467,19 +445,15 @@ def abox_mod_1(s: FormulaStep) -> None:
         parts[2] = "z"
     s.write("x, y, z = w", f"w = ({', '.join(parts)})")
     square = SQUARE
-    if s.on("transf_function_enabled_false") and s.during(
-        "transf_start_iterations_K", "transf_stop_iterations_K"
-    ):
+    if s.on("transf_function_enabled_false") and s.within("K"):
         square = f"exp({s.number('mandelbox_vary_rpower')} * log(maximum({SQUARE}, 1e-30)))"
     s.ball(s.value("transf_minimum_radius_0"), s.value("transf_maxR2_1"), square=square)
     scale_by(s, scale)
-    if s.on("transf_addCpixel_enabled_false") and s.during(
-        "transf_start_iterations_E", "transf_stop_iterations_E"
-    ):
+    if s.on("transf_addCpixel_enabled_false") and s.within("E"):
         s.add_constant(
             "mandelbulbMulti_order_of_xyz", "transf_constant_multiplier_111", "transf_alternate_enabled_false"
         )
-    if s.on("transf_rotation_enabled") and s.during("transf_start_iterations_R", "transf_stop_iterations_R"):
+    if s.on("transf_rotation_enabled") and s.within("R"):
         s.turn("transf_rotation")
 
 
@@ -512,7 +486,7 @@ def abox_icen(s: FormulaStep) -> None:
     s.write("w = w + t" if own else f"w = w + {j}")
     mandelbox_ball(s, None)
     scale_by(s, scale)
-    if s.on("transf_rotation_enabled") and s.during("transf_start_iterations", "transf_stop_iterations"):
+    if s.on("transf_rotation_enabled") and s.within(""):
         s.turn("transf_rotation")
     s.write("cx, cy, cz = c", "t = (mx * cx, my * cy, mz * cz)", f"w = w {'-' if own else '+'} t + {j}")
 
@@ -520,11 +494,9 @@ def abox_icen(s: FormulaStep) -> None:
 @known(127, "Abox - Mod 13", "Sandercoe after Lowe 2010, fractalforums.org")
 def abox_mod_13(s: FormulaStep) -> None:
     """A Mandelbox with a box of three sizes, and a vector that is added in some iterations."""
-    if s.on("transf_function_enabledAz_false") and s.during(
-        "transf_start_iterations_E", "transf_stop_iterations_E"
-    ):
+    if s.on("transf_function_enabledAz_false") and s.within("E"):
         add_inverse(s, "transf_function_enabledAy_false")
-    if s.during("transf_start_iterations_A", "transf_stop_iterations_A"):
+    if s.within("A"):
         if s.on("transf_function_enabled"):
             s.fold("transf_addition_constant_111")
         else:
@@ -532,42 +504,36 @@ def abox_mod_13(s: FormulaStep) -> None:
     if s.during("transf_start_iterations_D", "transf_stop_iterations_D1"):
         s.refuse("transf_function_enabled_false")
     swap(s, "transf_function_enabledSw_false", "(z, y, x)")
-    if s.during("transf_start_iterations_S", "transf_stop_iterations_S"):
+    if s.within("S"):
         fold_ball(s, "mandelbox_offset")
-    vary = s.on("transf_function_enabledX_false") and s.during(
-        "transf_start_iterations_X", "transf_stop_iterations_X"
-    )
+    vary = s.on("transf_function_enabledX_false") and s.within("X")
     added = s.state.get("added", 0.0)
     scale = add_vary(s, "mandelbox_scale", "transf_scaleB_1", vary, s.on("transf_function_enabledM_false"))
     scale_by(s, scale if vary else scale - added)
-    if s.during("transf_start_iterations_B", "transf_stop_iterations_B"):
+    if s.within("B"):
         s.refuse("transf_function_enabledAx_false")
         s.add("transf_addition_constant")
-    if s.on("transf_addCpixel_enabled_false") and s.during(
-        "transf_start_iterations_C", "transf_stop_iterations_C"
-    ):
+    if s.on("transf_addCpixel_enabled_false") and s.within("C"):
         s.add_constant(
             "mandelbulbMulti_order_of_xyz", "transf_constant_multiplier_111", "transf_alternate_enabled_false"
         )
-    if s.on("transf_rotation_enabled") and s.during("transf_start_iterations_R", "transf_stop_iterations_R"):
+    if s.on("transf_rotation_enabled") and s.within("R"):
         s.turn("transf_rotation")
 
 
 @known(59, "Fold Box - Mod 1", "Lowe 2010, fractalforums.com")
 def fold_box_mod_1(s: FormulaStep) -> None:
     """A Mandelbox whose fold is a difference of two absolute values, each with its own limit."""
-    if s.during("transf_start_iterations", "transf_stop_iterations"):
+    if s.within(""):
         absolute_fold(s)
-    if s.during("transf_start_iterations_A", "transf_stop_iterations_A"):
+    if s.within("A"):
         s.refuse("transf_function_enabled_false")
-    if s.during("transf_start_iterations_B", "transf_stop_iterations_B"):
+    if s.within("B"):
         mandelbox_ball(s, None)
-    if s.during("transf_start_iterations_D", "transf_stop_iterations_D"):
+    if s.within("D"):
         s.refuse("transf_function_enabledX_false")
     s.scale("mandelbox_scale")
-    if s.on("mandelbox_main_rotation_enabled") and s.during(
-        "transf_start_iterations_C", "transf_stop_iterations_C"
-    ):
+    if s.on("mandelbox_main_rotation_enabled") and s.within("C"):
         s.turn("mandelbox_rotation_main")
 
 
@@ -590,19 +556,17 @@ def mandelbox_menger(s: FormulaStep) -> None:
     s.refuse(
         "mandelbox_rotations_enabled", "transf_addCpixel_enabled_false", "transf_function_enabledx_false"
     )
-    if s.during("transf_start_iterations_A", "transf_stop_iterations_A"):
+    if s.within("A"):
         if s.value("transf_scale_1") != 1:
             raise UnknownError(f"{s.values.place('transf_scale_1')}: transf_scale_1")
         s.fold_apart("mandelbox_folding_limit", "mandelbox_folding_value")
-    if s.during("transf_start_iterations_B", "transf_stop_iterations_B"):
+    if s.within("B"):
         mandelbox_ball(s, "mandelbox_offset")
-    if s.on("mandelbox_main_rotation_enabled") and s.during(
-        "transf_start_iterations_R", "transf_stop_iterations_R"
-    ):
+    if s.on("mandelbox_main_rotation_enabled") and s.within("R"):
         s.turn("mandelbox_rotation_main")
-    if s.during("transf_start_iterations_S", "transf_stop_iterations_S"):
+    if s.within("S"):
         s.scale("mandelbox_scale")
-    if s.on("transf_function_enabled") and s.during("transf_start_iterations_M", "transf_stop_iterations_M"):
+    if s.on("transf_function_enabled") and s.within("M"):
         for _ in range(min(s.values.whole("transf_int_1"), 4)):
             s.write("w = positive(w)")
             s.menger("transf_scale_3", "transf_constant_multiplierA_111")
@@ -620,15 +584,20 @@ def mandalay_box(s: FormulaStep) -> None:
     s.turn("transf_rotation")
 
 
+def after_klein(s: FormulaStep) -> None:
+    """A box and a scale, after the last inversion."""
+    if s.on("transf_function_enabled"):
+        s.fold("transf_offset_110")
+    s.scale("transf_scale_2")
+    s.add("transf_offsetA_000")
+
+
 @known(221, "Amazing Surf - Klein", "Kali 2011, fractalforums.com", LEFT_OUT)
 def amazing_surf_klein(s: FormulaStep) -> None:
     """An Amazing Surf for some iterations, then a box and a scale."""
     inversion(s, "transf_start_iterations_X", "transf_stop_iterations_1")
     if s.index >= s.values.whole("transf_int8_X"):
-        if s.on("transf_function_enabled"):
-            s.fold("transf_offset_110")
-        s.scale("transf_scale_2")
-        s.add("transf_offsetA_000")
+        after_klein(s)
         return
     s.fold_flat("transf_addition_constant_111")
     swap(s, "transf_function_enabledSw_false", "(y, x, z)")
@@ -650,10 +619,7 @@ def abox_klein(s: FormulaStep) -> None:
     """A Mandelbox for some iterations, then a box and a scale."""
     inversion(s, "transf_start_iterations_X", "transf_stop_iterations_1")
     if s.index >= s.values.whole("transf_stop_iterations_15"):
-        if s.on("transf_function_enabled"):
-            s.fold("transf_offset_110")
-        s.scale("transf_scale_2")
-        s.add("transf_offsetA_000")
+        after_klein(s)
         return
     s.fold("transf_addition_constant_111")
     swap(s, "transf_function_enabledSw_false", "(y, x, z)")
@@ -669,21 +635,17 @@ def abox_klein(s: FormulaStep) -> None:
 @known(199, "Mandalay Box V2", "Knighty and DarkBeam 2015, fractalforums.com")
 def mandalay_box_2(s: FormulaStep) -> None:
     """A box, a Mandalay fold, a ball and a scale, in their iterations."""
-    if s.on("transf_function_enabledA_false") and s.during(
-        "transf_start_iterations_A", "transf_stop_iterations_A"
-    ):
+    if s.on("transf_function_enabledA_false") and s.within("A"):
         if s.on("transf_function_enabled"):
             s.fold("transf_addition_constant_111")
         else:
             s.fold_flat("transf_addition_constant_111")
-    if s.during("transf_start_iterations_P", "transf_stop_iterations_P"):
+    if s.within("P"):
         s.refuse("transf_function_enabledP_false")
     mandalay(s, s.on("transf_function_enabledSw_false"))
-    if s.during("transf_start_iterations_S", "transf_stop_iterations_S"):
+    if s.within("S"):
         fold_ball(s, None)
-    vary = s.on("transf_function_enabledK_false") and s.during(
-        "transf_start_iterations_K", "transf_stop_iterations_K"
-    )
+    vary = s.on("transf_function_enabledK_false") and s.within("K")
     scale_by(s, add_vary(s, "transf_scale_2", "transf_scaleC_1", vary, False))
-    if s.on("transf_rotation_enabled") and s.during("transf_start_iterations_R", "transf_stop_iterations_R"):
+    if s.on("transf_rotation_enabled") and s.within("R"):
         s.turn("transf_rotation")

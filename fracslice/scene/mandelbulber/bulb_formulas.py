@@ -101,26 +101,22 @@ def benesi_pine_tree(s: FormulaStep) -> None:
 @known(137, "Mandelbulb - Abs Power 2", NYLANDER)
 def mandelbulb_abs_2(s: FormulaStep) -> None:
     """The square with absolute values before and after, and turns."""
-    if s.on("transf_rotation_enabled") and s.during("transf_start_iterations_R", "transf_stop_iterations_R"):
+    if s.on("transf_rotation_enabled") and s.within("R"):
         s.turn("transf_rotation")
-    if s.on("transf_function_enabledD_false") and s.during(
-        "transf_start_iterations_D", "transf_stop_iterations_D"
-    ):
+    if s.on("transf_function_enabledD_false") and s.within("D"):
         s.add("transf_offsetA_000")
     absolute(s, *(f"buffalo_preabs_{axis}" for axis in "xyz"))
     s.square()
     if s.on("buffalo_pos_z"):
         s.write("x, y, z = w", "w = (x, y, -z)")
     absolute(s, *(f"buffalo_abs_{axis}" for axis in "xyz"))
-    if s.on("transf_function_enabledM") and s.during("transf_start_iterations_M", "transf_stop_iterations_M"):
+    if s.on("transf_function_enabledM") and s.within("M"):
         s.add("transf_offset_000")
-    if s.on("transf_function_enabled") and s.during("transf_start_iterations_S", "transf_stop_iterations_S"):
+    if s.on("transf_function_enabled") and s.within("S"):
         s.turn("mandelbox_rotation_main")
-    if s.during("transf_start_iterations_E", "transf_stop_iterations_E"):
+    if s.within("E"):
         s.refuse("transf_addCpixel_enabled_false")
-    if s.on("transf_function_enabledP_false") and s.during(
-        "transf_start_iterations_H", "transf_stop_iterations_H"
-    ):
+    if s.on("transf_function_enabledP_false") and s.within("H"):
         absolute(s, *(f"transf_function_enabledC{axis}_false" for axis in "xyz"))
 
 
@@ -136,19 +132,17 @@ def mandelnest(s: FormulaStep) -> None:
     if not s.on("transf_function_enabledA_false"):
         s.write("r = r / sqrt(maximum(ux * ux + uy * uy + uz * uz, 1e-30))")
     s.write("w = (r * ux, r * uy, r * uz)")
-    if s.during("transf_start_iterations_S", "transf_stop_iterations_S"):
+    if s.within("S"):
         s.add("transf_offsetF_000")
 
 
 @known(244, "Msltoe - Sym4 Mod1", "Msltoe 2010, fractalforums.com", LEFT_OUT)
 def msltoe_sym_4(s: FormulaStep) -> None:
     """Reflections, a polygon's fold about x, a square, and an offset along the radius."""
-    if s.during("transf_start_iterations_K", "transf_stop_iterations_K"):
+    if s.within("K"):
         symmetric(s)
     n = s.values.whole("transf_int8_Y")
-    if s.on("transf_function_enabledB_false") and s.during(
-        "transf_start_iterations_B", "transf_stop_iterations_B"
-    ):
+    if s.on("transf_function_enabledB_false") and s.within("B"):
         n += s.values.whole("transf_int_1")
     sector(s, "yz", s.parameter("transf_int8_Y", max(n, 1)), PI)
     a, b = s.number("transf_scaleB_1"), s.number("transf_scale")
@@ -159,7 +153,7 @@ def msltoe_sym_4(s: FormulaStep) -> None:
         f"w = ((x * x - y * y) * m * {a}, 2 * x * y * m * {b}, 2 * z * sqrt(s))",
     )
     s.add("transf_addition_constant_neg100")
-    if s.during("transf_start_iterations_C", "transf_stop_iterations_C"):
+    if s.within("C"):
         s.refuse("transf_addCpixel_enabled_false")
     if s.value("transf_offset"):
         s.write("x, y, z = w", "r = sqrt(maximum(x * x + y * y + z * z, 1e-30))")
@@ -171,9 +165,7 @@ def msltoe_sym_4(s: FormulaStep) -> None:
 def pupuku(s: FormulaStep) -> None:
     """The Mandelbulb with factors of its angles and of their sines and cosines."""
     s.refuse("transf_function_enabledBz_false")
-    if s.on("transf_function_enabledP_false") and s.during(
-        "transf_start_iterations_P", "transf_stop_iterations_P"
-    ):
+    if s.on("transf_function_enabledP_false") and s.within("P"):
         absolute(s, *(f"transf_function_enabledC{axis}_false" for axis in "xyz"))
         s.add("transf_offsetA_000")
     n, a, b = s.number("power"), s.number("transf_scaleA_1"), s.number("transf_scaleB_1")
@@ -181,20 +173,18 @@ def pupuku(s: FormulaStep) -> None:
     s.write("x, y, z = w", "s = maximum(x * x + y * y, 1e-30)")
     s.write(f"t = {n} * {a} * (atan2({own}){offset(s, 'beta_angle_offset')})")
     s.write(f"p = {n} * {b} * (atan2(y, x){offset(s, 'alpha_angle_offset')})")
-    if s.on("transf_function_enabledX_false") and s.during(
-        "transf_start_iterations_X", "transf_stop_iterations_X"
-    ):
+    if s.on("transf_function_enabledX_false") and s.within("X"):
         s.write(f"p = p + where(cos(t) < 0, {PI}, 0)")
     sine, cosine = ("cos(t)", "sin(t)") if s.on("transf_function_enabledD_false") else ("sin(t)", "cos(t)")
     s.write(f"u = {cosine}", f"r = exp(0.5 * ({n} - {s.number('transf_offset_1')} + 1) * log(s + z * z))")
     parts = ["u", "u"]
     for k, (letter, name) in enumerate((("B", "transf_scaleB_0"), ("A", "transf_scaleA_0"))):
-        now = s.during(f"transf_start_iterations_{letter}", f"transf_stop_iterations_{letter}")
+        now = s.within(letter)
         if s.on(f"transf_function_enabled{letter}_false") and now:
             parts[k] = f"(1 + (u - 1) * {s.number(name)})"
     s.write(f"w = (r * {parts[0]} * cos(p), r * {parts[1]} * sin(p), r * {sine})")
     s.add("transf_offset_000")
-    if s.during("transf_start_iterations_S", "transf_stop_iterations_S"):
+    if s.within("S"):
         s.scale("transf_scaleC_1")
 
 
@@ -213,21 +203,26 @@ def mandelbar_3(s: FormulaStep) -> None:
         ("D_false", "D", "x, z = t, -z"),
     )
     for switch, letter, line in signs:
-        now = s.during(f"transf_start_iterations_{letter}", f"transf_stop_iterations_{letter}")
+        now = s.within(letter)
         if s.on(f"transf_function_enabled{switch}") and now:
             s.write(line)
     s.write("w = (x, y, z)")
-    later = {
-        "P": lambda: s.write("x, y, z = w", f"w = (x, y, {s.number('transf_scale_1')} * z)"),
-        "S": lambda: s.scale("transf_scaleA_1"),
-        "J": lambda: s.add("transf_addition_constant"),
-        "R": lambda: s.turn("transf_rotation"),
-        "X": lambda: s.add_constant("", "transf_constant_multiplier_111"),
-    }
-    for letter, act in later.items():
-        now = s.during(f"transf_start_iterations_{letter}", f"transf_stop_iterations_{letter}")
-        if s.on(f"transf_function_enabled{letter}_false") and now:
-            act()
+    mandelbar_options(s)
+
+
+def mandelbar_options(s: FormulaStep) -> None:
+    """Scales, an offset, a turn and the start point, each in its iterations."""
+    on = {p: s.on(f"transf_function_enabled{p}_false") and s.within(p) for p in "PSJRX"}
+    if on["P"]:
+        s.write("x, y, z = w", f"w = (x, y, {s.number('transf_scale_1')} * z)")
+    if on["S"]:
+        s.scale("transf_scaleA_1")
+    if on["J"]:
+        s.add("transf_addition_constant")
+    if on["R"]:
+        s.turn("transf_rotation")
+    if on["X"]:
+        s.add_constant("", "transf_constant_multiplier_111")
 
 
 @known(259, "Mandelnest Full", "Mermelada 2020, fractalforums.org", LEFT_OUT)
@@ -279,7 +274,7 @@ def mandelbulb_kali(s: FormulaStep) -> None:
 @known(240, "Mandelbulb - Pow2 V3", NYLANDER)
 def mandelbulb_pow2_3(s: FormulaStep) -> None:
     """A square in polar coordinates whose angle is moved."""
-    if s.during("transf_start_iterations_B", "transf_stop_iterations_B"):
+    if s.within("B"):
         x, y, z = s.vector("transf_addition_constant_111")
         limits = [
             s.parameter(f"limit_{p}", abs(v)) if s.on(f"transf_function_enabledB{p}_false") else "1e6"
@@ -287,9 +282,7 @@ def mandelbulb_pow2_3(s: FormulaStep) -> None:
         ]
         if limits != ["1e6"] * 3:
             s.write(f"w = fold_to(w, ({', '.join(limits)}))")
-    if s.on("transf_function_enabledA_false") and s.during(
-        "transf_start_iterations_A", "transf_stop_iterations_A"
-    ):
+    if s.on("transf_function_enabledA_false") and s.within("A"):
         absolute(s, *(f"transf_function_enabledA{axis}_false" for axis in "xyz"))
     s.scale("transf_scaleA_1")
     angle = f"t + 1.5 * {PI}"
@@ -299,29 +292,21 @@ def mandelbulb_pow2_3(s: FormulaStep) -> None:
     s.write(f"t = {angle}", "m = r * sin(t) / s")
     s.write(f"w = (m * (y * y - x * x), -2 * m * x * y, r * cos(t) * {s.number('transf_scale_1')})")
     s.add("transf_offset_000")
-    if s.on("transf_rotation2_enabled_false") and s.during(
-        "transf_start_iterations_C", "transf_stop_iterations_C"
-    ):
+    if s.on("transf_rotation2_enabled_false") and s.within("C"):
         s.turn("transf_rotation")
 
 
 @known(262, "Mandelbulb - Pow2 V1", NYLANDER)
 def mandelbulb_pow2_1(s: FormulaStep) -> None:
     """Squares about y and about z, each in its iterations."""
-    if s.on("transf_function_enabledAx_false") and s.during(
-        "transf_start_iterations_A", "transf_stop_iterations_A"
-    ):
+    if s.on("transf_function_enabledAx_false") and s.within("A"):
         absolute(s, *(f"transf_function_enabledC{axis}_false" for axis in "xyz"))
     s.refuse("transf_function_enabledD_false", "transf_function_enabledF_false")
-    if s.on("transf_function_enabledAy") and s.during(
-        "transf_start_iterations_B", "transf_stop_iterations_B"
-    ):
+    if s.on("transf_function_enabledAy") and s.within("B"):
         sign = "-" if s.on("transf_function_enabledB_false") else ""
         s.write("x, y, z = w", "s = maximum(x * x + z * z, 1e-30)", "m = y * y / s - 1")
         s.write(f"w = ({sign}2 * x * z * m, 2 * sqrt(s) * y, (z * z - x * x) * m)")
-    if s.on("transf_function_enabledAz_false") and s.during(
-        "transf_start_iterations_C", "transf_stop_iterations_C"
-    ):
+    if s.on("transf_function_enabledAz_false") and s.within("C"):
         sign = "-" if s.on("transf_function_enabledA_false") else ""
         s.write("x, y, z = w", "s = maximum(x * x + y * y, 1e-30)", "m = 1 - z * z / s")
         s.write(f"w = ({sign}2 * x * y * m, (y * y - x * x) * m, 2 * sqrt(s) * z)")

@@ -72,12 +72,12 @@ def solid(settings: Settings, made: list[Orbit]) -> Node:
         result = _joined(settings.main, name, first, result, node)
     for kind, number in _primitives(settings.main):
         prefix = f"primitive_{kind}_{number}_"
-        node = _primitive(settings.main, kind, prefix)
-        if node is None:
+        found = _primitive(settings.main, kind, prefix)
+        if found is None:
             place = settings.main.place(prefix + "enabled")
             made[0].notes.append(f"{place}: primitive_{kind}_{number}: left out")
             continue
-        shown = appearance.material(node, settings, settings.main.whole(prefix + "material_id", "1"))
+        shown = appearance.material(found, settings, settings.main.whole(prefix + "material_id", "1"))
         result = _joined(settings.main, prefix + "boolean_operator", "1", result, shown)
     return result
 
@@ -119,8 +119,7 @@ def placed(node: Node, where: Triple, angles: Triple, factor: float = 1.0) -> No
     turned = factor * (about_x @ about_y @ about_z)
     rows = [round(float(v), 12) for row, moved in zip(turned, where, strict=True) for v in (*row, moved)]
     if not any(angles):
-        scale = {} if factor == 1 else {"scale": (factor,)}
-        return get("transform")(node, translate=where, **scale)
+        return get("transform")(node, translate=where, scale=(factor,))
     return get("transform")(node, matrix=tuple(rows))
 
 

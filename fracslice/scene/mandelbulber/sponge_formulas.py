@@ -39,12 +39,10 @@ def menger_mod_1(s: FormulaStep) -> None:
     s.write("w = positive(w)")
     s.symmetric = False
     s.menger("transf_scale_3", "transf_constant_multiplier_111")
-    if s.on("transf_rotation_enabled") and s.during("transf_start_iterations", "transf_stop_iterations"):
+    if s.on("transf_rotation_enabled") and s.within(""):
         s.turn("transf_rotation")
     s.add("transf_addition_constant")
-    if s.on("transf_function_enabledx_false") and s.during(
-        "transf_start_iterations_A", "transf_stop_iterations_A"
-    ):
+    if s.on("transf_function_enabledx_false") and s.within("A"):
         box_offset(s, "transf_addition_constantA_000")
     weigh(s, "transf_function_enabled_false", "transf_offset", "transf_offset_0")
 
@@ -81,7 +79,7 @@ def menger_smooth(s: FormulaStep) -> None:
     )
     s.write(f"t = {f} * ({a} - 1) / {a}", "z = z - t", f"z = t - sqrt(z * z + {e})")
     s.write(f"w = ({a} * x - ({a} - 1) * {b}, {a} * y - ({a} - 1) * {d}, {a} * z)")
-    if s.on("transf_rotation_enabled") and s.during("transf_start_iterations_R", "transf_stop_iterations_R"):
+    if s.on("transf_rotation_enabled") and s.within("R"):
         s.turn("transf_rotation")
     weigh(s, "transf_function_enabledz_false", "transf_offsetA_0", "transf_offsetB_0")
 
@@ -152,11 +150,9 @@ def sierpinski(s: FormulaStep) -> None:
     if s.on("transf_function_enabled_false"):
         s.sort()
     s.scale("transf_scaleA_2")
-    if s.during("transf_start_iterations_C", "transf_stop_iterations_C"):
+    if s.within("C"):
         s.add("transf_offset_111", "-")
-    if s.on("transf_function_enabledR_false") and s.during(
-        "transf_start_iterations_R", "transf_stop_iterations_R"
-    ):
+    if s.on("transf_function_enabledR_false") and s.within("R"):
         s.turn("transf_rotation")
 
 
@@ -167,45 +163,31 @@ def ifs(s: FormulaStep) -> None:
     s.add("transf_offset_111", "-")
     added = s.state.get("added", 0.0)
     s.write(f"w = {s.parameter('transf_scale_2', s.value('transf_scale_2') - added)} * w")
-    if s.on("transf_function_enabledK_false") and s.during(
-        "transf_start_iterations_K", "transf_stop_iterations_K"
-    ):
+    if s.on("transf_function_enabledK_false") and s.within("K"):
         s.state["added"] = s.value("transf_scale_vary_0") * (abs(added) - s.value("transf_offsetA_1"))
     s.turn("transf_rotation")
-    if s.during("transf_start_iterations_O", "transf_stop_iterations_O"):
+    if s.within("O"):
         s.add("transf_offset_000")
-    if s.on("transf_function_enabledS_false") and s.during(
-        "transf_start_iterations_S", "transf_stop_iterations_S"
-    ):
+    if s.on("transf_function_enabledS_false") and s.within("S"):
         s.ball(s.value("transf_minR2_p25"), s.value("transf_maxR2_1"))
-    if s.during("transf_start_iterations_R", "transf_stop_iterations_R"):
+    if s.within("R"):
         s.turn("transf_rotation2")
 
 
 def koch(s: FormulaStep) -> None:
     """The snowflake's folds, in space: two reflections of x and z about thirds, a scale and an offset."""
     names = (("Ax", "Cx"), ("Ay", "Cy"), ("Az_false", "Cz"))
-    switches = [
-        s.on(f"transf_function_enabled{switch}")
-        and s.during(f"transf_start_iterations_{letter}", f"transf_stop_iterations_{letter}")
-        for switch, letter in names
-    ]
+    switches = [s.on(f"transf_function_enabled{switch}") and s.within(letter) for switch, letter in names]
     absolute_of(s, switches)
-    if s.on("transf_function_enabledCx") and s.during(
-        "transf_start_iterations_D", "transf_stop_iterations_D"
-    ):
+    if s.on("transf_function_enabledCx") and s.within("D"):
         s.write("w = mirror(w, (1, -1, 0))")
-    if s.on("transf_function_enabledC_false") and s.during(
-        "transf_start_iterations_C", "transf_stop_iterations_C"
-    ):
+    if s.on("transf_function_enabledC_false") and s.within("C"):
         s.add("transf_offsetA_000", "-")
     if s.on("transf_function_enabled_false") and s.during(
         "transf_start_iterations", "transf_stop_iterations"
     ):
         koch_options(s)
-    if s.on("transf_function_enabledG_false") and s.during(
-        "transf_start_iterations_G", "transf_stop_iterations_G"
-    ):
+    if s.on("transf_function_enabledG_false") and s.within("G"):
         s.ball(s.value("transf_minimum_radius_0"), s.value("transf_maxR2_1"), "mandelbox_offset")
     y = s.parameter("third", s.value("transf_scale_1") / 3)
     s.write("x, y, z = w", f"w = (x, {y} - absolute(y - {y}), z)")
@@ -214,11 +196,11 @@ def koch(s: FormulaStep) -> None:
         if s.on("transf_function_enabledN_false")
         else "(0.3333333333333333, 0, 0)"
     )
-    if s.during("transf_start_iterations_A", "transf_stop_iterations_A"):
+    if s.within("A"):
         s.write(f"w = mirror(w + {third}, (1, 0, -1)) - {third}")
-    if s.during("transf_start_iterations_B", "transf_stop_iterations_B"):
+    if s.within("B"):
         s.write(f"w = mirror(w - {third}, (1, 0, -1)) + {third}")
-    if s.during("transf_start_iterations_P", "transf_stop_iterations_P"):
+    if s.within("P"):
         s.add("transf_offset_100", "-")
     o, scale = s.point("transf_addition_constant_neg100"), s.value("transf_scale_2")
     if s.on("transf_function_enabledK_false"):
@@ -226,13 +208,9 @@ def koch(s: FormulaStep) -> None:
         scale += added
         s.state["added"] = -s.value("transf_scale_vary_0") * (abs(added) - s.value("transf_scaleC_1"))
     s.write(f"w = {s.parameter('transf_scale_2', scale)} * (w - {o})")
-    if s.on("transf_function_enabledH_false") and s.during(
-        "transf_start_iterations_H", "transf_stop_iterations_H"
-    ):
+    if s.on("transf_function_enabledH_false") and s.within("H"):
         s.write("x, y, z = w", "w = (x, y, -z)")
-    if s.on("transf_function_enabledR_false") and s.during(
-        "transf_start_iterations_R", "transf_stop_iterations_R"
-    ):
+    if s.on("transf_function_enabledR_false") and s.within("R"):
         s.turn("transf_rotation")
     s.write(f"w = w + {o}")
 
@@ -283,11 +261,9 @@ def menger_smooth_mod_1(s: FormulaStep) -> None:
     third, scale = s.parameter("third", z / 3), s.number("transf_scale_3")
     s.write(f"z = z - {third}", f"z = {third} - sqrt(z * z + {e} + {s.number('transf_offsetA_0')})")
     s.write(f"w = ({scale} * x - {a}, {scale} * y - {b}, {scale} * z)")
-    if s.on("transf_rotation_enabled") and s.during("transf_start_iterations_R", "transf_stop_iterations_R"):
+    if s.on("transf_rotation_enabled") and s.within("R"):
         s.turn("transf_rotation")
-    if s.on("transf_function_enabledx_false") and s.during(
-        "transf_start_iterations_A", "transf_stop_iterations_A"
-    ):
+    if s.on("transf_function_enabledx_false") and s.within("A"):
         box_offset(s, "transf_addition_constantA_000")
     weigh(s, "transf_function_enabledz_false", "transf_offsetA_0", "transf_offsetB_0")
 
@@ -301,9 +277,7 @@ def menger_cross(s: FormulaStep) -> None:
     """Reflections of a prism's cross, a scale and an offset."""
     if s.during("transf_start_iterations", "transf_stop_iterations_1"):
         s.refuse("transf_function_enabled_false")
-    if not (
-        s.on("transf_function_enabled") and s.during("transf_start_iterations_A", "transf_stop_iterations_A")
-    ):
+    if not (s.on("transf_function_enabled") and s.within("A")):
         return
     absolute_of(s, [s.on("transf_function_enabledz_false"), True, True])
     s.write(f"w = mirror(w, ({SLOPE}, -0.5, 0))", "w = mirror(w, (0, 1, 0))", "w = mirror(w, (0, -1, 1))")
@@ -316,7 +290,5 @@ def menger_cross(s: FormulaStep) -> None:
     if s.on("transf_function_enabledP_false"):
         a, b = s.number("transf_offset"), s.number("transf_offset_0")
         s.write("x, y, z = w", f"w = (absolute(x + {a}) + {b}, y, z)")
-    if s.on("transf_function_enabledR_false") and s.during(
-        "transf_start_iterations_R", "transf_stop_iterations_R"
-    ):
+    if s.on("transf_function_enabledR_false") and s.within("R"):
         s.turn("transf_rotation2")

@@ -81,6 +81,11 @@ class FormulaStep:
         """True in iterations from one number on and before another."""
         return self.values.whole(start) <= self.index < self.values.whole(stop)
 
+    def within(self, letter: str) -> bool:
+        """True in the iterations of a letter."""
+        own = f"_{letter}" if letter else ""
+        return self.during(f"transf_start_iterations{own}", f"transf_stop_iterations{own}")
+
     def refuse(self, *names: str) -> None:
         """Raise an error if one of these switches, which are not known here, is on."""
         for name in names:

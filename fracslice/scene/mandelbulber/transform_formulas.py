@@ -135,7 +135,7 @@ def abs_add_constant_2(s: FormulaStep) -> None:
 @known(1025, "T>Abs Add Tglad Fold", "Glad and Lowe 2010, fractalforums.com", LEFT_OUT)
 def tglad_fold(s: FormulaStep) -> None:
     """Fold into a box."""
-    if s.during("transf_start_iterations_A", "transf_stop_iterations_A"):
+    if s.within("A"):
         s.refuse("transf_function_enabled_false")
     s.fold("transf_addition_constant")
 
@@ -322,23 +322,17 @@ def add_inverted(s: FormulaStep) -> None:
 @known(1158, "T>Abs Sym3", MANDELBULBER, LEFT_OUT)
 def abs_sym_3(s: FormulaStep) -> None:
     """Absolute values, and reflections in three diagonal planes, in part."""
-    if s.on("transf_function_enabledA_false") and s.during(
-        "transf_start_iterations_A", "transf_stop_iterations_A"
-    ):
+    if s.on("transf_function_enabledA_false") and s.within("A"):
         absolute(s, *(f"transf_function_enabled{axis}" for axis in "xyz"))
         s.add("transf_offset_000")
-    if s.during("transf_start_iterations_K", "transf_stop_iterations_K"):
+    if s.within("K"):
         symmetric(s)
-    if s.on("transf_function_enabledB_false") and s.during(
-        "transf_start_iterations_B", "transf_stop_iterations_B"
-    ):
+    if s.on("transf_function_enabledB_false") and s.within("B"):
         absolute(s, *(f"transf_function_enabledC{axis}" for axis in "xyz"))
         s.add("transf_offsetF_000")
-    if s.on("transf_function_enabledR_false") and s.during(
-        "transf_start_iterations_R", "transf_stop_iterations_R"
-    ):
+    if s.on("transf_function_enabledR_false") and s.within("R"):
         s.turn("transf_rotation")
-    if s.during("transf_start_iterations_E", "transf_stop_iterations_E"):
+    if s.within("E"):
         s.scale("transf_scale_1")
     if s.during("transf_start_iterations_C", "transf_stop_iterations_C1"):
         s.refuse("transf_addCpixel_enabled_false")
@@ -474,7 +468,7 @@ def diagonal_fold(s: FormulaStep) -> None:
     timed = s.on("transf_function_enabledAx_false")
     planes = (("Ax", "(-1, 1, 0)", "A"), ("Ay_false", "(0, -1, 1)", "B"), ("Az_false", "(1, 0, -1)", "C"))
     for switch, normal, letter in planes:
-        now = not timed or s.during(f"transf_start_iterations_{letter}", f"transf_stop_iterations_{letter}")
+        now = not timed or s.within(letter)
         if s.on(f"transf_function_enabled{switch}") and now:
             s.write(f"w = mirror(w, {normal})")
 
@@ -488,11 +482,9 @@ def poly_fold(s: FormulaStep) -> None:
         polygon(s, "xy", "transf_int8_X")
         a, b = s.number("transf_scaleF_1"), s.number("transf_scaleG_1")
         s.write("x, y, z = w", f"w = (y + (x - y) * {a}, x + (y - x) * {b}, z)")
-    if s.on("transf_rotation2_enabled_false") and s.during(
-        "transf_start_iterations_R", "transf_stop_iterations_R"
-    ):
+    if s.on("transf_rotation2_enabled_false") and s.within("R"):
         s.turn("transf_rotation")
-    if s.during("transf_start_iterations_A", "transf_stop_iterations_A"):
+    if s.within("A"):
         s.add("transf_addition_constant")
 
 
@@ -501,17 +493,13 @@ def menger_fold_2(s: FormulaStep) -> None:
     """A sponge's folds, in part, with turns between, a scale and an offset."""
     s.write("w = positive(w)")
     s.add("transf_offset_000")
-    if s.on("transf_rotation_enabled_false") and s.during(
-        "transf_start_iterations_R", "transf_stop_iterations_R"
-    ):
+    if s.on("transf_rotation_enabled_false") and s.within("R"):
         s.turn("transf_rotation")
     diagonals(s)
     if s.on("transf_function_enabled_false"):
         s.turn("transf_rotation2")
     scale = s.value("transf_scale_3")
-    if s.on("transf_function_enabledX_false") and s.during(
-        "transf_start_iterations_X", "transf_stop_iterations_X"
-    ):
+    if s.on("transf_function_enabledX_false") and s.within("X"):
         added = s.state.get("added", 0.0)
         scale += added
         s.state["added"] = -s.value("transf_scale_vary_0") * (abs(added) - s.value("transf_scaleB_1"))
