@@ -743,6 +743,36 @@ def absolute_differences(w: Points, c: Points, v: Values, _: int) -> Points:
     return abs(w + a) - abs(w - b) - column(v["transf_scale3D_111"]) * w + column(v["transf_offsetA_000"])
 
 
+def amazing_surf_klein_2(w: Points, c: Points, v: Values, i: int) -> Points:
+    if i >= v["transf_int8_X"]:
+        return v["transf_scale_2"] * box(w, v["transf_offset_110"]) + column(v["transf_offsetA_000"])
+    w = flat(w, v["transf_addition_constant_111"])[[0, 2, 1]]
+    w = v["transf_scale_1"] * ball(w, v["transf_minimum_radius_0"], 1)
+    return w + column(v["transf_addition_constantA_000"])
+
+
+def amazing_surf_m3d(w: Points, c: Points, v: Values, _: int) -> Points:
+    w = flat(w, v["transf_addition_constant_111"]) + column(v["transf_offset_000"])
+    w = v["transf_scale_015"] * ball(w, v["mandelbox_folding_min_radius"] ** 2, 1)
+    return turned_back(w + c * column(v["transf_constant_multiplier_111"]), c, v, 0)
+
+
+def lkmitch(w: Points, c: Points, v: Values, _: int) -> Points:
+    x, y, z = w
+    return np.array([x * x - 2 * y * z, z * z + 2 * x * y, y * y - 2 * x * z])
+
+
+def sine_or_cosine(w: Points, c: Points, v: Values, _: int) -> Points:
+    u = w * column(v["transf_constant_multiplierC_111"])
+    return v["transf_scale"] * np.array([np.cos(u[0]), np.sin(u[1]), np.sin(u[2])])
+
+
+def platonic(w: Points, c: Points, v: Values, _: int) -> Points:
+    x, y, z = v["platonic_solid_frequency"] * w
+    waves = np.cos(x) * np.sin(y) + np.cos(y) * np.sin(z) + np.cos(z) * np.sin(x)
+    return w * (waves * v["platonic_solid_amplitude"] + length2(w) ** 0.25 * v["platonic_solid_rhoMul"])
+
+
 FORMULAS: dict[int, Formula] = {
     2: mandelbulb,
     3: mandelbulb_square,
@@ -838,4 +868,9 @@ FORMULAS: dict[int, Formula] = {
     1059: octo_fold,
     1048: folding_planes,
     1029: absolute_differences,
+    224: amazing_surf_klein_2,
+    233: amazing_surf_m3d,
+    49: lkmitch,
+    1082: sine_or_cosine,
+    56: platonic,
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from .folds import absolute, mandalay
+from .folds import absolute, absolute_of, mandalay, polygon
 from .step_text import CYLINDER, LEFT_OUT, ORDERS, SQUARE, SWAPPED, FormulaStep, UnknownError, known
 
 LOWE = "Lowe 2010, fractalforums.com: Amazing Fractal"
@@ -649,3 +649,55 @@ def mandalay_box_2(s: FormulaStep) -> None:
     scale_by(s, add_vary(s, "transf_scale_2", "transf_scaleC_1", vary, False))
     if s.on("transf_rotation_enabled") and s.within("R"):
         s.turn("transf_rotation")
+
+
+@known(224, "Amazing Surf - Klein V2", "Kali 2011, fractalforums.com", LEFT_OUT)
+def amazing_surf_klein_2(s: FormulaStep) -> None:
+    """As the first, with a polygon's fold before, and swaps in their iterations."""
+    if s.on("transf_function_enabledP_false") and s.during(
+        "transf_start_iterations_P", "transf_stop_iterations_P1"
+    ):
+        absolute_of(s, [True, s.on("transf_function_enabledCy"), False])
+        polygon(s, "xy", "transf_int8_Y")
+        s.add("transf_offsetF_000")
+    inversion(s, "transf_start_iterations_X", "transf_stop_iterations_1")
+    if s.index >= s.values.whole("transf_int8_X"):
+        after_klein(s)
+        return
+    s.fold_flat("transf_addition_constant_111")
+    if s.within("I"):
+        swap(s, "transf_function_enabledI_false", "(y, x, z)")
+    if s.on("transf_function_enabledJ_false") and s.within("J"):
+        z = s.parameter("transf_addition_constant_111_z", s.vector("transf_addition_constant_111")[2])
+        s.write(f"w = fold_to(w, (1e6, 1e6, {z}))")
+    else:
+        s.write("x, y, z = w", "w = (x, z, y)")
+    if s.within("H"):
+        swap(s, "transf_function_enabledSw_false", "(y, x, z)")
+    own_ball(s)
+    vary = s.on("transf_function_enabledK_false") and s.within("K")
+    scale_by(s, add_vary(s, "transf_scale_1", "transf_scaleC_1", vary, False))
+    if s.on("transf_rotation2_enabled_false"):
+        s.turn("transf_rotation")
+    if s.within("O"):
+        s.add("transf_addition_constantA_000")
+
+
+@known(233, "Amazing Surf - M3D", "Kali 2011, fractalforums.com", LEFT_OUT)
+def amazing_surf_m3d(s: FormulaStep) -> None:
+    """An Amazing Surf as Mandelbulb3D has it: the start point is added before the turn."""
+    if s.during("transf_start_iterations", "transf_stop_iterations_1"):
+        s.refuse("transf_function_enabledSw_false")
+    base, vary = s.value("transf_scale_015"), s.value("mandelbox_vary_scale_vary")
+    s.state["scale"] = base + vary * (abs(s.state.get("scale", s.value("mandelbox_scale"))) - 1)
+    s.fold_flat("transf_addition_constant_111")
+    s.add("transf_offset_000")
+    if s.within("C"):
+        s.refuse("transf_function_enabled_false")
+    inner = s.value("mandelbox_folding_min_radius")
+    s.ball(inner * inner, 1.0)
+    scale_by(s, s.state["scale"])
+    if s.on("transf_addCpixel_enabled"):
+        s.add_constant("", "transf_constant_multiplier_111")
+    s.add("transf_offsetA_000")
+    s.turn("transf_rotationXYZ", "zyx", "zyx")

@@ -398,3 +398,9 @@ def eiffie_msltoe(s: FormulaStep) -> None:
         s.write("x, y, z = w", "r = sqrt(maximum(x * x + y * y + z * z, 1e-30))")
         s.write(f"w = (1 - {s.number('transf_offset')} / r) * w")
     s.scale("transf_scale_1")
+
+
+@known(49, "Lkmitch", "Mitchell 2009, fractalforums.com")
+def lkmitch(s: FormulaStep) -> None:
+    """A square of numbers of three parts."""
+    s.write("x, y, z = w", "w = (x * x - 2 * y * z, z * z + 2 * x * y, y * y - 2 * x * z)")

@@ -560,3 +560,31 @@ def abs_add_multi(s: FormulaStep) -> None:
         parts.append(f"{one} - {two} - {s.parameter(f'k_{p}', k)} * {p}")
     s.write("x, y, z = w", f"w = ({', '.join(parts)})")
     s.add("transf_offsetA_000")
+
+
+@known(1082, "T>Sin Or Cos", MANDELBULBER, LEFT_OUT)
+def sine_or_cosine(s: FormulaStep) -> None:
+    """Sines or cosines of the coordinates; those whose switch is off are 0."""
+    f, k = s.point("transf_constant_multiplierC_111"), s.number("transf_scale")
+    s.write(f"fx, fy, fz = {f}", "x, y, z = w")
+    parts = []
+    for p in "xyz":
+        function = "cos" if s.on(f"transf_function_enabledA{p}_false") else "sin"
+        value = f"{k} * {function}(f{p} * {p})" if s.on(f"transf_function_enabledA{p}") else f"0 * {p}"
+        less = s.on("transf_function_enabled_false")
+        parts.append(f"{k} * {value} / (absolute({p}) + 1)" if less else value)
+    s.write(f"w = ({', '.join(parts)})")
+
+
+@known(56, "T>Platonic Solid", "Luca 2011, fractalforums.com", LEFT_OUT)
+def platonic_solid(s: FormulaStep) -> None:
+    """Multiply by a sum of products of sines and cosines, and of the root of the radius."""
+    s.refuse("transf_function_enabled_false")
+    f, a, b = (s.number(f"platonic_solid_{name}") for name in ("frequency", "amplitude", "rhoMul"))
+    s.write(
+        "x, y, z = w",
+        f"p, q, r = {f} * x, {f} * y, {f} * z",
+        "t = cos(p) * sin(q) + cos(q) * sin(r) + cos(r) * sin(p)",
+        "s = sqrt(sqrt(maximum(x * x + y * y + z * z, 1e-30)))",
+        f"w = (t * {a} + s * {b}) * w",
+    )
