@@ -332,6 +332,10 @@ WRONG = {
         text("formula_1 7; background_color_1 ff").encode(),
         "x.fract:6: background_color_1 ff: expected a",
     ),
+    "tree": (
+        text("formula_1 5; node_0001_definition group 1,1,12,0,100").encode(),
+        "x.fract:6: node_0001_definition group 1,1,12,0,100: expected one formula or a hybrid",
+    ),
     "escape": (text("formula_1 1002").encode(), "x.fract: .*has orbits that do not escape"),
 }
 

@@ -19,12 +19,19 @@ OPERATORS = ("intersection", "union", "difference")
 
 _PRIMITIVE = re.compile(r"primitive_([a-z]+)_(\d+)_enabled")
 
+_NODE = re.compile(r"node_\d+_definition")
+_MOVED_NODE = re.compile(r"node_\d+_(position|rotation|repeat)")
+
+ORBITS = ("1", "10")
+"""Kinds of the nodes of a tree that are a formula or a hybrid."""
+
 MOST_PRIMITIVES = 100
 
 
 def orbits(settings: Settings, leave_out: bool = False) -> list[Orbit]:
     """Orbits of a file: one, or with boolean operators one of each formula."""
     main = settings.main
+    _refuse_trees(main)
     apart = main.flag("boolean_operators", "false")
     slots = all_slots(settings) if apart else hybrid_slots(settings)
     if not slots:
@@ -38,6 +45,17 @@ def orbits(settings: Settings, leave_out: bool = False) -> list[Orbit]:
     made = [_orbit(settings, [s], apart) for s in kept] if apart else [_orbit(settings, kept, apart)]
     made[0].missing += missing
     return made
+
+
+def _refuse_trees(main: SettingsSection) -> None:
+    """Raise an error for a tree of objects, which files have from version 2.35 on, other than one orbit."""
+    for name in list(main.values):
+        match = _NODE.fullmatch(name)
+        words = main.text(name).rpartition(" ")[2].split(",") if match else []
+        if len(words) > 2 and words[2] not in ORBITS:
+            raise main.fail(name, "one formula or a hybrid, not a tree of objects")
+        if _MOVED_NODE.fullmatch(name) and any(main.vector(name)):
+            raise main.fail(name, "an object in its place")
 
 
 def _orbit(settings: Settings, slots: list[Slot], apart: bool) -> Orbit:
