@@ -432,3 +432,8 @@ def test_keyframes_are_tracks_of_a_film(tmp_path: Path) -> None:
     assert reads(to_xml(made.scene)) == made.scene
     with pytest.raises(SceneError, match=r"x\.fract:13: keyframe of 2 values: expected 7"):
         imported(tmp_path, source + "3;4\n")
+    own = (
+        "[keyframes]\nframe;framesPerKeyframe;main_fov\n0;30;50\n1;90;60\n2;10;40\ninterpolation;morphAkima\n"
+    )
+    film = imported(tmp_path, text("formula_1 2; N 3") + own).scene
+    assert film.tracks[0].keys == ((0.0, "50.0"), (1.0, "60.0"), (4.0, "40.0"))

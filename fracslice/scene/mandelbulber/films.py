@@ -14,6 +14,9 @@ from .settings import LARGEST, Settings
 CAMERA = {"camera": "camera.eye", "target": "camera.target", "camera_top": "camera.up", "fov": "camera.fov"}
 """Attributes of the camera by their names in a file."""
 
+EACH, INTERPOLATION = "framesPerKeyframe", "interpolation"
+"""Column with the frames after each keyframe, and the row with the kinds of curves."""
+
 MOST_KEYS, MOST_COLUMNS = 2000, 500
 """Most keyframes, and most columns of their table."""
 
@@ -31,15 +34,13 @@ class Column:
 def film(settings: Settings, root: Node, notes: list[str]) -> tuple[Animation | None, tuple[Track, ...]]:
     """Film of a file; what its keyframes move and a scene does not is noted."""
     rows = [(line, text.split(";")) for line, text in settings.keyframes if text.strip()]
+    rows = [row for row in rows if row[1][0] != INTERPOLATION]
     if len(rows) < 3:
         return None, ()
     if len(rows) > MOST_KEYS or len(rows[0][1]) > MOST_COLUMNS:
         raise SceneError(f"{settings.path}:{rows[0][0]}: expected at most {MOST_KEYS} keyframes")
     table = [_numbers(settings.path, line, words, len(rows[0][1])) for line, words in rows[1:]]
-    pace = settings.main.whole("frames_per_keyframe", "100") / max(
-        settings.main.number("keyframe_frames_per_second", "30"), 0.01
-    )
-    times = [round(k * pace, 6) for k in range(len(table))]
+    times = _times(settings, rows[0][1], table)
     tracks = []
     for column in _columns(rows[0][1]):
         values = [tuple(row[k] for k in column.places) for row in table]
@@ -52,6 +53,15 @@ def film(settings: Settings, root: Node, notes: list[str]) -> tuple[Animation | 
         keys = tuple((time, " ".join(map(repr, v))) for time, v in zip(times, values, strict=True))
         tracks.append(Track(of=of, keys=keys))
     return (Animation(duration=times[-1], fps=30.0), tuple(tracks)) if tracks else (None, ())
+
+
+def _times(settings: Settings, heading: Sequence[str], table: Sequence[Sequence[float]]) -> list[float]:
+    """Seconds of each keyframe: after each are as many frames as its row, or the file, says."""
+    frames = float(settings.main.whole("frames_per_keyframe", "100"))
+    place = heading.index(EACH) if EACH in heading else 0
+    rate = max(settings.main.number("keyframe_frames_per_second", "30"), 0.01)
+    steps = [max(row[place], 1.0) if place else max(frames, 1.0) for row in table[:-1]]
+    return [round(sum(steps[:k]) / rate, 6) for k in range(len(table))]
 
 
 def _numbers(path: str, line: int, words: Sequence[str], count: int) -> list[float]:
@@ -76,6 +86,9 @@ def _columns(heading: Sequence[str]) -> Iterator[Column]:
     k = 1
     while k < len(heading):
         name = heading[k].strip()
+        if name == EACH:
+            k += 1
+            continue
         after = [word.strip() for word in heading[k : k + 3]]
         if name.endswith("_x") and after == [name[:-1] + axis for axis in "xyz"]:
             yield Column(name[:-2], (k, k + 1, k + 2))
