@@ -15,6 +15,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
+from keyword import iskeyword
 from typing import Any, NoReturn, TextIO
 
 import click
@@ -47,6 +48,7 @@ NAMES = (
     "fill",
     "fly",
     "formulas",
+    "import",
     "mesh",
     "orient",
     "plate",
@@ -58,7 +60,7 @@ NAMES = (
     "slice",
     "studio",
 )
-"""Commands: functions in modules of their names, with an underscore behind the name of a builtin."""
+"""Commands: functions in modules of their names, with an underscore behind that of a builtin or a keyword."""
 
 FEWEST = 500_000
 """New objects between two garbage collections; the modules of a command have fewer."""
@@ -80,8 +82,9 @@ class Commands(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """The command of a name."""
         if cmd_name in NAMES and cmd_name not in self.commands:
-            module = import_module(f".{cmd_name}", __package__)
-            name = f"{cmd_name}_" if hasattr(builtins, cmd_name) else cmd_name
+            reserved = iskeyword(cmd_name)
+            module = import_module(f".{cmd_name}_" if reserved else f".{cmd_name}", __package__)
+            name = f"{cmd_name}_" if reserved or hasattr(builtins, cmd_name) else cmd_name
             self.add_command(getattr(module, name))
         return super().get_command(ctx, cmd_name)
 

@@ -146,6 +146,7 @@ def test_commands_are_understood(line: str, folder: Path, monkeypatch, capfd) ->
         "animation.Timeline",
         "bench.measurements.measure",
         "scene.calibration.calibration",
+        "scene.mandelbulber.import_scene",
         "viewer.fly",
         "cluster.connect",
     ):

@@ -1,0 +1,406 @@
+"""Powers of points in Mandelbulber: the Mandelbulb and its relatives, and squares of quaternions."""
+
+from __future__ import annotations
+
+from .folds import PI, absolute, sector, symmetric
+from .step_text import LEFT_OUT, OWN, FormulaStep, known
+
+NYLANDER = "White and Nylander 2009, fractalforums.com"
+
+
+@known(2, "Mandelbulb", NYLANDER)
+def mandelbulb(s: FormulaStep) -> None:
+    """Angles are counted from the equator, and may have offsets."""
+    power, alpha, beta = s.value("power"), s.value("alpha_angle_offset"), s.value("beta_angle_offset")
+    if 2 <= power <= 16 and not alpha and not beta:
+        s.replace("cosine_bulb", power=power)
+    n, a, b = s.number("power"), offset(s, "alpha_angle_offset"), offset(s, "beta_angle_offset")
+    s.write(
+        "x, y, z = w",
+        "s = maximum(x * x + y * y, 1e-30)",
+        f"t = {n} * (atan2(z, sqrt(s)){b})",
+        f"p = {n} * (atan2(y, x){a})",
+        f"r = exp(0.5 * {n} * log(s + z * z))",
+        "w = (r * cos(t) * cos(p), r * cos(t) * sin(p), r * sin(t))",
+    )
+
+
+def offset(s: FormulaStep, name: str) -> str:
+    """Addition of an angle in degrees; nothing for 0."""
+    return f" + {s.number(name)} * 0.017453292519943295" if s.value(name) else ""
+
+
+@known(3, "Mandelbulb - Power 2", NYLANDER)
+def mandelbulb_2(s: FormulaStep) -> None:
+    """The square by products."""
+    s.square()
+
+
+@known(5, "Quaternion", "Norton 1982")
+def quaternion(s: FormulaStep) -> None:
+    """The square of a quaternion without k."""
+    s.replace("quaternion_mandelbrot")
+    s.write("x, y, z = w", "w = (x * x - y * y - z * z, 2 * x * y, 2 * x * z)")
+
+
+@known(11, "Xenodreambuie", "Xenodreambuie 2010, fractalforums.com")
+def xenodreambuie(s: FormulaStep) -> None:
+    """Angles are counted from the pole; the one from it is reflected at the equator."""
+    n, a, b = s.number("power"), offset(s, "alpha_angle_offset"), offset(s, "beta_angle_offset")
+    s.write(
+        "x, y, z = w",
+        "s = maximum(x * x + y * y, 1e-30)",
+        f"p = {n} * (atan2(y, x){b})",
+        f"t = atan2(sqrt(s), z){a}",
+        f"t = where(absolute(t) > 0.5 * {PI}, where(t < 0, -{PI}, {PI}) - t, t)",
+        f"t = {n} * t",
+        f"r = exp(0.5 * {n} * log(s + z * z))",
+        "w = (r * cos(p) * sin(t), r * sin(p) * sin(t), r * cos(t))",
+    )
+
+
+@known(21, "Bristorbrot", "Bristor 2009, fractalforums.com")
+def bristorbrot(s: FormulaStep) -> None:
+    """The Bristorbrot."""
+    s.replace("bristorbrot")
+    s.write("x, y, z = w", "w = (x * x - y * y - z * z, y * (2 * x - z), z * (2 * x + y))")
+
+
+@known(20, "Benesi - Pwr2", "Benesi 2010, fractalforums.com")
+def benesi(s: FormulaStep) -> None:
+    """A square about the x axis, whose sign of x depends on the side of a cone and of the start point."""
+    side = "0.1" if s.on("transf_function_enabledE_false") else "cx"
+    s.write(
+        f"ox, oy, oz = {s.point('transf_offset_000')}",
+        "cx, cy, cz = c",
+        "x, y, z = w",
+        "s = maximum(y * y + z * z, 1e-30)",
+        "r = sqrt(s)",
+        "u = x * x - s + ox",
+        f"u = where({side} < 0, u, where(x < r, u, -u))",
+        "k = -2 * absolute(x) / r",
+        "w = (u, k * (y * y - z * z) + oy, 2 * k * y * z + oz)",
+    )
+
+
+@known(66, "Benesi - Pine Tree", "Benesi 2010, fractalforums.com", OWN)
+def benesi_pine_tree(s: FormulaStep) -> None:
+    """A square about the x axis; the start point is added with y and z swapped, each with a factor."""
+    s.write(
+        f"kx, ky, kz = {s.point('transf_constant_multiplier_100')}",
+        "cx, cy, cz = c",
+        "x, y, z = w",
+        "s = maximum(y * y + z * z, 1e-30)",
+        "k = 2 * x / sqrt(s)",
+        "w = (x * x - s + kx * cx, 2 * k * y * z + kz * cz, k * (y * y - z * z) + ky * cy)",
+    )
+    if s.value("transf_angle_0"):
+        s.write(f"w = turn(w, (1, 0, 0), -{s.number('transf_angle_0')})")
+
+
+@known(137, "Mandelbulb - Abs Power 2", NYLANDER)
+def mandelbulb_abs_2(s: FormulaStep) -> None:
+    """The square with absolute values before and after, and turns."""
+    if s.on("transf_rotation_enabled") and s.within("R"):
+        s.turn("transf_rotation")
+    if s.on("transf_function_enabledD_false") and s.within("D"):
+        s.add("transf_offsetA_000")
+    absolute(s, *(f"buffalo_preabs_{axis}" for axis in "xyz"))
+    s.square()
+    if s.on("buffalo_pos_z"):
+        s.write("x, y, z = w", "w = (x, y, -z)")
+    absolute(s, *(f"buffalo_abs_{axis}" for axis in "xyz"))
+    if s.on("transf_function_enabledM") and s.within("M"):
+        s.add("transf_offset_000")
+    if s.on("transf_function_enabled") and s.within("S"):
+        s.turn("mandelbox_rotation_main")
+    if s.within("E"):
+        s.refuse("transf_addCpixel_enabled_false")
+    if s.on("transf_function_enabledP_false") and s.within("H"):
+        absolute(s, *(f"transf_function_enabledC{axis}_false" for axis in "xyz"))
+
+
+@known(229, "Mandelnest", "Mermelada 2020, fractalforums.org")
+def mandelnest(s: FormulaStep) -> None:
+    """Cosines of multiples of the angles to the three axes, made as long as a power of the radius."""
+    s.refuse("transf_function_enabled_false")
+    n, shift = s.number("power"), s.number("transf_offset_0")
+    s.write("x, y, z = w", "s = maximum(x * x + y * y + z * z, 1e-30)")
+    for p in "xyz":
+        s.write(f"u{p} = cos({PI} * {shift} + {n} * atan2(sqrt(maximum(s - {p} * {p}, 1e-30)), {p}))")
+    s.write(f"r = exp(0.5 * ({n} - {s.number('transf_offset_1')}) * log(s))")
+    if not s.on("transf_function_enabledA_false"):
+        s.write("r = r / sqrt(maximum(ux * ux + uy * uy + uz * uz, 1e-30))")
+    s.write("w = (r * ux, r * uy, r * uz)")
+    if s.within("S"):
+        s.add("transf_offsetF_000")
+
+
+@known(244, "Msltoe - Sym4 Mod1", "Msltoe 2010, fractalforums.com", LEFT_OUT)
+def msltoe_sym_4(s: FormulaStep) -> None:
+    """Reflections, a polygon's fold about x, a square, and an offset along the radius."""
+    if s.within("K"):
+        symmetric(s)
+    n = s.values.whole("transf_int8_Y")
+    if s.on("transf_function_enabledB_false") and s.within("B"):
+        n += s.values.whole("transf_int_1")
+    sector(s, "yz", s.parameter("transf_int8_Y", max(n, 1)), PI)
+    a, b = s.number("transf_scaleB_1"), s.number("transf_scale")
+    s.write(
+        "x, y, z = w",
+        "s = maximum(x * x + y * y, 1e-30)",
+        "m = 1 - z * z / maximum(s + z * z, 1e-30)",
+        f"w = ((x * x - y * y) * m * {a}, 2 * x * y * m * {b}, 2 * z * sqrt(s))",
+    )
+    s.add("transf_addition_constant_neg100")
+    if s.within("C"):
+        s.refuse("transf_addCpixel_enabled_false")
+    if s.value("transf_offset"):
+        s.write("x, y, z = w", "r = sqrt(maximum(x * x + y * y + z * z, 1e-30))")
+        s.write(f"w = (1 - {s.number('transf_offset')} / r) * w")
+    s.scale("transf_scale_1")
+
+
+@known(266, "Mandelbulb Pupuku", "Pupukuusikko 2021, fractalforums.org")
+def pupuku(s: FormulaStep) -> None:
+    """The Mandelbulb with factors of its angles and of their sines and cosines."""
+    s.refuse("transf_function_enabledBz_false")
+    if s.on("transf_function_enabledP_false") and s.within("P"):
+        absolute(s, *(f"transf_function_enabledC{axis}_false" for axis in "xyz"))
+        s.add("transf_offsetA_000")
+    n, a, b = s.number("power"), s.number("transf_scaleA_1"), s.number("transf_scaleB_1")
+    own = "sqrt(s), z" if s.on("transf_function_enabledSw_false") else "z, sqrt(s)"
+    s.write("x, y, z = w", "s = maximum(x * x + y * y, 1e-30)")
+    s.write(f"t = {n} * {a} * (atan2({own}){offset(s, 'beta_angle_offset')})")
+    s.write(f"p = {n} * {b} * (atan2(y, x){offset(s, 'alpha_angle_offset')})")
+    if s.on("transf_function_enabledX_false") and s.within("X"):
+        s.write(f"p = p + where(cos(t) < 0, {PI}, 0)")
+    sine, cosine = ("cos(t)", "sin(t)") if s.on("transf_function_enabledD_false") else ("sin(t)", "cos(t)")
+    s.write(f"u = {cosine}", f"r = exp(0.5 * ({n} - {s.number('transf_offset_1')} + 1) * log(s + z * z))")
+    parts = ["u", "u"]
+    for k, (letter, name) in enumerate((("B", "transf_scaleB_0"), ("A", "transf_scaleA_0"))):
+        now = s.within(letter)
+        if s.on(f"transf_function_enabled{letter}_false") and now:
+            parts[k] = f"(1 + (u - 1) * {s.number(name)})"
+    s.write(f"w = (r * {parts[0]} * cos(p), r * {parts[1]} * sin(p), r * {sine})")
+    s.add("transf_offset_000")
+    if s.within("S"):
+        s.scale("transf_scaleC_1")
+
+
+@known(282, "Mandelbar V3", "Crowe et al. 1989, after White and Nylander 2009")
+def mandelbar_3(s: FormulaStep) -> None:
+    """A square with the signs of its coordinates turned about."""
+    if s.on("transf_function_enabled_false"):
+        absolute(s, *(f"transf_function_enabledA{axis}_false" for axis in "xyz"))
+    s.refuse("transf_function_enabledAw_false")
+    s.write("x, y, z = w", "s = maximum(x * x + y * y, 1e-30)", "m = 1 - z * z / s")
+    s.write("t = 2 * x * y * m", "y = (y * y - x * x) * m", "z = 2 * sqrt(s) * z")
+    signs = (
+        ("M", "A", "x = -t"),
+        ("B_false", "B", "x, z = -t, -z"),
+        ("C_false", "C", "x = t"),
+        ("D_false", "D", "x, z = t, -z"),
+    )
+    for switch, letter, line in signs:
+        now = s.within(letter)
+        if s.on(f"transf_function_enabled{switch}") and now:
+            s.write(line)
+    s.write("w = (x, y, z)")
+    mandelbar_options(s)
+
+
+def mandelbar_options(s: FormulaStep) -> None:
+    """Scales, an offset, a turn and the start point, each in its iterations."""
+    on = {p: s.on(f"transf_function_enabled{p}_false") and s.within(p) for p in "PSJRX"}
+    if on["P"]:
+        s.write("x, y, z = w", f"w = (x, y, {s.number('transf_scale_1')} * z)")
+    if on["S"]:
+        s.scale("transf_scaleA_1")
+    if on["J"]:
+        s.add("transf_addition_constant")
+    if on["R"]:
+        s.turn("transf_rotation")
+    if on["X"]:
+        s.add_constant("", "transf_constant_multiplier_111")
+
+
+@known(259, "Mandelnest Full", "Mermelada 2020, fractalforums.org", LEFT_OUT)
+def mandelnest_full(s: FormulaStep) -> None:
+    """Sines of multiples of the angles to the three planes, with the sign that stays nearer."""
+    s.refuse("transf_function_enabled_false")
+    n, o, k = s.number("power"), s.point("transf_offsetA_000"), s.point("transf_constant_multiplierA_111")
+    s.write("x, y, z = w", "s = maximum(x * x + y * y + z * z, 1e-30)")
+    for p in "xyz":
+        s.write(f"u{p} = sin({n} * atan2({p}, sqrt(maximum(s - {p} * {p}, 1e-30))))")
+    s.write(f"r = exp(0.5 * {n} * log(s)) / sqrt(maximum(ux * ux + uy * uy + uz * uz, 1e-30))")
+    s.write(f"ox, oy, oz = {o}", f"kx, ky, kz = {k}", "cx, cy, cz = c")
+    inside = not s.on("transf_function_enabledA_false")
+    for p in "xyz":
+        added = f"o{p} + k{p} * c{p}" if inside else f"o{p}"
+        s.write(f"a{p} = {added}")
+    s.write("d = r * (ux * ax + uy * ay + uz * az)", "r = where(d < 0, r, -r)")
+    s.write("w = (r * ux + ax, r * uy + ay, r * uz + az)")
+    if not inside:
+        s.write("w = w + (kx * cx, ky * cy, kz * cz)")
+
+
+def kali_angles(s: FormulaStep, beta: str, alpha: str) -> None:
+    """Write the angles of a point to the pole and about z, the latter in half of a turn, and its radius."""
+    s.write("x, y, z = w", "s = maximum(x * x + y * y, 1e-30)", "q = sqrt(s + z * z)")
+    s.write(f"t = atan2(sqrt(s), z){beta}")
+    s.write(f"p = atan2(y * where(x < 0, -1, 1), maximum(absolute(x), 1e-30)){alpha}")
+
+
+def kali_point(s: FormulaStep, radius: str) -> None:
+    """Write the point of angles."""
+    s.write(f"w = ({radius} * sin(t) * cos(p), {radius} * sin(t) * sin(p), {radius} * cos(t))")
+
+
+@known(92, "Mandelbulb - Kali", "Kali 2010, fractalforums.com")
+def mandelbulb_kali(s: FormulaStep) -> None:
+    """A Mandelbulb of two steps: one angle is multiplied, then the other, of the image."""
+    if s.on("transf_function_enabled_false"):
+        absolute(s, *(f"transf_function_enabledA{axis}_false" for axis in "xyz"))
+    n, a, b = s.number("transf_pwr_8"), s.number("transf_scaleA_1"), s.number("transf_scaleB_1")
+    kali_angles(s, offset(s, "beta_angle_offset"), offset(s, "alpha_angle_offset"))
+    s.write(f"t = {n} * {a} * t")
+    kali_point(s, "q")
+    kali_angles(s, offset(s, "transf_beta_angle_offset"), "")
+    s.write(f"p = {n} * {b} * p", f"r = exp({n} * log(q))")
+    kali_point(s, "r")
+
+
+@known(240, "Mandelbulb - Pow2 V3", NYLANDER)
+def mandelbulb_pow2_3(s: FormulaStep) -> None:
+    """A square in polar coordinates whose angle is moved."""
+    if s.within("B"):
+        x, y, z = s.vector("transf_addition_constant_111")
+        limits = [
+            s.parameter(f"limit_{p}", abs(v)) if s.on(f"transf_function_enabledB{p}_false") else "1e6"
+            for p, v in zip("xyz", (x, y, z), strict=True)
+        ]
+        if limits != ["1e6"] * 3:
+            s.write(f"w = fold_to(w, ({', '.join(limits)}))")
+    if s.on("transf_function_enabledA_false") and s.within("A"):
+        absolute(s, *(f"transf_function_enabledA{axis}_false" for axis in "xyz"))
+    s.scale("transf_scaleA_1")
+    angle = f"t + 1.5 * {PI}"
+    for letter, part in (("B", "0.25"), ("C", "0.5"), ("D", "1")):
+        angle = f"2 * t + {part} * {PI}" if s.on(f"transf_function_enabled{letter}_false") else angle
+    s.write("x, y, z = w", "s = maximum(x * x + y * y, 1e-30)", "r = s + z * z", "t = atan2(z, sqrt(s))")
+    s.write(f"t = {angle}", "m = r * sin(t) / s")
+    s.write(f"w = (m * (y * y - x * x), -2 * m * x * y, r * cos(t) * {s.number('transf_scale_1')})")
+    s.add("transf_offset_000")
+    if s.on("transf_rotation2_enabled_false") and s.within("C"):
+        s.turn("transf_rotation")
+
+
+@known(262, "Mandelbulb - Pow2 V1", NYLANDER)
+def mandelbulb_pow2_1(s: FormulaStep) -> None:
+    """Squares about y and about z, each in its iterations."""
+    if s.on("transf_function_enabledAx_false") and s.within("A"):
+        absolute(s, *(f"transf_function_enabledC{axis}_false" for axis in "xyz"))
+    s.refuse("transf_function_enabledD_false", "transf_function_enabledF_false")
+    if s.on("transf_function_enabledAy") and s.within("B"):
+        sign = "-" if s.on("transf_function_enabledB_false") else ""
+        s.write("x, y, z = w", "s = maximum(x * x + z * z, 1e-30)", "m = y * y / s - 1")
+        s.write(f"w = ({sign}2 * x * z * m, 2 * sqrt(s) * y, (z * z - x * x) * m)")
+    if s.on("transf_function_enabledAz_false") and s.within("C"):
+        sign = "-" if s.on("transf_function_enabledA_false") else ""
+        s.write("x, y, z = w", "s = maximum(x * x + y * y, 1e-30)", "m = 1 - z * z / s")
+        s.write(f"w = ({sign}2 * x * y * m, (y * y - x * x) * m, 2 * sqrt(s) * z)")
+
+
+@known(41, "Buffalo", "Kali 2011, fractalforums.com")
+def buffalo(s: FormulaStep) -> None:
+    """The square with absolute values before and after."""
+    absolute(s, *(f"buffalo_preabs_{axis}" for axis in "xyz"))
+    s.square()
+    if s.on("buffalo_pos_z"):
+        s.write("x, y, z = w", "w = (x, y, -z)")
+    absolute(s, *(f"buffalo_abs_{axis}" for axis in "xyz"))
+
+
+@known(83, "IQ Bulb", "Quilez 2009, iquilezles.org: Mandelbulb")
+def iq_bulb(s: FormulaStep) -> None:
+    """The power about the y axis, with a number for each angle."""
+    n, m = s.number("transf_pwr_8"), s.number("transf_pwr_8a")
+    s.write(
+        "x, y, z = w",
+        "s = maximum(x * x + z * z, 1e-30)",
+        f"t = {n} * atan2(sqrt(s), y)",
+        f"p = {m} * atan2(x, z)",
+        f"r = exp(0.5 * {n} * log(s + y * y))",
+        "w = (r * sin(t) * sin(p), r * cos(t), r * sin(t) * cos(p))",
+    )
+
+
+@known(800, "Mandelbulb - Eye", NYLANDER)
+def mandelbulb_eye(s: FormulaStep) -> None:
+    """A square whose angles are sums of two, each with a factor."""
+    absolute(s, *(f"buffalo_preabs_{axis}" for axis in "xyz"))
+    other = f"{PI} - p" if s.on("transf_function_enabled_false") else "atan2(-y, x)"
+    s.write(
+        "x, y, z = w",
+        "s = maximum(x * x + y * y, 1e-30)",
+        "q, r = sqrt(s), s + z * z",
+        f"t = {s.number('transf_scaleB_1')} * atan2(q, z) + {s.number('transf_scaleC_1')} * atan2(q, -z)",
+        "p = atan2(y, x)",
+        f"p = {s.number('transf_scale_1')} * p + {other}",
+        "w = (r * sin(t) * cos(p), r * sin(t) * sin(p), r * cos(t))",
+    )
+    absolute(s, *(f"buffalo_abs_{axis}" for axis in "xyz"))
+    s.add("transf_addition_constantA_000")
+
+
+def doubled_angle(s: FormulaStep, first: str, second: str) -> None:
+    """Double the angle in a plane and keep the length; the coordinates are those of the statement before."""
+    s.write(
+        f"q = sqrt(maximum({first} * {first} + {second} * {second}, 1e-30))",
+        f"{first}, {second} = ({first} * {first} - {second} * {second}) / q, 2 * {first} * {second} / q",
+    )
+
+
+@known(13, "Mandelbulb 2", "Buddhi 2009, fractalforums.com")
+def mandelbulb_of_planes(s: FormulaStep) -> None:
+    """Angles in three planes are doubled, one after the other."""
+    s.write("x, y, z = w", "r = sqrt(x * x + y * y + z * z)")
+    doubled_angle(s, "x", "y")
+    doubled_angle(s, "y", "z")
+    doubled_angle(s, "x", "z")
+    s.write("w = (r * x, r * y, r * z)")
+
+
+@known(14, "Mandelbulb 3", "Buddhi 2009, fractalforums.com")
+def mandelbulb_of_signs(s: FormulaStep) -> None:
+    """Angles in two planes are doubled, with the signs of x before and between."""
+    s.write("x, y, z = w", "r = sqrt(x * x + y * y + z * z)", "a = where(x < 0, -1, 1)")
+    doubled_angle(s, "x", "y")
+    s.write("b = where(x < 0, -1, 1)")
+    doubled_angle(s, "x", "z")
+    s.write("w = (r * x * b, r * y, r * z * a)")
+
+
+@known(70, "Msltoe - Julia Bulb Eiffie", "Eiffie and Msltoe 2011, fractalforums.com")
+def eiffie_msltoe(s: FormulaStep) -> None:
+    """An octagon's fold about x, a square, and an offset along the radius."""
+    s.refuse("transf_addCpixel_enabled_false")
+    sector(s, "yz", "8", PI)
+    s.write(
+        "x, y, z = w",
+        "s = maximum(x * x + y * y, 1e-30)",
+        "m = 1 - z * z / maximum(s + z * z, 1e-30)",
+        f"w = ((x * x - y * y) * m, 2 * x * y * m * {s.number('transf_scale')}, 2 * z * sqrt(s))",
+    )
+    s.add("transf_addition_constant")
+    if s.value("transf_offset"):
+        s.write("x, y, z = w", "r = sqrt(maximum(x * x + y * y + z * z, 1e-30))")
+        s.write(f"w = (1 - {s.number('transf_offset')} / r) * w")
+    s.scale("transf_scale_1")
+
+
+@known(49, "Lkmitch", "Mitchell 2009, fractalforums.com")
+def lkmitch(s: FormulaStep) -> None:
+    """A square of numbers of three parts."""
+    s.write("x, y, z = w", "w = (x * x - 2 * y * z, z * z + 2 * x * y, y * y - 2 * x * z)")

@@ -1,0 +1,79 @@
+"""Folds that formulas of several families have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from .step_text import FormulaStep
+
+PI = "3.141592653589793"
+
+
+def absolute(s: FormulaStep, *switches: str) -> None:
+    """Absolute value of the coordinates whose switches are on."""
+    absolute_of(s, [s.on(switch) for switch in switches])
+
+
+def absolute_of(s: FormulaStep, on: Sequence[bool]) -> None:
+    """Absolute value of some coordinates."""
+    if all(on):
+        s.write("w = positive(w)")
+    elif any(on):
+        parts = (f"absolute({axis})" if flag else axis for axis, flag in zip("xyz", on, strict=True))
+        s.write("x, y, z = w", f"w = ({', '.join(parts)})")
+
+
+def polygon(s: FormulaStep, axes: str, count: str) -> None:
+    """Fold the angle in the plane of two axes into a sector of a polygon."""
+    sector(s, axes, s.parameter(count, max(s.values.whole(count), 1)), "0")
+
+
+def sector(s: FormulaStep, axes: str, count: str, turn: str) -> None:
+    """Fold an angle in a plane, which is turned before, into half of a sector: |fmod(angle + k, 2 k) - k|."""
+    first, second = axes[0], axes[1]
+    start = f"atan2({second}, {first})" if turn == "0" else f"atan2({second}, {first}) + {turn}"
+    s.write(
+        "x, y, z = w",
+        f"k = {PI} / {count}",
+        f"t = {start} + k",
+        "t = t - 2 * k * where(t < 0, -floor(-t / (2 * k)), floor(t / (2 * k)))",
+        "t = absolute(t - k)",
+        f"r = sqrt(maximum({first} * {first} + {second} * {second}, 1e-30))",
+        f"{first} = r * cos(t)",
+        f"{second} = r * sin(t)",
+        "w = (x, y, z)",
+    )
+
+
+def symmetric(s: FormulaStep) -> None:
+    """Absolute values, reflections in three diagonal planes, in part, and an offset."""
+    absolute(s, *(f"transf_function_enabledB{axis}" for axis in "xyz"))
+    diagonals(s)
+    s.add("transf_offsetA_000")
+
+
+def diagonals(s: FormulaStep) -> None:
+    """Reflections in three diagonal planes, in part."""
+    shares = dict(zip("xyz", s.vector("transf_addition_constant_0555"), strict=True))
+    for name, first, second in (("x", "x", "z"), ("y", "x", "y"), ("z", "y", "z")):
+        if s.on(f"transf_function_enabledA{name}"):
+            k = s.parameter(f"transf_addition_constant_0555_{name}", shares[name])
+            s.write("x, y, z = w", f"t = 2 * {k} * minimum({first} - {second}, 0)")
+            s.write(f"{first} = {first} - t", f"{second} = {second} + t", "w = (x, y, z)")
+
+
+MANDALAY = (("x", "y", "z"), ("y", "z", "x"), ("z", "x", "y"))
+"""Order of the coordinates in each of the three parts of a Mandalay fold."""
+
+
+def mandalay(s: FormulaStep, serial: bool) -> None:
+    """Folds of a Mandalay box; serial ones take the coordinates of those before."""
+    f, g = s.point("transf_addition_constant_0555"), s.point("transf_offsetA_000")
+    s.write(f"fx, fy, fz = {f}", f"gx, gy, gz = {g}", "x, y, z = w")
+    s.write("ax, ay, az = absolute(x), absolute(y), absolute(z)", "qx, qy, qz = ax, ay, az")
+    for p, q, r in MANDALAY:
+        a = "q" if serial else "a"
+        s.write(f"u, v = {a}{p}, maximum({a}{q}, {a}{r})")
+        s.write(f"t, m = u - 2 * f{p}, v - 4 * f{p}", f"m = maximum(absolute(t + f{p}) - f{p}, m)")
+        s.write(f"q{p} = minimum(minimum(m, maximum(t - g{p}, v)), u)")
+    s.write(*(f"{p} = where({p} < 0, -q{p}, q{p})" for p in "xyz"), "w = (x, y, z)")

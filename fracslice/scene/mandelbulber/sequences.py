@@ -1,0 +1,321 @@
+"""Hybrids of Mandelbulber: which formula is taken at which iteration, as an orbit of steps.
+
+Formulas are taken in turn, each as often as its iterations say, and only between its start and its stop;
+behind the last, one goes on with that of `repeat_from`. Much in a formula begins or ends at an iteration,
+too. So each iteration is written as a text, and equal texts are one definition. Where the texts recur from
+the first on, one period of them is the round of an `<orbit>`; else each iteration is an element of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from ...common.parameters import AUTO, Number, Parameter, Vector
+from ...errors import SceneError
+from ...fields.definitions import Definition, formula
+from ...fields.orbits import REPEAT
+from ...formulas import Node, get
+from .settings import FRACTALS, Settings, SettingsSection, Triple
+from .step_text import (
+    ADDED,
+    FORMULAS,
+    LEFT_OUT,
+    OWN,
+    SWAPPED,
+    Element,
+    FormulaStep,
+    KnownFormula,
+    UnknownError,
+)
+
+NEVER = 250
+"""Iterations of a file that does not limit them, and the last one of a formula that does not stop."""
+
+DEEP = 24
+"""Most iterations that stand in a scene as in the file; more are automatic."""
+
+UNROLLED = 6
+"""Most iterations of an orbit whose steps do not recur."""
+
+OWN_DISTANCES = (3, 4, 5)
+"""Distances that are not of the last radius of an orbit: of Kleinian groups, and those of formulas."""
+
+LONGEST = 32
+"""Most steps of a round."""
+
+
+@dataclass(frozen=True)
+class Slot:
+    """One of the formulas of a file."""
+
+    place: int  # from 1
+    number: int  # of the formula
+    values: SettingsSection  # its parameters
+    known: KnownFormula | None
+    iterations: int  # how often it is taken in turn
+    start: int
+    stop: int
+    weight: float
+    adds: bool  # True if the constant is added after it
+    line: str = ""  # file and line of its number
+
+
+@dataclass
+class Orbit:
+    """Everything that the steps of an orbit share."""
+
+    settings: Settings
+    slots: list[Slot]
+    is_hybrid: bool
+    iterations: int
+    julia: Triple | None
+    factor: Triple
+    notes: list[str] = field(default_factory=list)
+    missing: list[str] = field(default_factory=list)
+
+
+Text = tuple[str, tuple[tuple[str, Any], ...], Element | None, int]
+"""A step at an iteration: statements, parameters, the element of ours that it is, and its place."""
+
+
+def slot(settings: Settings, place: int, hybrid: bool) -> Slot | None:
+    """Formula of a place, from 1; None for none."""
+    main, own = settings.main, settings.fractals[place - 1]
+
+    def where(name: str) -> tuple[SettingsSection, str]:
+        return (own, name) if own.given(name) else (main, f"{name}_{place}")
+
+    section, name = where("formula")
+    number = section.whole(name, "2" if place == 1 else "0")
+    if number == 0:
+        return None
+    known = FORMULAS.get(number)
+    (a, stay), (b, often), (d, heavy) = (
+        where("dont_add_c_constant"),
+        where("formula_iterations"),
+        where("formula_weight"),
+    )
+    (e, begin), (f, end) = where("formula_start_iteration"), where("formula_stop_iteration")
+    switched = a.flag(stay, "false")
+    constant = known.constant if known else ADDED
+    adds = constant != OWN and switched == (constant == LEFT_OUT)
+    return Slot(
+        place,
+        number,
+        own,
+        known,
+        max(b.whole(often, "1"), 1) if hybrid else 1,
+        e.whole(begin, "0") if hybrid else 0,
+        f.whole(end, str(NEVER)) if hybrid else NEVER,
+        d.number(heavy, "1") if hybrid else 1.0,
+        adds,
+        section.place(name),
+    )
+
+
+def hybrid_slots(settings: Settings) -> list[Slot]:
+    """All formulas of a hybrid, or the first alone."""
+    hybrid = settings.main.flag("hybrid_fractal_enable", "false")
+    places = range(1, FRACTALS + 1) if hybrid else (1,)
+    return [found for place in places if (found := slot(settings, place, hybrid))]
+
+
+def all_slots(settings: Settings) -> list[Slot]:
+    """All formulas of a file that is no hybrid."""
+    places = range(1, FRACTALS + 1)
+    return [found for place in places if (found := slot(settings, place, False))]
+
+
+def order(slots: Sequence[Slot], repeat_from: int, count: int) -> list[Slot]:
+    """Formula of each iteration; fewer than asked for where none is left."""
+    taken: list[Slot] = []
+    at = counter = 0
+    first = min(max(repeat_from - 1, 0), len(slots) - 1)
+    for i in range(count):
+        counter += 1
+        for _ in slots:
+            if slots[at].start <= i <= slots[at].stop:
+                break
+            at = at + 1 if at + 1 < len(slots) else first
+        else:
+            break
+        taken.append(slots[at])
+        if counter >= slots[at].iterations:
+            counter = 0
+            at = at + 1 if at + 1 < len(slots) else first
+    return taken
+
+
+def texts(orbit: Orbit, taken: Sequence[Slot]) -> list[Text]:
+    """Step of each iteration."""
+    state: dict[str, float] = {}
+    even = all(s.known and s.known.even and not s.adds and s.weight == 1 for s in taken)
+    return [one(orbit, s, i, state, even) for i, s in enumerate(taken)]
+
+
+def one(orbit: Orbit, slot: Slot, index: int, state: dict[str, float], even: bool) -> Text:
+    """Step of one iteration."""
+    assert slot.known is not None
+    step = FormulaStep(slot.values, index, state, symmetric=even)
+    foldings(step, orbit.settings.main)
+    slot.known.write(step)
+    if slot.weight <= 0:
+        return "return w", (), None, slot.place
+    animated = any(f"fractal{slot.place - 1}_" in line for _, line in orbit.settings.keyframes[:1])
+    element = (
+        step.element
+        if not animated and slot.weight >= 1 and slot.adds and orbit.factor == (1, 1, 1)
+        else None
+    )
+    if step.element and element and orbit.settings.main.flag("box_folding", "false"):
+        element = None
+    if slot.weight < 1:
+        step.lines.insert(0, "start = w")
+    if slot.adds:
+        constant(step, orbit, slot.known.constant == SWAPPED)
+    if slot.weight < 1:
+        share = step.parameter("formula_weight", slot.weight)
+        step.write(f"w = {share} * w + (1 - {share}) * start")
+    step.write("return w")
+    return "\n".join(step.lines), tuple(step.parameters.items()), element, slot.place
+
+
+def constant(step: FormulaStep, orbit: Orbit, swapped: bool) -> None:
+    """Add the constant of a Julia set, or the start point, times a factor; x and y may be swapped."""
+    if orbit.julia is not None:
+        x, y, z = (a * b for a, b in zip(orbit.julia, orbit.factor, strict=True))
+        x, y = (y, x) if swapped else (x, y)
+        step.write(f"w = w + {step.parameter('julia_c', (x, y, z))}")
+    elif swapped:
+        own = step.parameter("fractal_constant_factor", orbit.factor)
+        step.write(f"fx, fy, fz = {own}", "cx, cy, cz = c", "w = w + (fx * cy, fy * cx, fz * cz)")
+    elif orbit.factor == (1, 1, 1):
+        step.write("w = w + c")
+    else:
+        own = step.parameter("fractal_constant_factor", orbit.factor)
+        step.write(f"fx, fy, fz = {own}", "cx, cy, cz = c", "w = w + (fx * cx, fy * cy, fz * cz)")
+
+
+def foldings(step: FormulaStep, main: SettingsSection) -> None:
+    """Folds of the whole file before each formula."""
+    if main.flag("box_folding", "false"):
+        limit, value = main.number("box_folding_limit", "1"), main.number("box_folding_value", "2")
+        step.fold_beyond("box_folding", limit, value)
+    if main.flag("spherical_folding", "false"):
+        inner, outer = (
+            main.number("spherical_folding_inner", "0.5"),
+            main.number("spherical_folding_outer", "1"),
+        )
+        step.ball(inner * inner, outer * outer)
+
+
+def recurring(steps: Sequence[Text]) -> int:
+    """Shortest period of steps from the first on; 0 if they do not recur twice."""
+    for period in range(1, min(LONGEST, len(steps) // 2) + 1):
+        if all(steps[k] == steps[k - period] for k in range(period, len(steps))):
+            return period
+    return 0
+
+
+def steps_of(orbit: Orbit) -> list[Text]:
+    """Step of each iteration of a file; its solid is that of escape, not of a distance of the last formula.
+
+    Raises `UnknownError` for a variant of a formula that is not known here.
+    """
+    main = orbit.settings.main
+    if main.whole("delta_DE_function", "0") in OWN_DISTANCES:
+        what = main.text("delta_DE_function", "0")
+        raise UnknownError(f"{main.place('delta_DE_function')}: delta_DE_function {what}")
+    taken = order(orbit.slots, orbit.settings.main.whole("repeat_from", "1"), min(orbit.iterations, NEVER))
+    if not taken:
+        raise SceneError(f"{orbit.settings.path}: expected a formula that is taken at the first iteration")
+    return texts(orbit, taken)
+
+
+def nodes(orbit: Orbit, name: str = "") -> Node:
+    """Orbit of a file as an element of ours."""
+    steps = steps_of(orbit)
+    place = f"{orbit.settings.main.place('N')}: N {orbit.iterations}"
+    period = recurring(steps)
+    if period and (len(steps) > UNROLLED or len(steps) % period == 0):
+        whole = -(-len(steps) // period)
+        if len(steps) > DEEP and orbit.iterations < NEVER:
+            orbit.notes.append(f"{place}: the number of iterations is automatic")
+        elif len(steps) <= DEEP and len(steps) % period:
+            orbit.notes.append(f"{place}: {whole * period} iterations, which are whole rounds")
+        return assembled(orbit, steps[:period], AUTO if len(steps) > DEEP else whole, name)
+    if len(steps) > UNROLLED:
+        orbit.notes.append(f"{place}: {UNROLLED} of the iterations, for their steps do not recur")
+    return assembled(orbit, steps[:UNROLLED], 1, name)
+
+
+def assembled(orbit: Orbit, round_: list[Text], iterations: Any, name: str) -> Node:
+    """Elements of a round; equal steps in a row are repeated."""
+    made: dict[Text, tuple[str, Any]] = {}
+    for step in dict.fromkeys(round_):
+        made[step] = definition(orbit, step, name, len(made), len(set(round_)))
+    runs = list(_runs(round_))
+    if len(runs) == 1 and (runs[0][1] == 1 or iterations != AUTO):
+        step, count = runs[0]
+        whole = iterations if iterations == AUTO else iterations * count
+        return element(orbit, step, made[step], iterations=whole)
+    children = [element(orbit, step, made[step], repeat=count) for step, count in runs]
+    return get("orbit")(*children, iterations=iterations)
+
+
+def _runs(round_: Sequence[Text]) -> Iterator[tuple[Text, int]]:
+    """Steps with the number of times that they stand in a row, up to that of `repeat`."""
+    last, count = round_[0], 0
+    for step in round_:
+        if step != last or count == REPEAT.most:
+            yield last, count
+            last, count = step, 0
+        count += 1
+    yield last, count
+
+
+def element(orbit: Orbit, step: Text, made: tuple[str, Any], **values: Any) -> Node:
+    """Element of a step: ours, or that of its definition."""
+    _, defined = made
+    if step[2] is not None:
+        given: dict[str, Any] = {**dict(step[2].values), **values}
+        if orbit.julia is not None:
+            given["julia"] = orbit.julia
+        return get(step[2].name)(**given)
+    made_of: Node = defined(**values)
+    return made_of
+
+
+def definition(orbit: Orbit, step: Text, name: str, index: int, count: int) -> tuple[str, Any]:
+    """Name and formula of a step."""
+    text, parameters, replaced, place = step
+    if replaced is not None:
+        return replaced.name, None
+    known = next(s.known for s in orbit.slots if s.place == place)
+    assert known is not None
+    own = (
+        f"{_identifier(known.name)}_{name}{index + 1}"
+        if count > 1
+        else f"{_identifier(known.name)}_{name}".rstrip("_")
+    )
+    kinds = tuple((n, _kind(value)) for n, value in parameters)
+    own = own if own not in _taken() else f"{own}_m"
+    return own, formula(Definition(own, kinds, text))
+
+
+def _taken() -> frozenset[str]:
+    from ...fields.registry import names
+
+    return frozenset(names())
+
+
+def _identifier(name: str) -> str:
+    """Name of an element for that of a formula."""
+    letters = "".join(letter if letter.isalnum() else "_" for letter in name.lower())
+    return "_".join(filter(None, letters.split("_")))[:30]
+
+
+def _kind(value: float | Triple) -> Parameter:
+    return Vector(value, "") if isinstance(value, tuple) else Number(value, "")
