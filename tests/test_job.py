@@ -302,6 +302,13 @@ def test_modules_of_later_stages_are_there() -> None:
     import_ahead()
 
 
+@pytest.fixture
+def only_samples(monkeypatch):
+    """No tetrahedra in place of samples."""
+    monkeypatch.setattr("fracslice.jobs.mesh._Job.split_up", lambda _: None)
+
+
+@pytest.mark.usefixtures("only_samples")
 def test_a_job_that_lost_its_object_samples_finer_and_says_so(tmp_path):
     report = make_mesh(LANTERN, MeshJob(resolution=144), path=tmp_path / "lantern.stl").report
     assert report.voxel_mm < 80 / 144 / 1.9 and report.problems == ()
@@ -310,6 +317,7 @@ def test_a_job_that_lost_its_object_samples_finer_and_says_so(tmp_path):
     assert "100.0% of the object's volume is finer than the samples and missing" in report.notes[0]
 
 
+@pytest.mark.usefixtures("only_samples")
 def test_a_lost_object_is_no_success(monkeypatch):
     """Where finer samples are too many, the report says how much is missing, and which voxel would do."""
     monkeypatch.setattr("fracslice.jobs.mesh.RAISED", 0)
@@ -321,6 +329,7 @@ def test_a_lost_object_is_no_success(monkeypatch):
     assert plain["missing_volume_share"] > 0.99
 
 
+@pytest.mark.usefixtures("only_samples")
 @pytest.mark.parametrize("tube", [0.006, 0.02], ids=["no sample", "crumbs"])
 def test_an_element_that_vanished_is_named_however_small(tube, monkeypatch):
     monkeypatch.setattr("fracslice.jobs.mesh.RAISED", 0)

@@ -17,7 +17,7 @@ import numpy as np
 from ..common.arrays import product
 from ..common.memory import peak_rss_mb
 from ..common.messages import lacking
-from ..errors import SceneError, SharedError, TooLargeError, VolumeError, keeping
+from ..errors import EmptyError, MeshError, SceneError, SharedError, TooLargeError, VolumeError, keeping
 from ..fields.box import Box
 from ..fields.field import Field
 from ..formulas import Node
@@ -207,11 +207,9 @@ def standing_on(mesh: Mesh, up: np.ndarray) -> Mesh:
     return turned.translated(np.array([-(x0 + x1) / 2, -(y0 + y1) / 2, -z0]))
 
 
-def noted(result: Result, coarse: Result) -> Result:
-    """A result with a note that it was made in place of a coarser one, and why."""
-    report, asked = result.report, coarse.report
-    text = f"voxel {report.voxel_mm:.3g} mm instead of {asked.voxel_mm:.3g} mm: {', '.join(asked.lost)}"
-    report = replace(report, notes=(text, *report.notes))
+def noted(result: Result, text: str) -> Result:
+    """A result with one note more."""
+    report = replace(result.report, notes=(text, *result.report.notes))
     return Result(report, result.place, result.planned, result.whole, result.work)
 
 
@@ -230,6 +228,9 @@ OWN = "the triangles are those of the model; with a voxel or a resolution it is 
 PIXEL = 0.2
 """Pixels by which the slope of the surface is measured for heights of layers, mm."""
 
+THIN = "tetrahedra show what is thinner than a voxel; samples lose"
+"""First part of the note on a mesh of tetrahedra."""
+
 TRIES = 2
 """How many times a job that lost its object samples finer."""
 
@@ -246,6 +247,7 @@ class _Job:
     clock: Clock
     path: Path | None
     given: Sized | None = None  # the field, if it is not that of the scene
+    split: bool = False  # whether tetrahedra are split until they show what is thinner than a voxel
 
     @cached_property
     def size(self) -> Sizing:
@@ -255,14 +257,41 @@ class _Job:
         return sizing(self.scene, self.what.size, self.what.scale, self.clock.work)
 
     def best(self) -> Result:
-        """Result, of finer samples where those that were asked for lose the object."""
-        result, finer = first, _ = self.made()
+        """Result; of tetrahedra, or else of finer samples, where samples as asked for lose the object."""
+        try:
+            first, finer = self.made()
+        except EmptyError:
+            if (split := self.split_up()) is None:
+                raise
+            return noted(split, f"{THIN} all of it")
+        report = first.report
+        if report.lost and (split := self.split_up()) is not None:
+            share = report.missing_volume_share
+            part = f"{share:.1%} of the object's volume" if share > 0 else "an element of the scene"
+            return noted(split, f"{THIN} {part}")
+        result = first
         with suppress(TooLargeError):  # what was made is returned, and says what it lacks
             for _ in range(TRIES):
                 if finer is None:
                     break
                 result, finer = finer.made()
-        return result if result is first else noted(result, first)
+        if result is first:
+            return result
+        voxels = f"voxel {result.report.voxel_mm:.3g} mm instead of {report.voxel_mm:.3g} mm"
+        return noted(result, f"{voxels}: {', '.join(report.lost)}")
+
+    def split_up(self) -> Result | None:
+        """Result of tetrahedra that are split until they show what is thinner than a voxel.
+
+        None if it would not print, or the field is that of a fractal, whose detail has no end.
+        """
+        root = self.scene.root if self.given is None else self.given.planned.root
+        if root.bounds.exterior_only or self.clock.work.cluster is not None:
+            return None
+        with suppress(TooLargeError, EmptyError, MeshError):
+            result, _ = replace(self, split=True).made()
+            return None if result.report.problems else result
+        return None
 
     def made(self) -> tuple[Result, _Job | None]:
         """Result, and the job of finer samples that has the object if this one lost it; None if there is no
@@ -368,8 +397,12 @@ class _Job:
         from ..mesh.shells import Pieces
         from .mesh_steps import Local, Sampled
 
+        work = self.clock.work
+        if self.split:
+            sized = self.given or plan_mesh(self.scene, self.what, self.size, self.clock)
+            return sized, mesh_steps.split_surface(sized.planned, self.clock), Local(work)
         sized, signs, again = self.sampled()
-        planned, work = sized.planned, self.clock.work
+        planned = sized.planned
         of, halo, executor = Sampled(planned, signs, work.threads), HALO * planned.voxel, Local(work)
         if (own := self.own_triangles(planned)) is not None:
             return sized, mesh_steps.surface_of_triangles(of, own, self.clock), executor
@@ -405,6 +438,7 @@ class _Job:
         """Finished mesh and report, and the refinement of the samples that does not lose the object."""
         from ..fields.depth import shallower
         from ..mesh.shells import touching_note
+        from ..mesh.subgrid import outside_share
         from ..printing.walls import thickness_note
         from ..volume.amount import lost_size, mesh_amount
         from .mesh_steps import choose_bodies
@@ -420,7 +454,8 @@ class _Job:
                 surface, sized.left, what.dust_limit, scale, how.thickness, executor
             )
         whole = how.bodies is None
-        measure = partial(mesh_amount, planned, chosen.volume, scale, whole, clock.work)
+        lacks = partial(outside_share, surface.pieces.mesh(0)) if surface.split else None
+        measure = partial(mesh_amount, planned, chosen.volume, scale, whole, clock.work, lacks)
         with in_background(measure, clock.work.threads) as measured:
             made = Writing(self.scene, what, clock, self.path).made(surface, finish, executor)
             written = nullcontext() if self.path is None else keeping(f"{self.path} is written")

@@ -141,11 +141,12 @@ class Surface:
     shells: WholeShells  # shells of the mesh
     tips: NDArray[np.float64]  # vertices that were added at tips, and at sharp edges that samples cut off
     own: bool = False  # whether these are the triangles of a model, which no voxel is too large for
+    split: bool = False  # whether tetrahedra were split until they showed what is thinner than a voxel
 
     @property
     def thin(self) -> str:
         """Note on walls thinner than a voxel; empty if there are none."""
-        return "" if self.own else self.shells.thin_walls(self.planned.voxel)
+        return "" if self.own or self.split else self.shells.thin_walls(self.planned.voxel)
 
 
 def sample_surface(planned: Plan, clock: Clock, evaluate: Evaluate | None = None) -> SignBricks:
@@ -240,6 +241,22 @@ def surface_of_triangles(of: Sampled, own: Triangles, clock: Clock) -> Surface:
         return Surface(of.planned, of.signs, pieces, shells, none, own=True)
 
 
+def split_surface(planned: Plan, clock: Clock) -> Surface:
+    """Surface of a field of which samples miss what is thinner than a voxel."""
+    from ..mesh.contouring import Piece
+    from ..mesh.shells import survey
+    from ..mesh.subgrid import thin_surface
+    from ..volume.bricks import SignBricks
+
+    pieces, lattice, none = Pieces(), planned.lattice, np.empty((0, 3))
+    with clock("meshing"):
+        mesh, evaluations = thin_surface(planned.root, lattice, clock.work)
+        pieces.add(Piece(mesh, np.inf), fresh=len(mesh.triangles))
+        shells = survey(pieces, planned.voxel, clock.work.threads)
+        signs = SignBricks.without(lattice, evaluations)
+        return Surface(planned, signs, pieces, shells, none, split=True)
+
+
 def refine_surface(surface: Surface, chord: float, clock: Clock) -> tuple[Surface, Refined]:
     """Refine a surface in one piece.
 
@@ -254,7 +271,7 @@ def refine_surface(surface: Surface, chord: float, clock: Clock) -> tuple[Surfac
         mesh, done = refine(planned.root, surface.pieces.mesh(0), chord, planned.voxel, clock.work)
         pieces.add(Piece(mesh, np.inf), fresh=len(mesh.triangles))
         shells = survey(pieces, planned.voxel, clock.work.threads)
-        return Surface(planned, surface.signs, pieces, shells, surface.tips), done
+        return replace(surface, pieces=pieces, shells=shells), done
 
 
 R = TypeVar("R")
@@ -792,7 +809,7 @@ VERTICES_A_BRICK = 170
 
 def stride(bricks: int) -> int:
     """Return the stride of the vertices whose distance from the surface is measured."""
-    return -(-VERTICES_A_BRICK * bricks // MOST_ERRORS)
+    return max(-(-VERTICES_A_BRICK * bricks // MOST_ERRORS), 1)
 
 
 def off_surface(

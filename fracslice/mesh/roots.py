@@ -23,9 +23,13 @@ from ..expr.loops import WIDTH, field, load, loop, shares, store
 from ..expr.runtime import constant
 from ..expr.vocabulary import absolute, any_of, maximum, minimum, rsqrt, where
 from ..fields.field import Device, Field, Precision
+from ..work import Work, chunks
 
 STEPS = 48
 """Largest number of steps to a root."""
+
+APPROACH = 128
+"""Largest number of steps from either end of a segment."""
 
 
 @loop("rrrrrrrrrn")
@@ -199,6 +203,47 @@ def lead(P, FRAME, X, Y, Z, LX, LY, LZ, HX, HY, HZ, OX, OY, OZ, MX, MY, MZ, DX, 
         store(DZ, i, where(between, mz, gz))
 
 
+@loop("rrrrrrrrrrrrn")
+def approach(P, FRAME, X, Y, Z, DX, DY, DZ, FA, FB, TA, TB, n):
+    """Go along each of n segments from both ends until the field has not the sign of that end, or both meet.
+
+    A step is as long as the field proves to have one sign, or as the finest step. FRAME: reciprocal of the
+    Lipschitz constant; finest step, scene units.
+
+    `FA`, `FB`: the field at the ends, [n]; `TA`, `TB`: receive where the sign has changed, as a fraction t of
+    the segment, or -1 - t where they met without, [n].
+    """
+    free, finest = FRAME[0], FRAME[1]
+    for i in shares(n, WIDTH):
+        x, y, z = load(X, i), load(Y, i), load(Z, i)
+        dx, dy, dz = load(DX, i), load(DY, i), load(DZ, i)
+        over = rsqrt(maximum(dx * dx + dy * dy + dz * dz, 1e-200))
+        least, reach = finest * over, free * over
+        fa, fb = load(FA, i), load(FB, i)
+        one, other = where(fa < 0.0, 0.0 * x - 1.0, 1.0), where(fb < 0.0, 0.0 * x - 1.0, 1.0)
+        fa, fb = absolute(fa), absolute(fb)
+        a = 0.0 * x
+        b = a + 1.0
+        going = least < 1.0
+        before, behind = a < 1.0, a < 1.0
+        for _ in range(APPROACH):
+            if not any_of(going):
+                break
+            there = where(before, a + maximum(fa * reach, least), a)
+            going = going & (there < b)
+            a = where(going, there, a)
+            fa = one * field(x + a * dx, y + a * dy, z + a * dz, P)
+            before = before & ((fa >= 0.0) | (a <= 0.0))
+            there = where(behind, b - maximum(fb * reach, least), b)
+            going = going & (there > a)
+            b = where(going, there, b)
+            fb = other * field(x + b * dx, y + b * dy, z + b * dz, P)
+            behind = behind & ((fb >= 0.0) | (b >= 1.0))
+            going = going & (before | behind)
+        store(TA, i, where(before, -1.0 - a, a))
+        store(TB, i, where(behind, -1.0 - b, b))
+
+
 @loop("hxxxxdfnn")
 def lay(E, ox, oy, oz, h, R, S, stride, n):
     """Lay n grid edges out as segments, on a GPU.
@@ -274,3 +319,51 @@ class Roots:
     def native(self, name: str) -> tuple[Any, ...] | Callable[..., None]:
         """Return a loop for native code."""
         return self.runs[name].native(self.frame)
+
+
+AT_ONCE = 1 << 10
+"""Packets of segments per task."""
+
+
+class Segments:
+    """Loops over segments of a field in float64, by all threads.
+
+    `voxel`, `finest` (the shortest step of `approach`) in scene units.
+    """
+
+    def __init__(self, root: Field, voxel: float, finest: float, work: Work) -> None:
+        loops = root.loops((find, approach), "float64")
+        self._width, self._work, self._runs = loops.width, work, loops.runs
+        frames = {"find": [1 / voxel, *FRAMES["float64"]], "approach": [1 / root.bounds.lipschitz, finest]}
+        self._frames = {
+            name: constant(np.array(frame), np.dtype(np.float64)) for name, frame in frames.items()
+        }
+
+    def roots(self, starts: np.ndarray, along: np.ndarray) -> np.ndarray:
+        """Roots on segments, as fractions, [n].
+
+        `starts`, `along`: float64 [3, n].
+        """
+        (roots,) = self._run("find", [*starts, *along], 1)
+        return np.asarray(roots)
+
+    def approach(self, starts: np.ndarray, along: np.ndarray, ends: np.ndarray) -> np.ndarray:
+        """See the loop, [2, n].
+
+        `starts`, `along`: float64 [3, n]; `ends`: the field at both ends, [2, n].
+        """
+        return self._run("approach", [*starts, *along, *ends], 2)
+
+    def _run(self, name: str, rows: list[np.ndarray], results: int) -> np.ndarray:
+        """Run a loop on rows [n] by all threads; [results, n]."""
+        n = len(rows[0])
+        padded = np.zeros((len(rows), -(-max(n, 1) // self._width) * self._width))
+        for row, own in zip(padded, rows, strict=True):
+            row[:n] = own
+        out = np.empty((results, padded.shape[1]))
+
+        def task(part: slice) -> None:
+            self._runs[name](self._frames[name], padded[:, part], out[:, part])
+
+        self._work.map(task, chunks(padded.shape[1], AT_ONCE * self._width))
+        return out[:, :n]

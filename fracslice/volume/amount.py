@@ -284,15 +284,11 @@ def lost_share(
 
 
 def scattered(
-    root: Field,
-    estimate: VolumeEstimate,
-    origin: tuple[float, float, float],
-    spacing: tuple[float, float, float],
-    work: Work | None = None,
+    root: Field, estimate: VolumeEstimate, missed: Lacks, work: Work | None = None
 ) -> list[tuple[Node, np.ndarray, float]]:
-    """Find the elements of a scene of several that samples miss: at most of their points.
+    """Find the elements of a scene of several that are missed at most of their points.
 
-    Returns float64 [3, n], scene units.
+    Returns such elements, points in them, float64 [3, n], scene units, and the share of these that is missed.
     """
     found = []
     for part in parts(root.tree) if root.tree else ():
@@ -304,8 +300,8 @@ def scattered(
             if own.volume < DUST * estimate.volume or not own.inside.size:
                 continue
         points = own.some(EACH)
-        if (missed := lost_share(root, points, origin, spacing, 1.0, work)) >= SCATTERED:
-            found.append((part, points, missed))
+        if (share := missed(points)) >= SCATTERED:
+            found.append((part, points, share))
     return found
 
 
@@ -340,6 +336,9 @@ def count_sealed(root: Field, outer: Box, cell: float, work: Work) -> tuple[int,
     kept = sizes[sizes >= SMALLEST_CAVITY]
     return len(kept), float(kept.sum()) * cell**3
 
+
+Lacks = Callable[[np.ndarray], float]
+"""Share of points, float64 [3, n], scene units, that are missing."""
 
 Grid = tuple[Triple, Triple, Callable[[float], str]]
 """Origin and spacing of the samples, scene units, and a function that names samples of a fraction of the
@@ -404,10 +403,13 @@ def lost_size(
     return (x, y, z), (f"{along}: {reason} reach farther",)
 
 
-def mesh_amount(planned: Plan, made: float, scale: float, whole: bool, work: Work) -> Completeness:
+def mesh_amount(
+    planned: Plan, made: float, scale: float, whole: bool, work: Work, lacks: Lacks | None = None
+) -> Completeness:
     """Compare the volume of a mesh with that of its field.
 
-    `made` in mm3; `scale`: mm per scene unit.
+    `made` in mm3; `scale`: mm per scene unit; `lacks`: share of points that the mesh lacks, if samples
+    do not tell.
     """
     lattice = Lattice.around(planned.outer, planned.voxel)
 
@@ -416,14 +418,21 @@ def mesh_amount(planned: Plan, made: float, scale: float, whole: bool, work: Wor
 
     spacing = planned.voxel, planned.voxel, planned.voxel
     grid = lattice.origin, spacing, sampling
-    return compare_volumes(planned.root, [planned.outer], made, scale, grid, whole, work)
+    return compare_volumes(planned.root, [planned.outer], made, scale, grid, whole, work, lacks)
 
 
 def compare_volumes(
-    root: Field, boxes: list[Box], made: float, scale: float, grid: Grid, whole: bool, work: Work
+    root: Field,
+    boxes: list[Box],
+    made: float,
+    scale: float,
+    grid: Grid,
+    whole: bool,
+    work: Work,
+    lacks: Lacks | None = None,
 ) -> Completeness:
     """Compare the volume of the field in boxes, scene units, with `made`, mm3; with `whole`, look for the
-    elements of the scene, too.
+    elements of the scene, too. `lacks` as for `mesh_amount`.
     """
     true, (origin, spacing, name) = amount(root, boxes, work), grid
     off, unit = true.off(made / scale**3), scale**3
@@ -438,7 +447,7 @@ def compare_volumes(
         )
 
     notes, problems, cures = list[str](), list[str](), [1]
-    for part, points, share in scattered(root, true, origin, spacing, work) if whole else ():
+    for part, points, share in scattered(root, true, lacks or missed, work) if whole else ():
         times = next((t for t in FINER if missed(points, t / MARGIN) < SCATTERED), None)
         element = f"<{part.formula.name}>{of(part)}"
         problems.append(f"{share:.0%} of {element} is finer than the samples and missing: {would(times)}")

@@ -113,6 +113,26 @@ class SignBricks(SamplingCounts):
     signs: np.ndarray
     index: np.ndarray
 
+    @classmethod
+    def without(cls, lattice: Lattice, evaluations: int) -> SignBricks:
+        """No bricks of a lattice, for a surface that is made without samples.
+
+        Parameters
+        ----------
+        lattice
+            The lattice.
+        evaluations
+            Evaluations that the surface took.
+
+        Returns
+        -------
+        SignBricks
+            No signs.
+        """
+        index = np.full(lattice.bricks, OUTSIDE, np.int32)
+        bits, none = np.empty((0, 8, 8), np.uint8), np.empty((0, 3), np.int32)
+        return cls(lattice.origin, lattice.voxel, none, bits, index, evaluations=evaluations)
+
     def __len__(self) -> int:
         return len(self.ijk)
 
