@@ -137,7 +137,7 @@ def _slope(layer: Layer) -> float:
     x, y = (stack.frame[:2] + stack.frame[2:] * (edges[:, :2] + share * np.eye(2)[edges[:, 2]])).T
     z = np.full(len(x), stack.z[layer.index])
     half = layer.height / stack.scale / 2
-    at = layer.exact.points
+    at = stack.exact.points
     gradient = np.array(
         [
             at(x + half, y, z) - at(x - half, y, z),

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 
 import numpy as np
 
 from ..common.cache import key
 from ..errors import SliceError
 from ..fields.box import Box
-from ..fields.field import Field
+from ..fields.field import Field, Kernel
 from ..printing import printable
 from ..records import SliceJob
 from ..volume import Drain, Plan, Supports, plan
@@ -124,7 +125,18 @@ class Stack:
         """Values that determine the layers."""
         own = [getattr(self, f.name) for f in fields(self) if f.name not in ("root", "parts", "supports")]
         parts = [(part.turns, part.at, key(*part.stack.identity)) for part in self.parts]
-        return [self.root.key, *own, *parts]
+        held = vars(self.supports.pillars).values() if self.supports else ()
+        return [self.object.key, *held, *own, *parts]
+
+    @property
+    def object(self) -> Field:
+        """The object without its supports."""
+        return self.supports.carried if self.supports else self.root
+
+    @cached_property
+    def exact(self) -> Kernel:
+        """float64 kernel of the field."""
+        return self.root.kernel("cpu", "float64")
 
     @property
     def heights(self) -> np.ndarray:
