@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from base64 import b64encode
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from html import escape
 from typing import TYPE_CHECKING, BinaryIO
@@ -333,7 +333,7 @@ def elevations(stack: Stack, file: BinaryIO, work: Work | None = None) -> None:
     def sides(layer: Layer) -> list[np.ndarray]:
         assert isinstance(layer, SupportedLayer)
         solids = _solid(layer.own), _solid(layer.supports)
-        return [solid.any(axis) for axis in (0, 1) for solid in solids]
+        return [np.asarray(solid.any(axis)) for axis in (0, 1) for solid in solids]
 
     front, front_held, right, right_held = (
         np.array(rows) for rows in zip(*Slicer(stack, work).map(sides, chosen), strict=True)

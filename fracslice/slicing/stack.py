@@ -172,7 +172,7 @@ def plan_object(root: Field, job: SliceJob, size: Sizing, work: Work | None = No
 def stack_of(planned: Plan, scale: float, job: SliceJob, size: Sizing, within: Stack | None = None) -> Stack:
     """Place layers of one height and pixels.
 
-    `scale`: mm per scene unit; `within`: layers of a part of the object, whose blocks of pixels are kept.
+    `scale`: mm per scene unit; `within`: layers of a part of the object, whose pixels are kept.
     """
     layer, pixel = job.layer[0], job.pixels
     box, outer = planned.box, planned.outer
@@ -182,7 +182,7 @@ def stack_of(planned: Plan, scale: float, job: SliceJob, size: Sizing, within: S
         step = pixel[axis] / scale
         pixels = 2 * math.ceil(outer.size[axis] / step / 2 + 1)
         if within:
-            pixels += (within.shape[1 - axis] - pixels) % (2 * BLOCK)
+            pixels = max(pixels + (within.shape[1 - axis] - pixels) % (2 * BLOCK), within.shape[1 - axis])
         shape[1 - axis] = pixels
         corner[axis] = box.centre[axis] - step * shape[1 - axis] / 2
     tops = _tops(mm[2], layer)
