@@ -172,7 +172,8 @@ def plan_object(root: Field, job: SliceJob, size: Sizing, work: Work | None = No
 def stack_of(planned: Plan, scale: float, job: SliceJob, size: Sizing, within: Stack | None = None) -> Stack:
     """Place layers of one height and pixels.
 
-    `scale`: mm per scene unit; `within`: layers of a part of the object, whose pixels are kept.
+    `scale`: mm per scene unit; `within`: layers of a part of the object, whose pixels and heights
+    are kept.
     """
     layer, pixel = job.layer[0], job.pixels
     box, outer = planned.box, planned.outer
@@ -191,6 +192,10 @@ def stack_of(planned: Plan, scale: float, job: SliceJob, size: Sizing, within: S
         raise SliceError(f"{shape[1]} x {shape[0]} pixels, {most}")
     _check_precision(outer, scale, min(*pixel, layer))
     z = box.lo[2] + (tops - np.diff(tops, prepend=0.0) / 2) / scale
+    if within:  # at the same heights to the last bit: a plane of the object may be at one of them
+        below = round((within.z[0] - z[0]) * scale / layer)
+        tops = layer * np.arange(1, below + len(within.z) + 1)
+        z = np.concatenate([within.z[0] - np.arange(below, 0, -1) * layer / scale, within.z])
     sides, at = (mm[0], mm[1], mm[2]), (corner[0], corner[1])
     rows, notes = (shape[0], shape[1]), (*planned.notes, *_rounding_note(mm[2], float(tops[-1])))
     where, rest = (at, pixel, rows, z, tops), (notes, planned.drains)

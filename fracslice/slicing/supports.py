@@ -92,7 +92,8 @@ def layers_with_room(planned: Plan, scale: float, job: SliceJob, size: Sizing) -
     Layers with supports have the same lattice, so that they show the same specks: what is sampled near the
     rim, and of a fractal the scale of values inside, depend on it.
     """
-    return stack_of(replace(planned, outer=planned.outer.grown(MARGIN / scale)), scale, job, size)
+    wide = replace(planned, outer=planned.outer.grown(MARGIN / scale))
+    return stack_of(wide, scale, job, size, stack_of(planned, scale, job, size))
 
 
 def supported(planned: Plan, stack: Stack, how: Print, work: Work, thinnest: float = 0.0) -> Plan:
