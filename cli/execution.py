@@ -411,7 +411,7 @@ def _trapped(stack: Stack, work: Work) -> tuple[int, float]:
     narrowest = min((2 * drain.radius for drain in stack.drains), default=math.inf)
     longest = max(stack.outer.size)
     cell = max(min(longest / CELLS, narrowest / 3), longest / FINEST)
-    count, volume = count_sealed(stack.root, stack.outer, cell, work)
+    count, volume = count_sealed(stack.object, stack.outer, cell, work)
     return count, volume * stack.scale**3
 
 

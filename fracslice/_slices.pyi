@@ -60,39 +60,13 @@ class Memory:
     """Memory of finished slabs, reused by later ones."""
 
 class Slab:
-    """Samples of neighbouring layers, one layer at a time.
+    """Neighbouring layers, one layer at a time: of a `FieldSlab` or a `BeamSlab`.
 
     The lattice has ny x nx points at (x0 + dx i, y0 + dy j).
 
     A layer must be read before the next one is sampled; otherwise ValueError is raised.
-
-    Parameters
-    ----------
-    memory : Memory
-        Memory shared by the slabs of one job.
-    entry : tuple or callable
-        Float32 kernel of the field (`Kernel.entry`).
-    bounds : ProbeBounds
-        Bounds for block probing.
-    frame : tuple of float
-        (x0, y0, dx, dy), scene units.
-    z : list of float
-        Heights of the layers, scene units.
-    ny, nx : int
-        Lattice points.
     """
 
-    def __init__(
-        self,
-        memory: Memory,
-        entry: tuple[CompiledFunction, NDArray[float32]]
-        | Callable[[NDArray[float32], NDArray[float32]], None],
-        bounds: ProbeBounds,
-        frame: tuple[float, float, float, float],
-        z: list[float],
-        ny: int,
-        nx: int,
-    ) -> None: ...
     def sample(self, layer: int) -> None:
         """Sample a layer around its contours; every edge that a contour crosses has two evaluated ends.
 
@@ -151,6 +125,7 @@ class Slab:
         shape: tuple[int, int],
         levels: bytes,
         encoding: Encoding,
+        others: Sequence[Slab] = (),
     ) -> tuple[bytes, float, int]:
         """Coverage of a layer as shown on a screen, encoded; see `fracslice.slicing.layers.ScreenView`.
 
@@ -166,6 +141,8 @@ class Slab:
             Rows and columns of the layer.
         encoding : Encoding
             Encoding of the picture.
+        others : sequence of Slab
+            Slabs of the same lattice whose layer is shown, too: of each pixel the greatest part.
 
         Returns
         -------
@@ -219,11 +196,80 @@ class Slab:
         of 8.
         """
 
+class FieldSlab(Slab):
+    """Samples of a field.
+
+    Parameters
+    ----------
+    memory : Memory
+        Memory shared by the slabs of one job.
+    entry : tuple or callable
+        Float32 kernel of the field (`Kernel.entry`).
+    bounds : ProbeBounds
+        Bounds for block probing.
+    frame : tuple of float
+        (x0, y0, dx, dy), scene units.
+    z : list of float
+        Heights of the layers, scene units.
+    ny, nx : int
+        Lattice points.
+    """
+
+    def __init__(
+        self,
+        memory: Memory,
+        entry: tuple[CompiledFunction, NDArray[float32]]
+        | Callable[[NDArray[float32], NDArray[float32]], None],
+        bounds: ProbeBounds,
+        frame: tuple[float, float, float, float],
+        z: list[float],
+        ny: int,
+        nx: int,
+    ) -> None: ...
+
+class Beams:
+    """Round cones that a floor cuts off, and a convex plate below it.
+
+    Parameters
+    ----------
+    balls : ndarray of float64, shape (n, 2, 4)
+        Centre and radius of both ends, scene units.
+    floor : float
+        Height of the floor.
+    planes : ndarray of float64, shape (k, 4)
+        a, b, c, d of the half spaces a x + b y + c z <= d that the plate is in; none for no plate.
+    """
+
+    def __init__(self, balls: NDArray[float64], floor: float, planes: NDArray[float64]) -> None: ...
+
+class BeamSlab(Slab):
+    """Layers of beams, cut exactly.
+
+    Parameters
+    ----------
+    memory, frame, z, ny, nx
+        As of a `FieldSlab`.
+    beams : Beams
+        The beams.
+    """
+
+    def __init__(
+        self,
+        memory: Memory,
+        beams: Beams,
+        frame: tuple[float, float, float, float],
+        z: list[float],
+        ny: int,
+        nx: int,
+    ) -> None: ...
+
 def encoded(image: NDArray[uint8], encoding: Encoding) -> bytes:
     """Encode an image of any strides."""
 
 def plate_picture(
-    pieces: Sequence[tuple[Slab, int, bool, bool, tuple[int, int], bool, Sequence[tuple[int, int]]]],
+    pieces: Sequence[
+        tuple[Sequence[Slab], int, bool, bool, tuple[int, int], bool, Sequence[tuple[int, int]]]
+    ],
     pixels: tuple[int, int],
     levels: bytes,
     encoding: Encoding,
@@ -233,7 +279,7 @@ def plate_picture(
     Parameters
     ----------
     pieces : sequence of tuple
-        For each object its slab and the sampled layer, `transposed` and `backwards` as for `Slab.picture`,
+        For each object its slabs and the sampled layer, `transposed` and `backwards` as for `Slab.picture`,
         rows and columns of the layer, whether its rows are shown in the other order, and the row and column
         of the picture of its first pixel, for each time it is shown.
     pixels, levels, encoding

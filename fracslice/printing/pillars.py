@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ..fields.field import Field, Kernel
 from ..formulas import Node, box, capsule, intersection, plane, transform, union
-from ..volume import Supports
+from ..volume import Pillars, Supports
 from ..volume.bricks import values_at
 from ..work import Work
 from .walls import slopes
@@ -167,42 +167,45 @@ class Room:
 
     def at(self, points: Points) -> tuple[NDArray[np.int64], ...]:
         """Cells (z, y, x) of points [..., 3], of those outside of the room the nearest ones."""
-        cells = np.floor((points - self.origin) / self.cell).astype(np.int64)
-        last = np.array(self.away.shape[::-1]) - 1
-        x, y, z = np.moveaxis(np.clip(cells, 0, last), -1, 0)
-        return z, y, x
+        cells = np.floor((points - self.origin) / self.cell)
+        cells = np.minimum(np.maximum(cells, 0), self._last).astype(np.int64)
+        return cells[..., 2], cells[..., 1], cells[..., 0]
 
-    def middle(self, cell: tuple[int, int, int]) -> Points:
-        """Middle of a cell (z, y, x)."""
-        return self.origin + (np.array(cell[::-1]) + 0.5) * self.cell
+    @cached_property
+    def _last(self) -> NDArray[np.int64]:
+        return np.array(self.away.shape[::-1]) - 1
 
     def is_free(self, start: Points, end: Points, least: int) -> bool:
         """True if all cells along a segment are as many steps away from the object."""
-        count = int(2 * np.linalg.norm(end - start) / float(self.cell.min())) + 2
-        along = start + np.linspace(0, 1, count)[:, None] * (end - start)
+        count = int(2 * math.dist(start, end) / float(self.cell.min())) + 2
+        along = start + (np.arange(count) / (count - 1))[:, None] * (end - start)
         return bool((self.away[self.at(along)] >= least).all())
 
     def way(self, start: Points) -> list[Points]:
         """Corners of the shortest way from a point down to the plate."""
-        cell = tuple(int(axis) for axis in self.at(start))
-        points, (_, ny, nx) = [start], self.away.shape
-        z, y, x = cell
-        sides = [(0, 0), (0, -1), (0, 1), (-1, 0), (1, 0)]
-        ways = [math.hypot(self.cell[0] * dx, self.cell[1] * dy, self.cell[2]) for dy, dx in sides]
+        z, y, x = (int(axis) for axis in self.at(start))
+        _, ny, nx = self.away.shape
+        (low_x, low_y, low_z), (wide, deep, high) = self.origin.tolist(), self.cell.tolist()
+        across, along = math.hypot(wide, high), math.hypot(deep, high)
+        ways = [(0, 0, high), (0, -1, across), (0, 1, across), (-1, 0, along), (1, 0, along)]
+        points = [start.tolist()]
         while z:
-            near = [(y + dy, x + dx) for dy, dx in sides]
-            costs = [
-                way + float(self.cost[z - 1, j, i]) if 0 <= j < ny and 0 <= i < nx else math.inf
-                for way, (j, i) in zip(ways, near, strict=True)
-            ]
-            y, x = near[costs.index(min(costs))]
             z -= 1
-            middle = self.middle((z, y, x))
+            least, to, below = math.inf, (y, x), self.cost[z]
+            for dy, dx, way in ways:
+                j, i = y + dy, x + dx
+                if 0 <= j < ny and 0 <= i < nx and (cost := way + below.item(j, i)) < least:
+                    least, to = cost, (j, i)
             # straight down, the way keeps its place
-            points.append(np.array([*points[-1][:2], middle[2]]) if (y, x) == cell[1:] else middle)
-            cell = (z, y, x)
+            place = (
+                points[-1][:2]
+                if to == (y, x)
+                else [low_x + (to[1] + 0.5) * wide, low_y + (to[0] + 0.5) * deep]
+            )
+            points.append([*place, low_z + (z + 0.5) * high])
+            y, x = to
         points[-1][2] = self.floor
-        return self._straight(points)
+        return self._straight(list(np.array(points)))
 
     def _straight(self, points: list[Points]) -> list[Points]:
         """Way with as few corners as its free cells permit."""
@@ -592,10 +595,16 @@ def support(
     struts, caught = _struts(of, room, np.column_stack([points, tips])[~led], ground, strength.pillar / 2)
     feet = np.concatenate([feet, struts[len(ground) :, 1][~inner]])
     beams = np.concatenate([cones, branches, struts, forest.braces()])
-    node, volume = _node(beams, feet, room.floor, raft, of.scale)
+    discs = np.stack([feet + [0, 0, 0, RIM], feet + [0, 0, RISE, 0]], 1)
+    plate, area = _raft(feet, room.floor - raft, raft) if raft else (np.empty((0, 4)), 0.0)
+    pillars = Pillars(
+        np.concatenate([beams, discs]) / of.scale, room.floor / of.scale, plate / [1, 1, 1, of.scale]
+    )
+    volume = _volume(pillars.beams * of.scale) + area * raft
     counts = len(points), int(inner.sum()), caught
     scars = math.pi * float((tips**2).sum() + (tips[~led][inner] ** 2).sum())
-    return Supports(of.root, node, strength.tip, *counts, volume, scars), of.carried(beams, lowest)
+    made = Supports(of.root, _node(pillars), pillars, strength.tip, *counts, volume, scars)
+    return made, of.carried(beams, lowest)
 
 
 def _widening(beams: Points, floor: float, high: float, largest: float) -> float:
@@ -648,39 +657,32 @@ def _volume(beams: Points) -> float:
     return float((math.pi / 3 * length * (a * a + a * b + b * b)).sum())
 
 
-def _node(beams: Points, feet: Points, floor: float, raft: float, scale: float) -> tuple[Node, float]:
-    """Element of beams, feet and the raft, in scene units, and its volume, mm3."""
-    parts = [_beam(one, scale) for one in beams]
-    discs = np.stack([feet + [0, 0, 0, RIM], feet + [0, 0, RISE, 0]], 1)
-    whole = intersection(
-        union(*parts, *(_beam(one, scale) for one in discs)), plane(normal=(0, 0, -1), offset=-floor / scale)
+def _node(of: Pillars) -> Node:
+    """Element of pillars and their raft."""
+    parts = (capsule(start[:3], end[:3], start[3], end[3]) for start, end in of.beams.tolist())
+    whole = intersection(union(*parts), plane(normal=(0, 0, -1), offset=-of.floor))
+    if not len(of.raft):
+        return whole
+    (_, _, _, top), (_, _, _, low), *rim = of.raft.tolist()
+    right, back, left, front = ((d - c * top) / math.hypot(a, b) for a, b, c, d in rim[::3])
+    size, middle = (
+        (right + left, back + front, top + low),
+        ((right - left) / 2, (back - front) / 2, (top - low) / 2),
     )
-    volume = _volume(beams) + _volume(discs)
-    if not raft:
-        return whole, volume
-    plate, area = _raft(feet, floor - raft, raft, scale)
-    return union(whole, plate), volume + area * raft
+    sides = [plane(normal=(a, b, c), offset=d) for a, b, c, d in rim]
+    return union(whole, intersection(transform(box(size=size), translate=middle), *sides))
 
 
-def _beam(ends: object, scale: float) -> Node:
-    (ax, ay, az, a), (bx, by, bz, b) = (np.asarray(ends) / scale).tolist()
-    return capsule((ax, ay, az), (bx, by, bz), a, b)
-
-
-def _raft(feet: Points, floor: float, height: float, scale: float) -> tuple[Node, float]:
-    """A plate under feet, of twelve sides whose rim is wider at its top, so that a scraper gets under it; and
-    the area of its top, mm2.
+def _raft(feet: Points, floor: float, height: float) -> tuple[Points, float]:
+    """Half spaces [14, 4] of a plate under feet, of twelve sides whose rim is wider at its top, so that a
+    scraper gets under it; and the area of its top, mm2.
     """
     turns = np.arange(12) * math.pi / 6
     sides = np.column_stack([np.cos(turns), np.sin(turns)])
     reach = (feet[:, :2] @ sides.T + feet[:, 3:]).max(0) + 2 * RIM
-    top, share = floor + height, math.sqrt(0.5)
-    planes = [plane(normal=(0, 0, 1), offset=top / scale)]
-    for (x, y), far in zip(sides.tolist(), reach.tolist(), strict=True):
-        planes.append(plane(normal=(x, y, -1), offset=(far - top) * share / scale))
-    low, high = (-reach[6], -reach[9], floor), (reach[0], reach[3], top)
-    size, middle = (np.subtract(high, low) / scale).tolist(), (np.add(low, high) / 2 / scale).tolist()
+    share, top = math.sqrt(0.5), floor + height
+    rim = np.column_stack([share * sides, np.full(12, -share), share * (reach - top)])
     corners = [np.linalg.solve(sides[[k, k - 1]], reach[[k, k - 1]]) for k in range(12)]
     x, y = np.array(corners).T
     area = abs(float(x @ np.roll(y, 1) - y @ np.roll(x, 1))) / 2
-    return intersection(transform(box(size=size), translate=middle), *planes), area
+    return np.concatenate([[(0, 0, 1, top), (0, 0, -1, -floor)], rim]), area

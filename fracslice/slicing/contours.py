@@ -84,14 +84,14 @@ def gathered(parts: Sequence[Contours]) -> Contours:
     )
 
 
-def contours(slab: Slab, k: int, z: float, stack: Stack, exact: Kernel) -> Contours:
+def contours(slab: Slab, k: int, z: float, stack: Stack) -> Contours:
     """Extract the contours of a layer.
 
-    `k`: layer in the slab; `z` in scene units; `exact`: float64 kernel that refines the crossings.
+    `k`: layer in the slab; `z` in scene units.
     """
 
     edges, ends = slab.crossings(k)
-    following, section = edges[:, 3], CrossSection(exact, z, stack.frame)
+    following, section = edges[:, 3], CrossSection(stack.exact, z, stack.frame)
     order, starts = _cycles(following)
     along = refine_crossings(section, edges, ends)
     # Never at an end of the edge: several contours, or branches of one, would meet there.

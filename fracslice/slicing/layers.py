@@ -26,6 +26,7 @@ known, sections are weighted by the light that they need.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -35,11 +36,22 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
-from .._slices import BorderError, Encoding, Memory, ProbeBounds, Slab, plate_picture
+from .._slices import (
+    Beams,
+    BeamSlab,
+    BorderError,
+    Encoding,
+    FieldSlab,
+    Memory,
+    ProbeBounds,
+    Slab,
+    plate_picture,
+)
 from ..common.arrays import dot
 from ..errors import SliceError
 from ..fields.box import Box
 from ..fields.field import Bounds, Field, Kernel
+from ..volume import Pillars
 from ..volume.amount import Completeness, compare_volumes
 from ..work import Work
 from .contours import Contours, contours, gathered
@@ -79,31 +91,27 @@ Encoded = tuple[bytes, float, int]
 """Encoded picture of a layer, its area in pixels, and the number of pixels that the contour cuts."""
 
 
-class Sampler:
+class Sampler(ABC):
     """Samples slabs of a stack. Safe to use from many threads.
 
-    `kernel`: float32 kernel of `root`; `frame`: float64 [4], scene units.
+    `frame`: float64 [4], scene units; `shape`: rows and columns of the lattice.
     """
 
-    def __init__(
-        self,
-        kernel: Kernel,
-        root: Field,
-        bounds: Bounds,
-        frame: np.ndarray,
-        shape: tuple[int, int],
-    ) -> None:
+    def __init__(self, frame: np.ndarray, shape: tuple[int, int]) -> None:
         self.frame, self.shape = frame, shape
-        self._memory, self._probe_bounds = Memory(), _probe_bounds(root, bounds)
-        self._entry = kernel.entry
+        self._memory = Memory()
 
+    @abstractmethod
     def slab(self, z: np.ndarray) -> Slab:
         """Create a slab without samples.
 
         `z`: float64 [n], scene units.
         """
+
+    @property
+    def _lattice(self) -> tuple[float, float, float, float]:
         x0, y0, dx, dy = self.frame.tolist()
-        return Slab(self._memory, self._entry, self._probe_bounds, (x0, y0, dx, dy), z.tolist(), *self.shape)
+        return x0, y0, dx, dy
 
     def sample(self, slab: Slab, layer: int) -> int:
         """Sample a layer of a slab."""
@@ -117,6 +125,37 @@ class Sampler:
         view, encoding = pictures
         with _within_the_rim():
             return slab.pictures(layers, *view, encoding)
+
+
+class FieldSampler(Sampler):
+    """Samples a field.
+
+    `kernel`: float32 kernel of `root`.
+    """
+
+    def __init__(
+        self, kernel: Kernel, root: Field, bounds: Bounds, frame: np.ndarray, shape: tuple[int, int]
+    ) -> None:
+        super().__init__(frame, shape)
+        self._entry, self._probe_bounds = kernel.entry, _probe_bounds(root, bounds)
+
+    def slab(self, z: np.ndarray) -> Slab:
+        """As `Sampler.slab`."""
+        return FieldSlab(
+            self._memory, self._entry, self._probe_bounds, self._lattice, z.tolist(), *self.shape
+        )
+
+
+class BeamSampler(Sampler):
+    """Cuts pillars, without samples."""
+
+    def __init__(self, pillars: Pillars, frame: np.ndarray, shape: tuple[int, int]) -> None:
+        super().__init__(frame, shape)
+        self._beams = Beams(pillars.beams, pillars.floor, pillars.raft)
+
+    def slab(self, z: np.ndarray) -> Slab:
+        """As `Sampler.slab`."""
+        return BeamSlab(self._memory, self._beams, self._lattice, z.tolist(), *self.shape)
 
 
 @contextmanager
@@ -159,8 +198,6 @@ class Layer:
         Samples.
     place : int
         Its number in the slab.
-    exact : Kernel
-        float64 kernel of the field.
     mean : (uint8 [ny, nx], float) or None
         Mean coverage and area of several sections, in place of those of the one sampled, pixels and mm^2.
     picture : Encoded or None
@@ -172,7 +209,6 @@ class Layer:
     evaluations: float
     slab: Slab
     place: int
-    exact: Kernel
     mean: tuple[np.ndarray, float] | None = None
     picture: Encoded | None = None
 
@@ -201,7 +237,7 @@ class Layer:
         bytes
             Encoded picture.
         """
-        data, area, cut = self.picture or self.slab.picture(self.place, *view, encoding)
+        data, area, cut = self.picture or self.slab.picture(self.place, *view, encoding, self.slabs[1:])
         self._painted = area, cut
         return data
 
@@ -239,9 +275,9 @@ class Layer:
         return self.mean is None
 
     @property
-    def sheets(self) -> Sequence[Layer]:
-        """Layers of one field each that it is put together of."""
-        return (self,)
+    def slabs(self) -> Sequence[Slab]:
+        """What it is put together of."""
+        return (self.slab,)
 
     @property
     def known_area(self) -> float | None:
@@ -266,7 +302,7 @@ class Layer:
     @cached_property
     def contours(self) -> Contours:
         """Polygons, each crossing within 0.001 pixels of the zero set."""
-        return contours(self.slab, self.place, float(self.stack.z[self.index]), self.stack, self.exact)
+        return contours(self.slab, self.place, float(self.stack.z[self.index]), self.stack)
 
 
 @dataclass(eq=False)
@@ -339,9 +375,8 @@ def _put_together(parts: Sequence[tuple[Standing, Layer]], view: ScreenView, enc
         _, _, places = shown.setdefault((id(part.stack), part.turns), (layer, part, []))
         places.append(_place(part, view))
     pieces = [
-        (sheet.slab, sheet.place, *_orientation(part, view), places)
+        (layer.slabs, layer.place, *_orientation(part, view), places)
         for layer, part, places in shown.values()
-        for sheet in layer.sheets
     ]
     return plate_picture(pieces, view.shape, view.levels, encoding)
 
@@ -373,26 +408,20 @@ class SupportedLayer(Layer):
 
     own: Layer = field(kw_only=True)
     supports: Layer = field(kw_only=True)
+    slicer: Slicer = field(kw_only=True)
 
     @property
-    def sheets(self) -> Sequence[Layer]:
-        """See `Layer.sheets`."""
-        return self.own, self.supports
-
-    def encoded(self, view: ScreenView, encoding: Encoding) -> bytes:
-        """See `Layer.encoded`."""
-        alone = Standing(self.stack, 0, (0, 0))
-        data, area, cut = _put_together([(alone, self)], view, encoding)
-        self._painted = area, cut
-        return data
+    def slabs(self) -> Sequence[Slab]:
+        """See `Layer.slabs`."""
+        return self.own.slab, self.supports.slab
 
     @cached_property
     def coverage(self) -> np.ndarray:
         """See `Layer.coverage`."""
         if self.mean is not None:
             return self.mean[0]
-        both: np.ndarray = np.maximum(self.own.coverage, self.supports.coverage)
-        return both
+        covered: np.ndarray = np.maximum(self.own.coverage, self.supports.coverage)
+        return covered
 
     @cached_property
     def runs(self) -> Runs:
@@ -411,10 +440,10 @@ class SupportedLayer(Layer):
     @cached_property
     def contours(self) -> Contours:
         """See `Layer.contours`."""
-        sampler = _sampler(self.stack, self.stack.root)
+        sampler = self.slicer.whole
         slab = sampler.slab(self.stack.z[self.index : self.index + 1])
         sampler.sample(slab, 0)
-        return contours(slab, 0, float(self.stack.z[self.index]), self.stack, self.exact)
+        return contours(slab, 0, float(self.stack.z[self.index]), self.stack)
 
 
 @dataclass(frozen=True, eq=False)
@@ -434,6 +463,11 @@ class Slicer:
     stack: Stack
     work: Work = field(default_factory=Work)
     areas: dict[int, float] = field(default_factory=dict, init=False)
+
+    @cached_property
+    def whole(self) -> Sampler:
+        """Sampler of an object with its supports."""
+        return _sampler(self.stack, self.stack.root)
 
     def map(
         self,
@@ -486,9 +520,8 @@ class Slicer:
 
     def _alone(self, pictures: Pictures | None) -> Callable[[list[int]], Iterator[Layer]]:
         """Function that samples layers of one slab of an object."""
-        exact = self.stack.root.kernel("cpu", "float64")
-        samplers = [_sampler(self.stack, field) for field in _fields(self.stack)]
-        return partial(self._sampled, samplers, exact=exact, pictures=pictures)
+        samplers = _samplers(self.stack)
+        return partial(self._sampled, samplers, pictures=pictures)
 
     def _plate(self) -> Callable[[list[int]], Iterator[Layer]]:
         """Function that samples layers of one slab of a plate: each part once, however often it stands."""
@@ -503,20 +536,20 @@ class Slicer:
                 parts = [(part, made[id(part.stack)]) for part in stack.parts if id(part.stack) in made]
                 one = parts[0][1]
                 spent = sum(layer.evaluations for layer in made.values())
-                yield PlateLayer(stack, index, spent, one.slab, one.place, one.exact, parts=parts)
+                yield PlateLayer(stack, index, spent, one.slab, one.place, parts=parts)
 
         return sampled
 
     def _sampled(
-        self, samplers: list[Sampler], group: list[int], exact: Kernel, pictures: Pictures | None
+        self, samplers: list[Sampler], group: list[int], pictures: Pictures | None
     ) -> Iterator[Layer]:
         """Layers of one slab; each is to be read before the next."""
         if len(samplers) > 1:
-            own, others = (self._sampled([sampler], group, exact, None) for sampler in samplers)
+            own, others = (self._sampled([sampler], group, None) for sampler in samplers)
             for layer, supports in zip(own, others, strict=True):
                 known = {name: getattr(layer, name) for name in ("index", "evaluations", "slab", "place")}
                 known["evaluations"] += supports.evaluations
-                yield SupportedLayer(self.stack, **known, exact=exact, own=layer, supports=supports)
+                yield SupportedLayer(self.stack, **known, own=layer, supports=supports, slicer=self)
             return
         (sampler,) = samplers
         first = group[0] // SLAB * SLAB
@@ -530,19 +563,24 @@ class Slicer:
             else:
                 sampled = sampler.pictures(slab, places, pictures)
             for index, (spent, picture) in zip(group, sampled, strict=False):
-                yield Layer(self.stack, index, spent, slab, index - first, exact, picture=picture)
+                yield Layer(self.stack, index, spent, slab, index - first, picture=picture)
             group = group[len(sampled) :]
 
 
-def _fields(stack: Stack) -> list[Field]:
-    """Fields that are sampled: an object and its supports each by itself."""
-    return [stack.supports.carried, stack.supports.node] if stack.supports else [stack.root]
+def _samplers(stack: Stack) -> list[Sampler]:
+    """Samplers of an object and of its supports, each by itself."""
+    held = [BeamSampler(stack.supports.pillars, *_lattice(stack))] if stack.supports else []
+    return [_sampler(stack, stack.object), *held]
 
 
 def _sampler(stack: Stack, root: Field) -> Sampler:
     """Sampler of a field on the pixels of a stack."""
-    shape = stack.shape[0] + 1, stack.shape[1] + 1
-    return Sampler(root.kernel(), root, root.bounds, stack.frame, shape)
+    return FieldSampler(root.kernel(), root, root.bounds, *_lattice(stack))
+
+
+def _lattice(stack: Stack) -> tuple[np.ndarray, tuple[int, int]]:
+    """Frame and points of a stack's lattice."""
+    return stack.frame, (stack.shape[0] + 1, stack.shape[1] + 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -626,8 +664,13 @@ SLABS = 6
 
 
 def layers_amount(slicer: Slicer, work: Work) -> Completeness:
-    """Compare the volume of some slabs of a stack with that of its field."""
+    """Compare the volume of some slabs of a stack with that of its field. Supports, which are exact, are left
+    out.
+    """
     stack = slicer.stack
+    if stack.supports:
+        slicer = Slicer(replace(stack, root=stack.object, supports=None), work)
+        stack = slicer.stack
     starts = np.arange(0, len(stack.z), SLAB)
     chosen = [s.tolist() for s in np.split(np.arange(len(stack.z)), starts[1:])]
     chosen = [

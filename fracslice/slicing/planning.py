@@ -53,12 +53,13 @@ def plan_stack(root: Field, job: SliceJob, work: Work | None = None, size: Sizin
     """
     size = size or Sizing.of(job.size, job.scale)
     planned, scale = plan_object(root, job, size, work)
-    stack = stack_of(planned, scale, job, size)
     if job.printing.supports == "none":
-        return stack
-    from .supports import supported  # measuring needs what many layers do not
+        return stack_of(planned, scale, job, size)
+    from .supports import layers_with_room, supported  # measuring needs what many layers do not
 
-    return stack_of(supported(planned, stack, job.printing, work or Work()), scale, job, size, stack)
+    stack = layers_with_room(planned, scale, job, size)
+    made = supported(planned, stack, job.printing, work or Work())
+    return stack_of(made, scale, job, size, stack if made.supports else None)
 
 
 def plan_layers(root: Field, job: SliceJob, work: Work | None = None, size: Sizing | None = None) -> Stack:
@@ -137,7 +138,7 @@ def _slope(layer: Layer) -> float:
     x, y = (stack.frame[:2] + stack.frame[2:] * (edges[:, :2] + share * np.eye(2)[edges[:, 2]])).T
     z = np.full(len(x), stack.z[layer.index])
     half = layer.height / stack.scale / 2
-    at = layer.exact.points
+    at = stack.exact.points
     gradient = np.array(
         [
             at(x + half, y, z) - at(x - half, y, z),

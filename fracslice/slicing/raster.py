@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from base64 import b64encode
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from html import escape
 from typing import TYPE_CHECKING, BinaryIO
@@ -22,7 +22,7 @@ from ..common.parameters import record
 from ..errors import SliceError
 from ..records import RasterOptions
 from ..work import Work
-from .layers import Layer, Pictures, ScreenView, Slicer
+from .layers import Layer, Pictures, ScreenView, Slicer, SupportedLayer
 from .printers import START, Printer, Resin
 from .stack import Stack
 
@@ -329,13 +329,17 @@ def elevations(stack: Stack, file: BinaryIO, work: Work | None = None) -> None:
 
     assert stack.supports is not None
     work, chosen = work or Work(), _spread_layers(range(len(stack.z)), ROWS)
-    seen = []
-    for root in (stack.supports.carried, stack.supports.node):
-        slicer = Slicer(replace(stack, root=root, supports=None), work)
-        sides = slicer.map(lambda layer: (_solid(layer).any(0), _solid(layer).any(1)), chosen)
-        seen.append([np.array(rows) for rows in zip(*sides, strict=True)])
+
+    def sides(layer: Layer) -> list[np.ndarray]:
+        assert isinstance(layer, SupportedLayer)
+        solids = _solid(layer.own), _solid(layer.supports)
+        return [np.asarray(solid.any(axis)) for axis in (0, 1) for solid in solids]
+
+    front, front_held, right, right_held = (
+        np.array(rows) for rows in zip(*Slicer(stack, work).map(sides, chosen), strict=True)
+    )
     high, pictures = len(chosen), []
-    for own, held, pixel in zip(*seen, stack.pixel, strict=True):
+    for own, held, pixel in zip((front, right), (front_held, right_held), stack.pixel, strict=True):
         shown = SIDES[np.where(held & ~own, 2, own)][::-1]
         across = own.shape[1] * pixel * high / float(stack.tops[-1])
         pictures.append(Image.fromarray(shown).resize((max(round(across), 1), high), Image.Resampling.BOX))

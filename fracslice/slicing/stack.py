@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 
 import numpy as np
 
 from ..common.cache import key
 from ..errors import SliceError
 from ..fields.box import Box
-from ..fields.field import Field
+from ..fields.field import Field, Kernel
 from ..printing import printable
 from ..records import SliceJob
 from ..volume import Drain, Plan, Supports, plan
@@ -124,7 +125,18 @@ class Stack:
         """Values that determine the layers."""
         own = [getattr(self, f.name) for f in fields(self) if f.name not in ("root", "parts", "supports")]
         parts = [(part.turns, part.at, key(*part.stack.identity)) for part in self.parts]
-        return [self.root.key, *own, *parts]
+        held = vars(self.supports.pillars).values() if self.supports else ()
+        return [self.object.key, *held, *own, *parts]
+
+    @property
+    def object(self) -> Field:
+        """The object without its supports."""
+        return self.supports.carried if self.supports else self.root
+
+    @cached_property
+    def exact(self) -> Kernel:
+        """float64 kernel of the field."""
+        return self.root.kernel("cpu", "float64")
 
     @property
     def heights(self) -> np.ndarray:
@@ -160,7 +172,8 @@ def plan_object(root: Field, job: SliceJob, size: Sizing, work: Work | None = No
 def stack_of(planned: Plan, scale: float, job: SliceJob, size: Sizing, within: Stack | None = None) -> Stack:
     """Place layers of one height and pixels.
 
-    `scale`: mm per scene unit; `within`: layers of a part of the object, whose blocks of pixels are kept.
+    `scale`: mm per scene unit; `within`: layers of a part of the object, whose pixels and heights
+    are kept.
     """
     layer, pixel = job.layer[0], job.pixels
     box, outer = planned.box, planned.outer
@@ -170,7 +183,7 @@ def stack_of(planned: Plan, scale: float, job: SliceJob, size: Sizing, within: S
         step = pixel[axis] / scale
         pixels = 2 * math.ceil(outer.size[axis] / step / 2 + 1)
         if within:
-            pixels += (within.shape[1 - axis] - pixels) % (2 * BLOCK)
+            pixels = max(pixels + (within.shape[1 - axis] - pixels) % (2 * BLOCK), within.shape[1 - axis])
         shape[1 - axis] = pixels
         corner[axis] = box.centre[axis] - step * shape[1 - axis] / 2
     tops = _tops(mm[2], layer)
@@ -179,6 +192,10 @@ def stack_of(planned: Plan, scale: float, job: SliceJob, size: Sizing, within: S
         raise SliceError(f"{shape[1]} x {shape[0]} pixels, {most}")
     _check_precision(outer, scale, min(*pixel, layer))
     z = box.lo[2] + (tops - np.diff(tops, prepend=0.0) / 2) / scale
+    if within:  # at the same heights to the last bit: a plane of the object may be at one of them
+        below = round((within.z[0] - z[0]) * scale / layer)
+        tops = layer * np.arange(1, below + len(within.z) + 1)
+        z = np.concatenate([within.z[0] - np.arange(below, 0, -1) * layer / scale, within.z])
     sides, at = (mm[0], mm[1], mm[2]), (corner[0], corner[1])
     rows, notes = (shape[0], shape[1]), (*planned.notes, *_rounding_note(mm[2], float(tops[-1])))
     where, rest = (at, pixel, rows, z, tops), (notes, planned.drains)

@@ -83,13 +83,23 @@ def supported_plan(planned: Plan, scale: float, how: Print, size: Sizing, work: 
     layer = max(SliceJob().layer[0], longest / 2048)
     job = SliceJob(layer=layer, pixel=max(PIXEL, longest / 2048), printing=how)
     thinnest = ACROSS * planned.voxel * scale
-    return supported(planned, stack_of(planned, scale, job, size), how, work, thinnest)
+    return supported(planned, layers_with_room(planned, scale, job, size), how, work, thinnest)
+
+
+def layers_with_room(planned: Plan, scale: float, job: SliceJob, size: Sizing) -> Stack:
+    """Layers of an object with room for supports beside it.
+
+    Layers with supports have the same lattice, so that they show the same specks: what is sampled near the
+    rim, and of a fractal the scale of values inside, depend on it.
+    """
+    wide = replace(planned, outer=planned.outer.grown(MARGIN / scale))
+    return stack_of(wide, scale, job, size, stack_of(planned, scale, job, size))
 
 
 def supported(planned: Plan, stack: Stack, how: Print, work: Work, thinnest: float = 0.0) -> Plan:
     """Plan of an object, lifted, with supports on the plate below.
 
-    `thinnest`: least diameter of tips, mm.
+    `stack`: see `layers_with_room`; `thinnest`: least diameter of tips, mm.
     """
     strength = STRENGTHS[how.supports]
     tip = max(strength.tip, thinnest)
@@ -268,9 +278,8 @@ class _Survey:
         slab, cell = SLAB * float(self.stack.heights[0]), self.sides
         lift = math.ceil((LIFT + raft) / slab) * slab - raft
         below = math.ceil(lift / cell[2])
-        beside = [math.ceil(MARGIN / side) for side in cell[:2]]
-        full = np.pad(np.array(self.full), ((below, 0), (beside[1],) * 2, (beside[0],) * 2))
-        origin = self.low - [beside[0] * cell[0], beside[1] * cell[1], below * cell[2]]
+        full = np.pad(np.array(self.full), ((below, 0), (0, 0), (0, 0)))
+        origin = self.low - [0, 0, below * cell[2]]
         clear = CLEARANCE + strength.pillar / 2
         return Room.around(full, origin, float(self.low[2] - lift), cell, clear)
 

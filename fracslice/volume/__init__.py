@@ -28,6 +28,7 @@ __all__ = [
     "Drain",
     "Extent",
     "Lattice",
+    "Pillars",
     "Plan",
     "SignBricks",
     "Supports",
@@ -78,6 +79,25 @@ class Drain:
 
 
 @dataclass(frozen=True, eq=False)
+class Pillars:
+    """What supports are made of, scene units.
+
+    Attributes
+    ----------
+    beams
+        Balls at both ends of each beam, float64 [n, 2, 4]: centre and radius.
+    floor
+        Height below which no beam is.
+    raft
+        Half spaces of the plate below, float64 [k, 4]: a, b, c and d of a x + b y + c z <= d; none, none.
+    """
+
+    beams: np.ndarray
+    floor: float
+    raft: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class Supports:
     """Supports of an object. Volumes and areas in mm3 and mm2.
 
@@ -87,6 +107,8 @@ class Supports:
         The object without them.
     node
         The supports, scene units.
+    pillars
+        What they are made of.
     tip
         Diameter of a contact, mm.
     tips
@@ -105,6 +127,7 @@ class Supports:
 
     carried: Field
     node: Node
+    pillars: Pillars
     tip: float
     tips: int
     inner: int

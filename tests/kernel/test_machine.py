@@ -16,7 +16,7 @@ import pytest
 
 import fracslice
 from fracslice._native import RootLoops
-from fracslice._slices import Memory, ProbeBounds, Slab
+from fracslice._slices import FieldSlab, Memory, ProbeBounds
 from fracslice.expr import runtime
 from fracslice.expr.loops import bricks, points
 from fracslice.expr.runtime import Image, UnsupportedError
@@ -26,8 +26,8 @@ from fracslice.formulas import box, mandelbulb, sphere
 from fracslice.mesh.roots import Roots
 
 
-def slab_of(entry: Any) -> Slab:
-    return Slab(Memory(), entry, ProbeBounds(1, 1, 1, False), (0, 0, 1, 1), [0.0], 9, 9)
+def slab_of(entry: Any) -> FieldSlab:
+    return FieldSlab(Memory(), entry, ProbeBounds(1, 1, 1, False), (0, 0, 1, 1), [0.0], 9, 9)
 
 
 def test_arrays_of_another_kind_are_refused() -> None:

@@ -23,7 +23,7 @@ struct Formula : Field {
 // One layer of pixels of size 1, `side` along each side.
 template <class Distance>
 struct Layer {
-    Slab slab;
+    FieldSlab slab;
     int side;
 
     Layer(Distance distance, int side)

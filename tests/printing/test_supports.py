@@ -35,6 +35,8 @@ from fracslice.scene import Print, scene
 from fracslice.slicing import SliceJob, Slicer, Stack, plan_stack
 from fracslice.slicing.layers import Layer, ScreenView
 from fracslice.slicing.orientation import _runs, orientations
+from fracslice.slicing.stack import plan_object
+from fracslice.slicing.supports import layers_with_room
 from fracslice.volume.amount import Sizing
 from fracslice.work import Work
 
@@ -230,9 +232,10 @@ def test_the_same_with_any_number_of_threads() -> None:
     assert one.root.key == two.root.key
 
 
-def test_layers_of_a_fractal_show_the_same_specks_as_without() -> None:
-    job = SliceJob(size=20, layer=STEP, pixel=STEP)
-    bare, stack = plan_stack(mandelbulb(), job), supported(mandelbulb(), size=20)
+def test_layers_of_a_fractal_show_the_specks_that_supports_were_made_for() -> None:
+    job, size = SliceJob(size=20, layer=STEP, pixel=STEP), Sizing.of(20)
+    bare = layers_with_room(*plan_object(mandelbulb(), job, size), job, size)
+    stack = supported(mandelbulb(), size=20)
     assert stack.supports is not None
     own, held = pictures(bare), pictures(stack)
     lift = len(held) - len(own)

@@ -30,7 +30,7 @@ from fracslice.formulas import (
 )
 from fracslice.scene import scene
 from fracslice.slicing import Layer, SliceJob, Slicer, Stack, plan_stack
-from fracslice.slicing.layers import Sampler, layers_amount
+from fracslice.slicing.layers import FieldSampler, Sampler, layers_amount
 from fracslice.work import Work
 from tests.examples import EXAMPLES, stamped
 
@@ -49,7 +49,7 @@ def all_of(stack: Stack, make: Callable[[Layer], Any], threads: int = 2) -> list
 
 def sampler_of(stack: Stack, bounds: Bounds | None = None) -> Sampler:
     shape = (stack.shape[0] + 1, stack.shape[1] + 1)
-    return Sampler(stack.root.kernel(), stack.root, bounds or stack.root.bounds, stack.frame, shape)
+    return FieldSampler(stack.root.kernel(), stack.root, bounds or stack.root.bounds, stack.frame, shape)
 
 
 def signs(sampler: Sampler, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -25,7 +25,7 @@ from fracslice.studio.measuring import Mark, Overlay, Tracer, angle, circle, rea
 from fracslice.studio.measuring import sphere as best_sphere
 from fracslice.studio.session import Session
 from fracslice.studio.solid import MEASURES, SceneSolid, graded, legend, thickness_at
-from fracslice.volume import Supports
+from fracslice.volume import Pillars, Supports
 from fracslice.volume.amount import Sizing
 from fracslice.work import Work
 from tests.waiting import wait_until
@@ -140,7 +140,8 @@ def test_supports_of_a_layer_are_told_from_the_object() -> None:
     rod = transform(cylinder(0.5, 3), translate=(0, 0, 1.5))
     size = Sizing.of(6.0)
     stack = plan_stack(ball | rod, SliceJob(layer=0.5, pixel=0.1), WORK, size)
-    held = Supports(ball, rod, 0.5, 1, 0, 0, 1.0, 0.1)
+    ends = np.array([[[0, 0, -1.0, 0.5], [0, 0, 3, 0.5]]])
+    held = Supports(ball, rod, Pillars(ends, 0.0, np.empty((0, 4))), 0.5, 1, 0, 0, 1.0, 0.1)
     layers = PrintLayers(replace(stack, supports=held), WORK, None, None)
     assert (layers.look(1).classes == HELD).sum() == pytest.approx(100 * np.pi / 4, rel=0.2)
     assert not (layers.look(8).classes == HELD).any()

@@ -11,6 +11,7 @@
 #include <memory>
 
 #include "../machine.h"
+#include "beams.h"
 #include "deflate.h"
 #include "picture.h"
 
@@ -74,6 +75,8 @@ nb::object owned(std::vector<Row>&& rows, std::initializer_list<size_t> shape) {
 constexpr std::chrono::milliseconds kUnlocked(20);
 
 using Bytes = nb::ndarray<uint8_t, nb::ndim<2>, nb::device::cpu>;
+using Balls = nb::ndarray<const double, nb::shape<-1, 2, 4>, nb::c_contig, nb::device::cpu>;
+using Planes = nb::ndarray<const double, nb::shape<-1, 4>, nb::c_contig, nb::device::cpu>;
 
 // What act() returns; other threads of Python run meanwhile.
 template <class Do>
@@ -113,10 +116,13 @@ View view_of(std::array<int, 2> rows_columns, bool transposed, bool backwards, s
 }
 
 nb::tuple bind_picture(const Slab& slab, int layer, std::array<int, 2> rows_columns, bool transposed, bool backwards,
-                       std::array<int, 2> at, std::array<int, 2> shape, const nb::bytes& levels, Encoding encoding) {
-    held(slab, layer);
+                       std::array<int, 2> at, std::array<int, 2> shape, const nb::bytes& levels, Encoding encoding,
+                       const Slabs& others) {
+    Slabs slabs{&slab};
+    slabs.insert(slabs.end(), others.begin(), others.end());
+    for (const Slab* one : slabs) held(*one, layer);
     const View view = view_of(rows_columns, transposed, backwards, at, shape, levels);
-    Picture shown = unlocked([&] { return picture(slab, view, encoding); });
+    Picture shown = unlocked([&] { return picture(slabs, view, encoding); });
     return nb::make_tuple(bytes(*shown.data), shown.painted.area, shown.painted.partly);
 }
 
@@ -135,7 +141,7 @@ nb::list bind_pictures(Slab& slab, const std::vector<int>& layers, std::array<in
         for (size_t i = 0; i < layers.size() && (i == 0 || std::chrono::steady_clock::now() < end); ++i) {
             const int64_t before = slab.evaluations();
             slab.sample(layers[i]);
-            const Picture shown = picture(slab, view, encoding);
+            const Picture shown = picture({&slab}, view, encoding);
             made.push_back({*shown.data, shown.painted, slab.evaluations() - before});
         }
     });
@@ -147,16 +153,16 @@ nb::list bind_pictures(Slab& slab, const std::vector<int>& layers, std::array<in
     return result;
 }
 
-// Slab, layer, transposed, backwards, rows and columns of the layer, upside down, places.
-using GivenPiece = std::tuple<const Slab*, int, bool, bool, std::array<int, 2>, bool, std::vector<std::array<int, 2>>>;
+// Slabs, layer, transposed, backwards, rows and columns of the layer, upside down, places.
+using GivenPiece = std::tuple<Slabs, int, bool, bool, std::array<int, 2>, bool, std::vector<std::array<int, 2>>>;
 
 nb::tuple bind_plate(const std::vector<GivenPiece>& given, std::array<int, 2> rows_columns, const nb::bytes& levels,
                      Encoding encoding) {
     std::vector<Piece> pieces;
-    for (const auto& [slab, layer, transposed, backwards, shape, upside_down, places] : given) {
-        held(*slab, layer);
+    for (const auto& [slabs, layer, transposed, backwards, shape, upside_down, places] : given) {
+        for (const Slab* slab : slabs) held(*slab, layer);
         const std::array<int, 2> own = {shape[transposed], shape[!transposed]};
-        pieces.push_back({slab, view_of(own, transposed, backwards, {0, 0}, shape, levels), upside_down, places});
+        pieces.push_back({slabs, view_of(own, transposed, backwards, {0, 0}, shape, levels), upside_down, places});
     }
     Picture shown = unlocked([&] { return picture(pieces, rows_columns[0], rows_columns[1], encoding); });
     return nb::make_tuple(bytes(*shown.data), shown.painted.area, shown.painted.partly);
@@ -216,22 +222,37 @@ NB_MODULE(_slices, module) {
     module.def("filtered", &bind_filtered, "rows"_a, "pixel"_a);
     nb::class_<Memory>(module, "Memory").def(nb::init<>());
     nb::class_<Slab>(module, "Slab")
-        .def("__init__",
-             [](Slab* self, std::shared_ptr<Memory> memory, const nb::object& entry, const ProbeBounds& bounds,
-                std::array<double, 4> f, std::vector<double> z, int ny, int nx) {
-                 const Frame frame{f[0], f[1], f[2], f[3]};
-                 new (self) Slab(std::move(memory), field_of(entry), bounds, frame, std::move(z), ny, nx);
-             },
-             "memory"_a, "entry"_a, "bounds"_a, "frame"_a, "z"_a, "ny"_a, "nx"_a)
         .def("sample", &Slab::sample, "layer"_a, nb::call_guard<nb::gil_scoped_release>())
         .def_prop_ro("evaluations", &Slab::evaluations)
         .def("paint", &bind_paint, "layer"_a, "image"_a)
         .def("runs", &bind_runs, "layer"_a, "shape"_a)
         .def("picture", &bind_picture, "layer"_a, "pixels"_a, "transposed"_a, "backwards"_a, "at"_a, "shape"_a, "levels"_a,
-             "encoding"_a)
+             "encoding"_a, "others"_a = Slabs())
         .def("pictures", &bind_pictures, "layers"_a, "pixels"_a, "transposed"_a, "backwards"_a, "at"_a, "shape"_a, "levels"_a,
              "encoding"_a)
         .def("crossings", &bind_crossings, "layer"_a)
         .def("signs", &bind_signs);
+    nb::class_<FieldSlab, Slab>(module, "FieldSlab")
+        .def("__init__",
+             [](FieldSlab* self, std::shared_ptr<Memory> memory, const nb::object& entry, const ProbeBounds& bounds,
+                std::array<double, 4> f, std::vector<double> z, int ny, int nx) {
+                 const Frame frame{f[0], f[1], f[2], f[3]};
+                 new (self) FieldSlab(std::move(memory), field_of(entry), bounds, frame, std::move(z), ny, nx);
+             },
+             "memory"_a, "entry"_a, "bounds"_a, "frame"_a, "z"_a, "ny"_a, "nx"_a);
+    nb::class_<Beams>(module, "Beams")
+        .def("__init__",
+             [](Beams* self, const Balls& balls, double floor, const Planes& planes) {
+                 new (self) Beams({balls.data(), balls.size()}, floor, {planes.data(), planes.size()});
+             },
+             "balls"_a, "floor"_a, "planes"_a);
+    nb::class_<BeamSlab, Slab>(module, "BeamSlab")
+        .def("__init__",
+             [](BeamSlab* self, std::shared_ptr<Memory> memory, std::shared_ptr<const Beams> beams, std::array<double, 4> f,
+                std::vector<double> z, int ny, int nx) {
+                 const Frame frame{f[0], f[1], f[2], f[3]};
+                 new (self) BeamSlab(std::move(memory), std::move(beams), frame, std::move(z), ny, nx);
+             },
+             "memory"_a, "beams"_a, "frame"_a, "z"_a, "ny"_a, "nx"_a);
     bind_checks(module);
 }

@@ -134,7 +134,13 @@ void cover(const Slab& slab, float scale, const Quad& tiles, const Corners& corn
 }
 
 #if defined(FRACSLICE_WIDE)
-// The same by values, two rows at a time, with AVX-512.
+// The same, two rows at a time, with AVX-512.
+
+// The inside parts of the sides of the cells of a tile: lower ones, in the last the upper ones of the last row and then the right
+// ones of the last column; and left ones.
+struct WideParts {
+    __m512 across[5], up[4];
+};
 
 // What samples weigh.
 FRACSLICE_WIDE __m512 weight(__m512 values, uint64_t known, uint64_t within, __m512 scale) {
@@ -153,8 +159,13 @@ FRACSLICE_WIDE __m512 between(__m512 lower, __m512 upper) {
     return _mm512_maskz_shuffle_f32x4(0xFFFF, lower, upper, _MM_SHUFFLE(1, 0, 3, 2));
 }
 
-FRACSLICE_WIDE void cover_wide(const Slab& slab, float scale, const Quad& tiles, const Corners& corners, Levels& levels,
-                               double* sums, float* areas) {
+// For each of two rows: the column to the right.
+FRACSLICE_WIDE inline __m512i beside(int i) {
+    return _mm512_setr_epi32(1, 2, 3, 4, 5, 6, 7, 24 + 2 * i, 9, 10, 11, 12, 13, 14, 15, 25 + 2 * i);
+}
+
+FRACSLICE_WIDE WideParts by_values_wide(const Slab& slab, float scale, const Quad& tiles, const Corners& corners) {
+    WideParts parts;
     const float *own = slab.tiles().values[tiles.own].data(), *right = slab.tiles().values[tiles.right].data();
     const uint64_t known = slab.tiles().known[tiles.own], *within = corners.word;
     const __m512 more = _mm512_set1_ps(scale);
@@ -173,24 +184,54 @@ FRACSLICE_WIDE void cover_wide(const Slab& slab, float scale, const Quad& tiles,
     const __m512i next = _mm512_setr_epi32(1, 2, 3, 4, 5, 6, 7, 16, 9, 10, 11, 12, 13, 14, 15, 16);
     const __m512 over = _mm512_permutex2var_ps(rim, next, corner);
     const __m512 rim_parts = _mm512_div_ps(inside_of(rim, rim_within, over, over_within), _mm512_add_ps(rim, over));
-    __m512i beside[4];
-    __m512 across[5], up[4], sum = _mm512_setzero_ps();
-    across[4] = rim_parts;
+    parts.across[4] = rim_parts;
     for (int i = 0; i < 4; ++i) {
-        beside[i] = _mm512_setr_epi32(1, 2, 3, 4, 5, 6, 7, 24 + 2 * i, 9, 10, 11, 12, 13, 14, 15, 25 + 2 * i);
         const int at = 16 * i;
-        const __m512 here = rows[i], right_one = _mm512_permutex2var_ps(here, beside[i], rim), above = between(here, rows[i + 1]);
+        const __m512 here = rows[i], right_one = _mm512_permutex2var_ps(here, beside(i), rim), above = between(here, rows[i + 1]);
         const __m512 u = _mm512_add_ps(here, right_one), v = _mm512_add_ps(here, above);
         const __m512 u_inside = inside_of(here, within[0] >> at, right_one, within[1] >> at);
         const __m512 v_inside = inside_of(here, within[0] >> at, above, within[3] >> at);
         const __m512 one_over = _mm512_div_ps(_mm512_set1_ps(1), _mm512_mul_ps(u, v));  // one division for both
-        across[i] = _mm512_mul_ps(_mm512_mul_ps(u_inside, v), one_over);
-        up[i] = _mm512_mul_ps(_mm512_mul_ps(v_inside, u), one_over);
+        parts.across[i] = _mm512_mul_ps(_mm512_mul_ps(u_inside, v), one_over);
+        parts.up[i] = _mm512_mul_ps(_mm512_mul_ps(v_inside, u), one_over);
     }
+    return parts;
+}
+
+// The inside part of sixteen edges with the signs `first` and `second` at their ends, which are crossed at these shares.
+FRACSLICE_WIDE inline __m512 part(const uint16_t* shares, uint64_t first, uint64_t second) {
+    const __m256i crossed = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(shares));
+    const __m512 share = _mm512_maskz_cvtepi32_ps(0xFFFF, _mm512_maskz_cvtepu16_epi32(0xFFFF, crossed));
+    const __m512 within = _mm512_mask_sub_ps(share, __mmask16(~first), _mm512_set1_ps(kWhole), share);
+    const __m512 whole = _mm512_maskz_mov_ps(__mmask16(first), _mm512_set1_ps(1));
+    return _mm512_mask_mul_ps(whole, __mmask16(first ^ second), within, _mm512_set1_ps(1 / kWhole));
+}
+
+FRACSLICE_WIDE WideParts by_crossings_wide(const Slab& slab, const Quad& tiles, const Corners& corners) {
+    WideParts parts;
+    const uint16_t *own = slab.tiles().cross[tiles.own].data(), *right = slab.tiles().cross[tiles.right].data();
+    const uint64_t* within = corners.word;
+    for (int i = 0; i < 4; ++i) {
+        const int at = 16 * i;
+        parts.across[i] = part(own + at, within[0] >> at, within[1] >> at);
+        parts.up[i] = part(own + 64 + at, within[0] >> at, within[3] >> at);
+    }
+    uint16_t rim[16];
+    std::memcpy(rim, slab.tiles().cross[tiles.upper].data(), kTile * sizeof *rim);
+    for (int k = 0; k < kTile; ++k) rim[kTile + k] = right[64 + kTile * k];
+    const uint64_t first = within[3] >> 56 | first_column(within[1] >> 7) << 8;
+    parts.across[4] = part(rim, first, within[2] >> 56 | first_column(within[2] >> 7) << 8);
+    return parts;
+}
+
+FRACSLICE_WIDE void cover_wide(const Slab& slab, float scale, const Quad& tiles, const Corners& corners, Levels& levels,
+                               double* sums, float* areas) {
+    const WideParts parts = scale == 0 ? by_crossings_wide(slab, tiles, corners) : by_values_wide(slab, scale, tiles, corners);
+    __m512 sum = _mm512_setzero_ps();
     __m512i level[4];
     for (int i = 0; i < 4; ++i) {
-        const __m512 b = across[i], a = between(b, across[i + 1]), l = up[i];
-        const __m512 r = _mm512_permutex2var_ps(l, beside[i], rim_parts);
+        const __m512 b = parts.across[i], a = between(b, parts.across[i + 1]), l = parts.up[i];
+        const __m512 r = _mm512_permutex2var_ps(l, beside(i), parts.across[4]);
         const __m512 half = _mm512_mul_ps(_mm512_mul_ps(_mm512_add_ps(l, r), _mm512_add_ps(a, b)), _mm512_set1_ps(0.5f));
         const __m512 inside = _mm512_sub_ps(half, _mm512_mul_ps(_mm512_mul_ps(l, r), _mm512_mul_ps(a, b)));
         sum = _mm512_add_ps(sum, inside);
@@ -213,7 +254,7 @@ void Coverage::operator()(const Quad& tiles, const Corners& corners, Levels& lev
     alignas(64) float areas[64];
     const uint64_t alternating = corners.alternating(), special = alternating | slab_.tiles().sharp[tiles.own];
 #if defined(FRACSLICE_WIDE)
-    if (kWide && scale_ != 0)
+    if (kWide)
         cover_wide(slab_, scale_, tiles, corners, levels, sums_.data(), special ? areas : nullptr);
     else
 #endif

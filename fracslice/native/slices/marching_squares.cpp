@@ -161,6 +161,10 @@ SolidRuns solid_runs(const Slab& slab, int rows, int columns) {
     for (int y = 1; kTile * (y - 1) < rows; ++y) {
         for (int x = 1; kTile * (x - 1) < columns; ++x) {
             const int32_t t = slab.at(y, x);
+            if (t == kEmpty) {
+                turns.add(kTile * (x - 1), 0);
+                continue;
+            }
             const Quad tiles(slab, {y, x, kEmpty});
             const Corners corners(slab, tiles);
             const uint64_t sharp = slab.tiles().sharp[t], cut = t < kTiles ? 0 : corners.mixed() | sharp;
@@ -293,7 +297,7 @@ struct Bend {
 // Crossings on the zero set: false position with the Illinois rule (Dowell and Jarratt 1971) or halving, all edges at once. Straight
 // lines between the values at both ends would miss it by up to half a pixel where other faces are nearer, as just below a
 // horizontal one.
-void Slab::project(const std::vector<Edge>& edges) {
+void FieldSlab::project(const std::vector<Edge>& edges) {
     cross.resize(count());
     struct Root {
         float low, high, below, above, share;
@@ -349,7 +353,7 @@ void Slab::project(const std::vector<Edge>& edges) {
 
 // Corners within pixels: where the sides before and after meet, if the field changes its sign there. In the pixel that both
 // crossings belong to, or in one beside it. Other sides are arcs, where they turn sharply only if the field agrees.
-void Slab::sharpen() {
+void FieldSlab::sharpen() {
     const Outline outline(*this);
     std::vector<Bend> turns;
     std::vector<Spot> spots;
@@ -379,7 +383,7 @@ void Slab::sharpen() {
     }
 }
 
-void Slab::put_tip(int row, int column, float area) {
+void FieldSlab::put_tip(int row, int column, float area) {
     if (row < 0 || column < 0 || row >= kTile * (ty_ - 2) || column >= kTile * (tx_ - 2)) return;
     const int y = row / kTile + 1, x = column / kTile + 1, bit = kTile * (row % kTile) + column % kTile;
     int32_t t = at(y, x);

@@ -199,7 +199,28 @@ class TileRows {
         int32_t across, tile;
     };
 
-    TileRows(const Slab& slab, const View& view, int down, int across) {
+    TileRows(const Slabs& slabs, const View& view, int down, int across) {
+        if (slabs.size() == 1) {
+            sort(*slabs[0], view, down, across);
+            return;
+        }
+        std::vector<TileRows> each;
+        for (const Slab* slab : slabs) each.emplace_back(Slabs{slab}, view, down, across);
+        for (int row = 0; row < down; ++row) {
+            begin_.push_back(int32_t(spots_.size()));
+            for (const TileRows& rows : each) spots_.insert(spots_.end(), rows[row].first, rows[row].second);
+            const auto own = spots_.begin() + begin_.back();
+            std::ranges::sort(own, spots_.end(), {}, &Spot::across);
+            spots_.erase(std::ranges::unique(own, spots_.end(), {}, &Spot::across).begin(), spots_.end());
+        }
+        begin_.push_back(int32_t(spots_.size()));
+    }
+    std::pair<const Spot*, const Spot*> operator[](int row) const {
+        return {spots_.data() + begin_[row], spots_.data() + begin_[row + 1]};
+    }
+
+ private:
+    void sort(const Slab& slab, const View& view, int down, int across) {
         const auto first = kTiles, last = int32_t(slab.tiles().count());
         spots_.resize(size_t(last - first));
         Rows<int32_t> by_column(spots_.size());
@@ -216,11 +237,7 @@ class TileRows {
         for (int32_t t = first; t < last; ++t) by_column[columns[column(t)]++] = t;
         for (int32_t t : by_column) spots_[rows[row(t)]++] = {column(t), t};
     }
-    std::pair<const Spot*, const Spot*> operator[](int row) const {
-        return {spots_.data() + begin_[row], spots_.data() + begin_[row + 1]};
-    }
 
- private:
     Rows<Spot> spots_;
     std::vector<int32_t> begin_;  // of each row of tiles
 };
@@ -229,9 +246,11 @@ namespace {
 
 // A tile of which some cells are cut, and where their levels go.
 struct Cut {
+    size_t slab;
     Quad tiles;
     Corners corners;
     Levels* levels;
+    bool over;  // another slab's levels, of which the greater ones stay
 };
 
 // The layer's pixels along a side of the picture, in its order, counted from the first tile's: those from `first` to before
@@ -255,12 +274,14 @@ thread_local Runs runs_of_thread;
 // A layer on its way to a picture.
 class Shown {
  public:
-    Shown(const Slab& slab, const View& view, Encoding encoding)
-        : slab_(slab), view_(view), encoding_(encoding), filter_(encoding == Encoding::png),
+    Shown(const Slabs& slabs, const View& view, Encoding encoding)
+        : slabs_(slabs), view_(view), encoding_(encoding), filter_(encoding == Encoding::png),
           down_(side(view.transposed), view.shape[view.transposed], view.at[view.transposed], view.rows, true),
           across_(side(!view.transposed), view.shape[!view.transposed], view.at[!view.transposed], view.columns, view.backwards),
-          band_(Orientation(view.transposed, view.backwards, view.levels), across_.tiles, across_.first, across_.last), coverage_(slab),
-          rows_(slab, view, down_.tiles, across_.tiles) {}
+          band_(Orientation(view.transposed, view.backwards, view.levels), across_.tiles, across_.first, across_.last),
+          rows_(slabs, view, down_.tiles, across_.tiles) {
+        for (const Slab* slab : slabs) coverage_.emplace_back(*slab);
+    }
 
     Picture picture() {
         read_all();
@@ -284,13 +305,23 @@ class Shown {
                 runs_.add(0, row * (to - from));
         }
         runs_.add(0, row * (view_.rows - down_.at - down_.count()));
-        painted_.area += coverage_.area();
+        for (const Coverage& one : coverage_) painted_.area += one.area();
         return runs_;
     }
     Painted painted() const { return painted_; }
 
  private:
-    int side(bool along_x) const { return along_x ? slab_.columns() : slab_.rows(); }
+    int side(bool along_x) const { return along_x ? slabs_[0]->columns() : slabs_[0]->rows(); }
+    bool is_full(size_t place) const {
+        return std::ranges::any_of(slabs_, [&](const Slab* slab) { return slab->spot(0, 0)[place] == kFull; });
+    }
+    // Whether the first sample of a place without cut cells is inside.
+    bool is_inside(size_t place) const {
+        return std::ranges::any_of(slabs_, [&](const Slab* slab) { return slab->tiles().inside[slab->spot(0, 0)[place]] & 1; });
+    }
+    bool is_tile(size_t place) const {
+        return std::ranges::any_of(slabs_, [&](const Slab* slab) { return slab->spot(0, 0)[place] >= kTiles; });
+    }
 
     // Reads the tiles of eight rows; false if they are empty.
     bool read(int tile) {
@@ -298,51 +329,89 @@ class Shown {
         const auto [begin, end] = rows_[tile];
         if (begin == end) return false;
         const int n = across_.tiles, along = down_.tiles - tile, beside = view_.backwards ? n : 1;
-        const int32_t* first = view_.transposed ? slab_.spot(beside, along) : slab_.spot(along, beside);
-        const ptrdiff_t step = (view_.transposed ? slab_.columns() : 1) * (view_.backwards ? -1 : 1);
+        const ptrdiff_t columns = slabs_[0]->columns();
+        const ptrdiff_t first = view_.transposed ? beside * columns + along : along * columns + beside;
+        const ptrdiff_t step = (view_.transposed ? columns : 1) * (view_.backwards ? -1 : 1);
+        auto place = [&](int i) { return size_t(first + step * i); };
         // All between two tiles is as the one after the first is; the same is before the first tile and after the last.
         int next = across_.first / kTile;  // tile that the band may lack
         auto put_next = [&](int i) {
-            if (i == next && i < n) band_.uniform(i, slab_.tiles().inside[first[step * i]] & 1), ++next;
+            if (i == next && i < n) band_.uniform(i, is_inside(place(i))), ++next;
         };
-        if (next < n && first[step * next] < kTiles) put_next(next);
+        if (next < n && !is_tile(place(next))) put_next(next);
         cut_.clear();
         for (const Spot* spot = begin; spot != end; ++spot) {
             const int i = spot->across, after = spot + 1 == end ? n : spot[1].across;
-            if (put(i, first + step * i)) next = std::max(next, i + 1);
+            if (put(i, place(i))) next = std::max(next, i + 1);
             put_next(i);
             if (i + 1 == after) continue;
             put_next(i + 1);
-            if (first[step * (i + 1)] == kFull) painted_.area += kTile * kTile * double(after - i - 1);
+            if (is_full(place(i + 1))) painted_.area += kTile * kTile * double(after - i - 1);
         }
-        for (const Cut& cut : cut_) coverage_(cut.tiles, cut.corners, *cut.levels);
+        for (const Cut& cut : cut_) cover(cut);
         band_.close();
         return true;
     }
 
     // Whether the tile is cut.
-    bool put(int i, const int32_t* spot) {
-        const Quad tiles(spot, slab_.columns());
-        const Corners corners(slab_, tiles);
-        const uint64_t cut = corners.mixed() | slab_.tiles().sharp[tiles.own];
+    bool put(int i, size_t place) {
+        seen_.clear();
+        uint64_t whole = 0;
+        for (const Slab* slab : slabs_) {
+            const int32_t* spot = slab->spot(0, 0) + place;
+            const Quad tiles(spot, slab->columns());
+            const Corners corners(*slab, tiles);
+            const uint64_t cut = *spot < kTiles ? 0 : corners.mixed() | slab->tiles().sharp[tiles.own];
+            seen_.push_back({tiles, corners, cut});
+            whole |= corners.whole() & ~cut;
+        }
+        uint64_t cut = 0;
+        for (const Seen& one : seen_) cut |= one.cut & ~whole;
         if (!cut) {
-            painted_.area += std::popcount(corners.whole());
+            painted_.area += std::popcount(whole);
             return false;
         }
-        const float* values = slab_.tiles().values[tiles.own].data();
-        for (int k = 0; k < 64; k += 16) prefetch(values + k);
         painted_.partly += std::popcount(cut);
-        cut_.push_back({tiles, corners, &band_.cut(i, cut)});
+        Levels& levels = band_.cut(i, cut);
+        bool over = false;
+        for (size_t s = 0; s < slabs_.size(); ++s) {
+            const auto& [tiles, corners, own] = seen_[s];
+            if (tiles.own == kEmpty || (!own && !corners.whole())) continue;
+            const float* values = slabs_[s]->tiles().values[tiles.own].data();
+            for (int k = 0; k < 64; k += 16) prefetch(values + k);
+            cut_.push_back({s, tiles, corners, &levels, over});
+            over = true;
+        }
         return true;
     }
 
-    const Slab& slab_;
+    void cover(const Cut& cut) {
+        if (!cut.over) return coverage_[cut.slab](cut.tiles, cut.corners, *cut.levels);
+        Levels more;
+        coverage_[cut.slab](cut.tiles, cut.corners, more);
+        int shared = 0;
+        for (size_t k = 0; k < more.size(); ++k) {
+            uint8_t& level = (*cut.levels)[k];
+            shared += std::min(level, more[k]), level = std::max(level, more[k]);
+        }
+        painted_.area -= shared / 255.0;
+    }
+
+    // What a slab has in a place: its tiles there, and the cells that it cuts.
+    struct Seen {
+        Quad tiles;
+        Corners corners;
+        uint64_t cut;
+    };
+
+    Slabs slabs_;
     const View& view_;
     Encoding encoding_;
     uint32_t filter_;  // bytes before each row
     Axis down_, across_;
     Band band_;
-    Coverage coverage_;
+    std::vector<Coverage> coverage_;
+    std::vector<Seen> seen_;
     Rows<Cut> cut_;
     TileRows rows_;
     Runs& runs_ = runs_of_thread;
@@ -399,7 +468,7 @@ double put_over(Streak next, std::vector<Streak>& line) {
 
 }  // namespace
 
-Picture picture(const Slab& slab, const View& view, Encoding encoding) { return Shown(slab, view, encoding).picture(); }
+Picture picture(const Slabs& slabs, const View& view, Encoding encoding) { return Shown(slabs, view, encoding).picture(); }
 
 Picture picture(const std::vector<Piece>& pieces, int rows, int columns, Encoding encoding) {
     struct Shows {
@@ -412,7 +481,7 @@ Picture picture(const std::vector<Piece>& pieces, int rows, int columns, Encodin
     std::vector<Shows> shows;
     streaks.reserve(pieces.size());
     for (const Piece& piece : pieces) {
-        Shown alone(*piece.slab, piece.view, Encoding::goo);
+        Shown alone(piece.slabs, piece.view, Encoding::goo);
         streaks.emplace_back(alone.read_all(), piece.view.rows, piece.view.columns);
         for (const auto& [row, column] : piece.places) {
             painted.area += alone.painted().area, painted.partly += alone.painted().partly;

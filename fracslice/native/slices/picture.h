@@ -24,11 +24,15 @@ struct Picture {
     Painted painted;
 };
 
-Picture picture(const Slab& slab, const View& view, Encoding encoding);
+// Slabs of one lattice, each with the same layer, that are shown together.
+using Slabs = std::vector<const Slab*>;
+
+// Of a pixel in several of them, the greatest part is shown.
+Picture picture(const Slabs& slabs, const View& view, Encoding encoding);
 
 // A layer of an object on a plate of several.
 struct Piece {
-    const Slab* slab;
+    Slabs slabs;
     View view;                                // of the object alone
     bool upside_down;                         // its rows come in the other order
     std::vector<std::array<int, 2>> places;  // row and column of its first pixel in the picture, for each time it is shown

@@ -249,17 +249,31 @@ class Likely {
 
 }  // namespace
 
-Slab::Slab(std::shared_ptr<Memory> memory, std::shared_ptr<const Field> field, const ProbeBounds& bounds, const Frame& frame,
-           std::vector<double> z, int ny, int nx)
-    : memory_(std::move(memory)),
+Slab::Slab(std::shared_ptr<Memory> memory, const Frame& frame, std::vector<double> z, int ny, int nx)
+    : memory_(std::move(memory)), frame_(frame), z_(std::move(z)), ty_((ny + kTile - 1) / kTile + 2), tx_((nx + kTile - 1) / kTile + 2) {
+    static_cast<Tiles&>(*this) = memory_->take(size_t(ty_) * tx_);
+}
+
+void Slab::begin(int layer) {
+    if (layer < 0 || layer >= layers()) throw std::out_of_range("a slab has no such layer");
+    layer_ = layer;
+}
+
+int32_t Slab::add(int y, int x) {
+    int32_t* here = &where[size_t(y) * tx_ + x];
+    push({y, x, *here}, inside[*here]);
+    *here = int32_t(count() - 1);
+    beside.back() = {here[1], here[-1], here[tx_], here[-tx_]};
+    for (int side = 0; side < 4; ++side) beside[beside.back()[side]][side ^ 1] = *here;
+    return *here;
+}
+
+FieldSlab::FieldSlab(std::shared_ptr<Memory> memory, std::shared_ptr<const Field> field, const ProbeBounds& bounds,
+                     const Frame& frame, std::vector<double> z, int ny, int nx)
+    : Slab(std::move(memory), frame, std::move(z), ny, nx),
       field_(std::move(field)),
       bounds_(bounds),
-      frame_(frame),
-      z_(std::move(z)),
-      diagonal_((square(frame.dx) + square(frame.dy)) / square(std::min(frame.dx, frame.dy))),
-      ty_((ny + kTile - 1) / kTile + 2),
-      tx_((nx + kTile - 1) / kTile + 2) {
-    static_cast<Tiles&>(*this) = memory_->take(size_t(ty_) * tx_);
+      diagonal_((square(frame.dx) + square(frame.dy)) / square(std::min(frame.dx, frame.dy))) {
     group(z_, 0, layers() - 1, kThick * std::min(frame.dx, frame.dy), groups_);
     group(z_, 0, layers() - 1, kThin * std::min(frame.dx, frame.dy), pairs_);
     if (!bounds_.escape_time_only) discs_.emplace(frame.dx, frame.dy, 0), centres_.emplace(frame.dx, frame.dy, 0.5);
@@ -267,9 +281,8 @@ Slab::Slab(std::shared_ptr<Memory> memory, std::shared_ptr<const Field> field, c
     for (int i = 0; i < kTile * (ty_ - 2); ++i) y_.push_back(float(frame.y0 + frame.dy * i));
 }
 
-void Slab::sample(int layer) {
-    if (layer < 0 || layer >= layers()) throw std::out_of_range("a slab has no such layer");
-    layer_ = layer;
+void FieldSlab::sample(int layer) {
+    begin(layer);
     auto of = [&](const auto& groups) { return *std::find_if(groups.begin(), groups.end(), [&](auto& g) { return layer <= g[1]; }); };
     const auto group = of(groups_), pair = of(pairs_);
     if (pair[0] != pair_) {
@@ -280,7 +293,7 @@ void Slab::sample(int layer) {
         open((z_[pair[1]] - z_[pair[0]]) / 2);
         pair_ = pair[0];
     }
-    begin();
+    reopen();
     probe();
     mend();
     close();
@@ -293,7 +306,7 @@ void Slab::sample(int layer) {
     }
 }
 
-std::vector<float> Slab::values_at(const std::vector<Spot>& spots) {
+std::vector<float> FieldSlab::values_at(const std::vector<Spot>& spots) {
     std::vector<float> result(spots.size());
     auto where = [&](size_t i, float& x, float& y, float& z) {
         x = float(frame_.x0 + frame_.dx * spots[i].column), y = float(frame_.y0 + frame_.dy * spots[i].row), z = float(z_[layer_]);
@@ -304,7 +317,7 @@ std::vector<float> Slab::values_at(const std::vector<Spot>& spots) {
 
 // --- top down ------------------------------------------------------------------------------------------------------------
 // The blocks of 16 pixels over all layers that are not decided.
-std::vector<Slab::Block> Slab::coarse() {
+std::vector<FieldSlab::Block> FieldSlab::coarse() {
     std::vector<Block> blocks, cut;
     for (int y = 1; y < ty_ - 1; y += kCoarsest)
         for (int x = 1; x < tx_ - 1; x += kCoarsest) blocks.push_back({y, x, kCoarsest});
@@ -332,13 +345,13 @@ std::vector<Slab::Block> Slab::coarse() {
     return blocks;
 }
 
-void Slab::fill(const Block& block) {
+void FieldSlab::fill(const Block& block) {
     const int last = std::min(block.y + block.size, ty_ - 1), n = std::min(block.size, tx_ - 1 - block.x);
     for (int y = block.y; y < last; ++y) slices::fill(&where[size_t(y) * tx_ + block.x], n);
 }
 
 // The places whose middle, halfway between two layers, does not decide the signs around it in and between these layers.
-void Slab::columns(int first, int last) {
+void FieldSlab::columns(int first, int last) {
     double height = (z_[last] - z_[first]) / 2;
     const double margin = bounds_.escape_time_only ? kAside : 1;
     double reach = margin * length(length(frame_.dx, frame_.dy) * (kTile - 1) / 2, height);
@@ -367,7 +380,7 @@ void Slab::columns(int first, int last) {
 }
 
 // The values in the middles of the columns' quarters, at a height.
-void Slab::quarter(double height) {
+void FieldSlab::quarter(double height) {
     auto where = [&](size_t i, float& x, float& y, float& z) {
         const Column& c = columns_[i / 4];
         const size_t right = 4 * (i & 1) + 1, above = 2 * (i & 2) + 1;
@@ -380,7 +393,7 @@ void Slab::quarter(double height) {
 
 // The tiles of a pair of layers that are `height` from the middles of quarters; none where all of these say that it is empty,
 // unless a tile beside it is taken to be full.
-void Slab::open(double height) {
+void FieldSlab::open(double height) {
     const float aside = float(square(height)) * factor(1, frame_), least = aside + float(2.25 * diagonal_ * square(bounds_.escape_time_only ? kBeside : 1));
     // A value beyond its rim decides its quarter.
     const float inside_reach = factor(bounds_.inside, frame_);
@@ -414,7 +427,7 @@ void Slab::open(double height) {
 }
 
 // A layer of that pair: its tiles as they were opened.
-void Slab::begin() {
+void FieldSlab::reopen() {
     drop(open_.inside.size(), tx_);
     beside = open_.beside, inside = open_.inside, decided_ = open_.decided;
     known.assign(count(), 0), sharp.assign(count(), 0);
@@ -435,7 +448,7 @@ uint64_t blocks(uint64_t last) { return (last >> kBack) * block(2); }
 
 }  // namespace
 
-void Slab::probe() {
+void FieldSlab::probe() {
     const int32_t end = int32_t(count());
     if (bounds_.escape_time_only) {
         twos();
@@ -450,7 +463,7 @@ void Slab::probe() {
 }
 
 // Those of the samples `among` that are not decided.
-void Slab::list(const Chunk& chunk, uint64_t among) {
+void FieldSlab::list(const Chunk& chunk, uint64_t among) {
     asks_.resize(size_t(chunk.last - chunk.first));
     size_t n = 0;
     for (int32_t t = chunk.first; t < chunk.last; ++t) {
@@ -462,7 +475,7 @@ void Slab::list(const Chunk& chunk, uint64_t among) {
 
 // Evaluates those of the samples `among` that are not decided, each in a block of `size`, and decides the samples within
 // their reach.
-void Slab::probe(const Chunk& chunk, int size, uint64_t among) {
+void FieldSlab::probe(const Chunk& chunk, int size, uint64_t among) {
     list(chunk, among);
     const float inside_reach = factor(bounds_.inside, frame_);
     const int back = size / 2 * kBack;
@@ -481,7 +494,7 @@ void Slab::probe(const Chunk& chunk, int size, uint64_t among) {
 }
 
 // Sets evaluated samples, and implied ones unless their sign is known.
-void Slab::set(const Ask& ask, uint64_t negative, uint64_t reached, uint64_t within) {
+void FieldSlab::set(const Ask& ask, uint64_t negative, uint64_t reached, uint64_t within) {
     uint64_t kept = known[ask.tile], implied = reached & ~(kept | ask.samples);
     uint64_t& now = inside[ask.tile];
     now = (now & ~(implied | ask.samples)) | (within & implied) | negative;
@@ -491,7 +504,7 @@ void Slab::set(const Ask& ask, uint64_t negative, uint64_t reached, uint64_t wit
 
 // --- in escape-time fields ------------------------------------------------------------------------------------------------------
 // One sample of each block of 2, which decides all of it or nothing.
-void Slab::twos() {
+void FieldSlab::twos() {
     list({kTiles, int32_t(count())}, kTwos);
     enough_.resize(count());
     const Rim rim{factor(bounds_.inside, frame_), open_.reach.data(), float(diagonal_), float(diagonal_) * kCalm * kCalm};
@@ -503,7 +516,7 @@ void Slab::twos() {
 
 // Decides the blocks of 2 around which, two blocks wide, nothing has the other sign. How near the surface is shows in the signs
 // around a sample rather than in its value.
-void Slab::calm() {
+void FieldSlab::calm() {
     const size_t n = count();
     halves_.resize(n), rows_.resize(n);
     const auto* around = beside.data();
@@ -526,29 +539,20 @@ void Slab::calm() {
     }
 }
 
-void Slab::rest() {
+void FieldSlab::rest() {
     list({kTiles, int32_t(count())}, kAll);
     evaluate(asks_, nullptr, [&](const Ask& ask, const Signs& result) { set(ask, result.negative, 0, 0); });
 }
 
 // --- Outside in, and inside out: until every edge that the contour crosses has two evaluated ends.
 
-int32_t Slab::add(int y, int x) {
-    int32_t* here = &where[size_t(y) * tx_ + x];
-    push({y, x, *here}, inside[*here]);
-    *here = int32_t(count() - 1);
-    beside.back() = {here[1], here[-1], here[tx_], here[-tx_]};
-    for (int side = 0; side < 4; ++side) beside[beside.back()[side]][side ^ 1] = *here;
-    return *here;
-}
-
 // Opens tiles taken to be full beside tiles taken to be empty, where a bound is wrong; the same in all layers of a group.
-void Slab::mend() {
+void FieldSlab::mend() {
     if (!torn_) torn_ = torn();
     for (const Place& p : *torn_) add(p.y, p.x);
 }
 
-std::vector<Place> Slab::torn() const {
+std::vector<Place> FieldSlab::torn() const {
     std::vector<Place> result;
     for (int y = 1; y < ty_ - 1; ++y) {
         const int32_t *row = spot(y, 0), *below = row - tx_, *above = row + tx_;
@@ -565,7 +569,7 @@ std::vector<Place> Slab::torn() const {
 }
 
 // The samples of a tile that differ from those to their right, left, above and below; and the tiles there.
-struct Slab::Differing {
+struct FieldSlab::Differing {
     std::array<int32_t, 4> beside;
     uint64_t words[4];
 
@@ -582,7 +586,7 @@ struct Slab::Differing {
 
 // Whether anything is to be done for a tile is hard to foretell: everywhere here lists are written without asking, and what
 // does not belong to them is written over.
-void Slab::close() {
+void FieldSlab::close() {
     std::vector<int32_t> active(count() - kTiles), again;
     std::iota(active.begin(), active.end(), kTiles);
     std::vector<uint8_t> marked;  // tiles that are in `again`, and the two that never are
@@ -620,7 +624,7 @@ void Slab::close() {
     assert(is_closed());
 }
 
-bool Slab::is_closed() const {
+bool FieldSlab::is_closed() const {
     for (int32_t t = kTiles; t < int32_t(count()); ++t) {
         const Differing d(beside[t], inside.data(), inside[t]);
         if ((d.words[0] | d.words[1] | d.words[2] | d.words[3]) & ~known[t]) return false;
@@ -630,7 +634,7 @@ bool Slab::is_closed() const {
 
 // One wave of the closure: the implied samples that differ from a neighbour. Tiles made on the way become active; tiles at
 // the rim that reach it are to be looked at again.
-void Slab::ask(std::vector<int32_t>& active, std::vector<int32_t>& again) {
+void FieldSlab::ask(std::vector<int32_t>& active, std::vector<int32_t>& again) {
     std::vector<int32_t> open;
     for (size_t begin = 0, end; begin < active.size(); begin = end) {
         end = active.size();
@@ -654,7 +658,7 @@ void Slab::ask(std::vector<int32_t>& active, std::vector<int32_t>& again) {
 }
 
 // Makes the tiles beside one that samples in it ask for.
-void Slab::enlarge(int32_t t, std::vector<int32_t>& active, std::vector<int32_t>& again) {
+void FieldSlab::enlarge(int32_t t, std::vector<int32_t>& active, std::vector<int32_t>& again) {
     constexpr int dy[] = {0, 0, 1, -1}, dx[] = {1, -1, 0, 0};
     const Differing d(beside[t], inside.data(), inside[t]);
     for (int side = 0; side < 4; ++side) {
@@ -671,7 +675,7 @@ void Slab::enlarge(int32_t t, std::vector<int32_t>& active, std::vector<int32_t>
 }
 
 // Tiles of which the contour cuts nothing but the last cell, at the corner: the two beside it have its sign there.
-void Slab::corners() {
+void FieldSlab::corners() {
     for (int32_t t = kTiles, n = int32_t(count()); t < n; ++t) {
         const auto [right, left, upper, lower] = beside[t];
         const uint64_t own = inside[t];
@@ -690,7 +694,7 @@ constexpr int32_t kOften = 8, kSeldom = 40, kEnough = 96;  // strides of the til
 }  // namespace
 
 // Crossed edges of the layer.
-std::vector<Slab::Edge> Slab::edges() const {
+std::vector<FieldSlab::Edge> FieldSlab::edges() const {
     std::vector<Edge> result;
     for (int32_t t = kTiles; t < int32_t(count()); ++t)
         crossed(t, kAll, [&](int number, float first, float second) { result.push_back({t, number, first, second}); });
@@ -698,7 +702,7 @@ std::vector<Slab::Edge> Slab::edges() const {
 }
 
 // Those of one tile in `step`.
-Slab::Middles Slab::middles(int32_t step) const {
+FieldSlab::Middles FieldSlab::middles(int32_t step) const {
     Middles result;
     for (auto* list : {&result.x, &result.y, &result.quotients}) list->reserve(count() - kTiles);
     const float half[2] = {float(frame_.dx / 2), float(frame_.dy / 2)};
@@ -715,7 +719,7 @@ Slab::Middles Slab::middles(int32_t step) const {
 
 // How many times smaller inside values are than outside ones: the factor with which as many crossings lie before the middle
 // of their edge as do in truth. An eighth of the edges is enough to know it, and a fortieth of many.
-float Slab::inside_scale() {
+float FieldSlab::inside_scale() {
     const int32_t tiles = int32_t(count()) - kTiles;
     int32_t step = std::clamp(tiles / kEnough, kOften, kSeldom);
     Middles some = middles(step);

@@ -1,4 +1,4 @@
-// The samples around the contours of a few neighbouring layers, one after the other, from the field.
+// The samples around the contours of a few neighbouring layers, one after the other.
 #pragma once
 
 #include <algorithm>
@@ -228,23 +228,15 @@ struct Spot {
     double column, row;
 };
 
-// The samples of a layer, tile by tile. Neighbouring layers share the coarse probes.
-//
-// Top down, blocks of 64, 32 and 16 pixels over all layers, of 8 over groups of some and of 4 over pairs, then samples: one
-// of each block of 2, and the others. A value decides all samples within its reach; in an escape-time field it is calm where all
-// around has one sign, and less is enough. Then closure: where two neighbours differ in sign and one of them is only implied,
-// it is evaluated, until no such pair is left. So every edge that the contour crosses has two evaluated ends.
-class Slab : private Tiles {
+// The tiles of a few neighbouring layers, one layer after the other.
+class Slab : protected Tiles {
  public:
-    // ny, nx: lattice points. z: of the layers, scene units.
-    Slab(std::shared_ptr<Memory> memory, std::shared_ptr<const Field> field, const ProbeBounds& bounds, const Frame& frame,
-         std::vector<double> z, int ny, int nx);
     Slab(const Slab&) = delete;
-    ~Slab() { memory_->give(std::move(*this)); }
+    virtual ~Slab() { memory_->give(std::move(*this)); }
 
     // Finds the tiles of a layer and lets go of those of the one before; they do not depend on which others were sampled.
     // Throws std::domain_error where the solid reaches the rim of the lattice.
-    void sample(int layer);
+    virtual void sample(int layer) = 0;
     int layer() const { return layer_; }  // the one whose tiles there are; -1 of none
 
     int layers() const { return int(z_.size()); }
@@ -276,6 +268,35 @@ class Slab : private Tiles {
         return sharp[tile] >> bit & 1 ? std::clamp(area + tips[tile][bit], 0.f, 1.f) : area;
     }
     int64_t evaluations() const { return evaluations_; }  // of the field, so far
+
+ protected:
+    // ny, nx: lattice points. z: of the layers, scene units.
+    Slab(std::shared_ptr<Memory> memory, const Frame& frame, std::vector<double> z, int ny, int nx);
+
+    void begin(int layer);  // the one to be sampled
+    int32_t add(int y, int x);
+
+    std::shared_ptr<Memory> memory_;
+    Frame frame_;
+    std::vector<double> z_;
+    int layer_ = -1;
+    int ty_, tx_;
+    float scale_ = 0;
+    int64_t evaluations_ = 0;
+};
+
+// The samples of a field, which neighbouring layers share the coarse probes of.
+//
+// Top down, blocks of 64, 32 and 16 pixels over all layers, of 8 over groups of some and of 4 over pairs, then samples: one
+// of each block of 2, and the others. A value decides all samples within its reach; in an escape-time field it is calm where all
+// around has one sign, and less is enough. Then closure: where two neighbours differ in sign and one of them is only implied,
+// it is evaluated, until no such pair is left. So every edge that the contour crosses has two evaluated ends.
+class FieldSlab : public Slab {
+ public:
+    FieldSlab(std::shared_ptr<Memory> memory, std::shared_ptr<const Field> field, const ProbeBounds& bounds, const Frame& frame,
+              std::vector<double> z, int ny, int nx);
+
+    void sample(int layer) override;
 
  private:
     struct Block {
@@ -319,7 +340,7 @@ class Slab : private Tiles {
     void columns(int first, int last);
     void quarter(double z);
     void open(double height);
-    void begin();
+    void reopen();
     void probe();
     void list(const Chunk& chunk, uint64_t among);
     void probe(const Chunk& chunk, int size, uint64_t among);
@@ -328,7 +349,6 @@ class Slab : private Tiles {
     void calm();
     void rest();
 
-    int32_t add(int y, int x);
     void mend();
     std::vector<Place> torn() const;
     void close();
@@ -345,11 +365,8 @@ class Slab : private Tiles {
     void sharpen();
     void put_tip(int row, int column, float area);
 
-    std::shared_ptr<Memory> memory_;
     std::shared_ptr<const Field> field_;
     ProbeBounds bounds_;
-    Frame frame_;
-    std::vector<double> z_;
     std::vector<std::array<int, 2>> groups_, pairs_;  // first and last of layers that share blocks of 8 pixels, or of 4
     std::vector<float> x_, y_;               // of lattice points
     std::optional<Discs> discs_, centres_;  // in fields that are not of escape time alone
@@ -359,7 +376,7 @@ class Slab : private Tiles {
     Rows<Four> quarters_;          // of the pair
     Open open_;
     std::optional<std::vector<Place>> torn_;  // of that group, once they are known
-    int group_ = -1, pair_ = -1, layer_ = -1;  // their first layers; the layer
+    int group_ = -1, pair_ = -1;  // their first layers
     std::vector<float> middles_;   // values in the middles of places, NaN between uses
     std::vector<uint64_t> decided_;  // of opened tiles: samples that are evaluated or implied by a value in reach
     Rows<Ask> asks_;  // for use within a step
@@ -367,9 +384,6 @@ class Slab : private Tiles {
     // it is calm.
     std::vector<uint32_t> halves_, rows_;
     std::vector<uint64_t> enough_;
-    int ty_, tx_;
-    float scale_ = 0;
-    int64_t evaluations_ = 0;
 };
 
 // --- The field at many points at a time.
@@ -398,7 +412,7 @@ struct Batch {
 
 // where(i, x, y, z) sets the place of point i, scene units; take(i, f) gets its value.
 template <class Where, class Take>
-void Slab::evaluate(size_t n, const Where& where, const Take& take) {
+void FieldSlab::evaluate(size_t n, const Where& where, const Take& take) {
     Batch batch;
     evaluations_ += int64_t(n);
     for (size_t begin = 0; begin < n; begin += kBatch) {
@@ -411,7 +425,7 @@ void Slab::evaluate(size_t n, const Where& where, const Take& take) {
 
 // Of samples; keeps the values. take(ask, signs) for each tile.
 template <class Take>
-void Slab::evaluate(const Rows<Ask>& asks, const Rim* rim, const Take& take) {
+void FieldSlab::evaluate(const Rows<Ask>& asks, const Rim* rim, const Take& take) {
     Batch batch;
     std::array<Signs, kBatch> result;
     std::fill(batch.z, batch.z + kBatch, float(z_[layer_]));
