@@ -371,6 +371,8 @@ class Live:
         """Show the picture of every pixel, pass by pass."""
         renderer = self._made(self._finals, self.camera, self._drawn)
         for done in renderer.passes():
+            if done.samples < 1:  # in blocks: the smoothed draft is the better picture
+                continue
             self.shown = replace(self.shown, pixels=_developed(renderer, done), samples=done.samples)
             yield done
 
