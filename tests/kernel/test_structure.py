@@ -60,7 +60,7 @@ def instructions(root: Node) -> int:
     module = llvm.parse_assembly(
         emitter._text(link(root).program, lanes, llvm.get_process_triple(), [points])
     )
-    emitter._optimise(module, emitter._target_machine(target))
+    emitter._optimise(module, emitter._target_machine(target), 2)
     return sum(1 for f in module.functions for b in f.blocks for _ in b.instructions)
 
 
