@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -132,6 +133,9 @@ class Stack:
     def object(self) -> Field:
         """The object without its supports."""
         return self.supports.carried if self.supports else self.root
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {f.name: getattr(self, f.name) for f in fields(self)}  # no machine code
 
     @cached_property
     def exact(self) -> Kernel:
