@@ -6,8 +6,6 @@ To be run when the page looks different, on a machine that does nothing else.
 from __future__ import annotations
 
 import io
-import shutil
-import subprocess
 import sys
 import tempfile
 import time
@@ -16,9 +14,11 @@ from itertools import pairwise
 from pathlib import Path
 
 from PIL import Image
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page
 
-SIZE = {"width": 1120, "height": 630}
+from tests.studio.serving import chromium, served
+
+SIZE = 1120, 630
 """Window, pixels."""
 
 SCALED = 800, 450
@@ -143,21 +143,14 @@ def play(page: Page, camera: Camera) -> None:
 
 def main(path: Path) -> None:
     """Make the film."""
-    command = [sys.executable, "-m", "cli", "studio", "mandelbulb", "--no-browser", "--device", "cpu"]
-    with tempfile.TemporaryDirectory() as folder, sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
-        with subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True) as studio:
-            assert studio.stdout
-            page = browser.new_page(viewport=SIZE)
-            try:
-                page.goto(studio.stdout.readline().strip())
-                page.get_by_role("list", name="Elements").wait_for()
-                page.evaluate(POINTER)
-                camera = Camera(page)
-                play(page, camera)
-            finally:
-                studio.send_signal(2)
-        browser.close()
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        chromium() as browser,
+        served(browser, "mandelbulb", Path(folder), SIZE) as studio,
+    ):
+        studio.page.evaluate(POINTER)
+        camera = Camera(studio.page)
+        play(studio.page, camera)
     camera.save(path)
     print(f"{path}: {len(camera.frames)} frames, {path.stat().st_size / 1e6:.1f} MB")
 

@@ -302,12 +302,6 @@ def test_modules_of_later_stages_are_there() -> None:
     import_ahead()
 
 
-@pytest.fixture
-def only_samples(monkeypatch):
-    """No tetrahedra in place of samples."""
-    monkeypatch.setattr("fracslice.jobs.mesh._Job.split_up", lambda _: None)
-
-
 @pytest.mark.usefixtures("only_samples")
 def test_a_job_that_lost_its_object_samples_finer_and_says_so(tmp_path):
     report = make_mesh(LANTERN, MeshJob(resolution=144), path=tmp_path / "lantern.stl").report

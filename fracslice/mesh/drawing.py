@@ -75,14 +75,22 @@ class Projection(NamedTuple):
         scale = self.pixels if self.parallel else self.pixels * nearness
         return np.stack([self.size[0] / 2 + scale * x, self.size[1] / 2 - scale * y, nearness], 1)
 
+    def rays(
+        self, columns: NDArray[np.float64], rows: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Starts and unit directions of the rays through points of the picture, [n, 3]."""
+        right, up = (columns - self.size[0] / 2) / self.pixels, (self.size[1] / 2 - rows) / self.pixels
+        forward = np.full(len(right), 0.0 if self.parallel else 1.0)
+        film = product(np.stack([right, up, forward], 1), self.axes)
+        eye = np.array(self.eye)
+        if self.parallel:
+            return eye + film, np.broadcast_to(self.axes[2], film.shape)
+        return np.broadcast_to(eye, film.shape), film / np.linalg.norm(film, axis=1)[:, None]
+
     def ray(self, column: float, row: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Start and unit direction of the ray through a point of the picture."""
-        right = (column - self.size[0] / 2) / self.pixels
-        up = (self.size[1] / 2 - row) / self.pixels
-        if self.parallel:
-            return np.array(self.eye) + np.array([right, up, 0.0]) @ self.axes, self.axes[2]
-        direction = np.array([right, up, 1.0]) @ self.axes
-        return np.array(self.eye), direction / np.linalg.norm(direction)
+        (start,), (along,) = self.rays(np.array([column]), np.array([row]))
+        return start, along
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import product
 from ..fields.box import Box
 from ..fields.field import Field
 from ..mesh.drawing import Plane, Projection, Size
@@ -88,11 +89,9 @@ class CutFace:
         self, view: Projection, column: NDArray[np.float64], row: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Where rays meet the plane, from the side that is cut away, [n, 3], and whether they do."""
-        right, up = (column - view.size[0] / 2) / view.pixels, (view.size[1] / 2 - row) / view.pixels
-        film = np.stack([right, up, np.full(len(up), 0.0 if view.parallel else 1.0)], 1) @ view.axes
-        start = np.array(view.eye) + film if view.parallel else np.array(view.eye)[None]
-        along = view.axes[2:] if view.parallel else film
-        height, falls = self._plane.heights(start), -along @ np.array(self._plane.normal)
+        start, along = view.rays(column, row)
+        height = self._plane.heights(start)
+        falls = -product(along, np.array(self._plane.normal)[:, None])[:, 0]
         with np.errstate(divide="ignore", invalid="ignore"):
             away = height / falls
         seen = (height > 0) & (falls > 0) & np.isfinite(away)

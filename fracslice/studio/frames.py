@@ -145,14 +145,14 @@ class Frames:
 
     async def send(self) -> None:
         """Send the picture if there is a new one, and a page to send it to."""
-        shown, inside = self._studio.shown, self._studio.inside
-        now = shown, inside.overlay, self._studio.handle
+        shown, inside, handle = self._studio.shown, self._studio.inside, self._studio.handle
+        now = shown, inside.overlay, handle
         if now == self._sent or self._streamer is None:
             return
         self._sent = now
         still = shown.samples > 0
         loop = asyncio.get_running_loop()
-        pixels = await loop.run_in_executor(None, inside.over, shown)
+        pixels = await loop.run_in_executor(None, inside.over, shown, handle)
         data = await loop.run_in_executor(None, jpeg, pixels, QUALITIES[still])
         rows, columns, _ = pixels.shape
         meta = {"type": "image/jpeg", "codec": "", "w": columns, "h": rows, "st": 0, "key": "key"}

@@ -38,8 +38,7 @@ class LightHandle:
         tag = document.chosen
         if tag is None or tag.name != Light.element or document.problem:
             return None
-        all_lights = [other for other in document.root.children if other.name == Light.element]
-        places = [other.place for other in all_lights]
+        places = [other.place for other in document.root.children if other.name == Light.element]
         light = document.scene.view.lights[places.index(tag.place)] if tag.place in places else None
         return cls(tag.place, light) if light and light.kind in ("lamp", "sun") else None
 

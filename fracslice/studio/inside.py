@@ -81,10 +81,6 @@ class Host(Protocol):
     def cut_plane(self) -> Plane | None:
         """The plane that cuts the picture open."""
 
-    @property
-    def handle(self) -> LightHandle | None:
-        """Handle of the light that is chosen."""
-
     def run(self, name: str, make: Callable[[Work], str]) -> None:
         """Begin a job in the background, if none is running; it says what it made."""
 
@@ -265,13 +261,14 @@ class Inside:
             self._face = scene, plane, face
         return self._face[2]
 
-    def over(self, shown: Shown) -> NDArray[np.uint8]:
-        """The picture with its marks, and the face of a cut in colours."""
+    def over(self, shown: Shown, handle: LightHandle | None = None) -> NDArray[np.uint8]:
+        """The picture with its marks, the handle of a light, and the face of a cut in colours."""
         pixels, size = shown.pixels, self._host.live.size
         if face := self.face:
             pixels = face.over(pixels, shown.camera, size)
-        handle = self._host.handle if self.mode == "field" else None
-        marks = (*self.overlay.marks, handle.mark(shown.camera)) if handle else self.overlay.marks
+        marks = self.overlay.marks
+        if handle and self.mode == "field":
+            marks = (*marks, handle.mark(shown.camera))
         return Overlay(marks).over(pixels, shown.camera, size) if marks else pixels
 
     # the mesh

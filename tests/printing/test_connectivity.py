@@ -173,11 +173,9 @@ def contoured(monkeypatch: pytest.MonkeyPatch) -> list[object]:
     return calls
 
 
-def test_a_mesh_in_pieces_does_not_tell_which_body_is_the_largest(
-    contoured: list[object], monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.usefixtures("only_samples")
+def test_a_mesh_in_pieces_does_not_tell_which_body_is_the_largest(contoured: list[object]) -> None:
     """The field does: of the shell all crumbs stay, at the shell's size, and it is said that they are."""
-    monkeypatch.setattr("fracslice.jobs.mesh._Job.split_up", lambda _: None)
     whole, kept = (
         make_mesh(THIN, MeshJob(resolution=48, printing=Print(keep=keep))) for keep in ("all", "largest")
     )

@@ -6,8 +6,6 @@ import os
 import random
 import re
 import shutil
-import subprocess
-import sys
 import time
 import urllib.error
 import urllib.request
@@ -15,11 +13,17 @@ from collections.abc import Iterator
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING
 
 import pytest
 
 from tests import waiting
+
+from . import serving
+from .serving import Served
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 playwright = pytest.importorskip("playwright.sync_api")
 axe = pytest.importorskip("axe_playwright_python.sync_playwright")
@@ -47,49 +51,17 @@ SOAK = 1800.0
 """Time of random input, seconds."""
 
 
-class Served(NamedTuple):
-    """A studio that is served."""
-
-    page: playwright.Page
-    address: str
-    folder: Path
-    process: int
-
-
 @pytest.fixture(scope="module")
-def browser() -> Iterator[playwright.Browser]:
-    with playwright.sync_playwright() as started:
-        opened = started.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
+def browser() -> Iterator[Browser]:
+    with serving.chromium() as opened:
         yield opened
-        opened.close()
 
 
 @pytest.fixture
-def served(browser: playwright.Browser, tmp_path: Path) -> Iterator[Served]:
+def served(browser: Browser, tmp_path: Path) -> Iterator[Served]:
     (tmp_path / "two.xml").write_text(SCENE)
-    command = [
-        sys.executable,
-        "-m",
-        "cli",
-        "studio",
-        "two.xml",
-        "--no-browser",
-        "--device",
-        "cpu",
-        "--threads",
-        "1",
-    ]
-    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout
-        address = process.stdout.readline().strip()
-        page = browser.new_page(viewport={"width": 1200, "height": 640})
-        page.goto(address)
-        try:
-            row(page, "sphere").wait_for()
-            yield Served(page, address, tmp_path, process.pid)
-        finally:
-            process.send_signal(2)
-        assert process.wait(60) in (0, 130)
+    with serving.served(browser, "two.xml", tmp_path, (1200, 640), "--threads", "1") as made:
+        yield made
 
 
 def text(page: playwright.Page) -> str:
@@ -140,6 +112,7 @@ def test_every_value_of_a_slider_arrives(served: Served) -> None:
     page.mouse.move(x + 40, y, steps=30)
     page.mouse.up()
     shown = page.get_by_label("radius 1 as a number")
+    wait_until(lambda: float(shown.input_value()) > 0.75)  # what it had before is in the text, too
     wait_until(lambda: f'radius="{float(shown.input_value()):.6g}"' in text(page))
     assert float(shown.input_value()) > 0.75
 
@@ -214,7 +187,7 @@ def test_a_page_is_loaded_again_and_goes_on_after_a_lost_connection(served: Serv
     picture(page)
 
 
-def test_two_tabs_show_the_same_scene(served: Served, browser: playwright.Browser) -> None:
+def test_two_tabs_show_the_same_scene(served: Served, browser: Browser) -> None:
     other = browser.new_page()
     other.goto(served.address)
     row(other, "sphere").wait_for()
@@ -225,9 +198,7 @@ def test_two_tabs_show_the_same_scene(served: Served, browser: playwright.Browse
     other.close()
 
 
-def test_other_sites_and_those_without_the_token_are_refused(
-    served: Served, browser: playwright.Browser
-) -> None:
+def test_other_sites_and_those_without_the_token_are_refused(served: Served, browser: Browser) -> None:
     base = served.address.partition("/index")[0]
     for headers in ({"Host": "example.com"}, {"Origin": "http://example.com"}):
         with pytest.raises(urllib.error.HTTPError, match="403"):

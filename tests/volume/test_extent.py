@@ -163,9 +163,9 @@ def test_a_base_is_cut_from_the_tip_of_the_field() -> None:
     assert np.ptp(flat[:, 0]) == pytest.approx(20, abs=1e-3)
 
 
-def test_a_tip_that_was_lost_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.usefixtures("only_samples")
+def test_a_tip_that_was_lost_is_reported() -> None:
     """A wire of half a voxel on a ball: no sample is in it, and no tetrahedra take their place."""
-    monkeypatch.setattr("fracslice.jobs.mesh._Job.split_up", lambda _: None)
     wire = capsule(**{"from": (0, 0, 0), "to": (0, 0, 2), "radius": 0.002})
     lost = make_mesh(scene(union(sphere(radius=0.5), wire), size="100mm"), MeshJob(resolution=64)).report
     assert lost.surface_error_mm.max < 1e-3

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from .folds import absolute, absolute_of, mandalay, polygon
+from .folds import absolute, absolute_of, differences, mandalay, polygon
 from .step_text import CYLINDER, LEFT_OUT, ORDERS, SQUARE, SWAPPED, FormulaStep, UnknownError, known
 
 LOWE = "Lowe 2010, fractalforums.com: Amazing Fractal"
@@ -525,7 +525,8 @@ def abox_mod_13(s: FormulaStep) -> None:
 def fold_box_mod_1(s: FormulaStep) -> None:
     """A Mandelbox whose fold is a difference of two absolute values, each with its own limit."""
     if s.within(""):
-        absolute_fold(s)
+        vectors = [f"transf_{name}_111" for name in ("addition_constant", "addition_constantA", "scale3D")]
+        differences(s, vectors, "transf_function_enabled", "transf_function_enabledA")
     if s.within("A"):
         s.refuse("transf_function_enabled_false")
     if s.within("B"):
@@ -535,19 +536,6 @@ def fold_box_mod_1(s: FormulaStep) -> None:
     s.scale("mandelbox_scale")
     if s.on("mandelbox_main_rotation_enabled") and s.within("C"):
         s.turn("mandelbox_rotation_main")
-
-
-def absolute_fold(s: FormulaStep) -> None:
-    """|x + a| - |x - b| - k x, without the terms whose switches are off."""
-    columns = (
-        s.vector(f"transf_{name}_111") for name in ("addition_constant", "addition_constantA", "scale3D")
-    )
-    parts = []
-    for p, a, b, k in zip("xyz", *columns, strict=True):
-        one = f"absolute({p} + {s.parameter(f'a_{p}', a)})" if s.on(f"transf_function_enabled{p}") else "0"
-        two = f"absolute({p} - {s.parameter(f'b_{p}', b)})" if s.on(f"transf_function_enabledA{p}") else "0"
-        parts.append(f"{one} - {two} - {s.parameter(f'k_{p}', k)} * {p}")
-    s.write("x, y, z = w", f"w = ({', '.join(parts)})")
 
 
 @known(91, "Mandelbox - Menger", "Lowe 2010 and Menger 1926")
@@ -592,6 +580,14 @@ def after_klein(s: FormulaStep) -> None:
     s.add("transf_offsetA_000")
 
 
+def klein_ball(s: FormulaStep, vary: bool) -> None:
+    """A ball, a scale that may vary, and a turn."""
+    own_ball(s)
+    scale_by(s, add_vary(s, "transf_scale_1", "transf_scaleC_1", vary, False))
+    if s.on("transf_rotation2_enabled_false"):
+        s.turn("transf_rotation")
+
+
 @known(221, "Amazing Surf - Klein", "Kali 2011, fractalforums.com", LEFT_OUT)
 def amazing_surf_klein(s: FormulaStep) -> None:
     """An Amazing Surf for some iterations, then a box and a scale."""
@@ -605,12 +601,7 @@ def amazing_surf_klein(s: FormulaStep) -> None:
         z = s.parameter("transf_addition_constant_111_z", s.vector("transf_addition_constant_111")[2])
         s.write(f"w = fold_to(w, (1e6, 1e6, {z}))")
     swap(s, "transf_function_enabledCz", "(x, z, y)")
-    own_ball(s)
-    scale_by(
-        s, add_vary(s, "transf_scale_1", "transf_scaleC_1", s.on("transf_function_enabledK_false"), False)
-    )
-    if s.on("transf_rotation2_enabled_false"):
-        s.turn("transf_rotation")
+    klein_ball(s, s.on("transf_function_enabledK_false"))
     s.add("transf_addition_constantA_000")
 
 
@@ -623,12 +614,7 @@ def abox_klein(s: FormulaStep) -> None:
         return
     s.fold("transf_addition_constant_111")
     swap(s, "transf_function_enabledSw_false", "(y, x, z)")
-    own_ball(s)
-    scale_by(
-        s, add_vary(s, "transf_scale_1", "transf_scaleC_1", s.on("transf_function_enabledK_false"), False)
-    )
-    if s.on("transf_rotation2_enabled_false"):
-        s.turn("transf_rotation")
+    klein_ball(s, s.on("transf_function_enabledK_false"))
     s.add("transf_addition_constantA_000")
 
 
@@ -674,11 +660,7 @@ def amazing_surf_klein_2(s: FormulaStep) -> None:
         s.write("x, y, z = w", "w = (x, z, y)")
     if s.within("H"):
         swap(s, "transf_function_enabledSw_false", "(y, x, z)")
-    own_ball(s)
-    vary = s.on("transf_function_enabledK_false") and s.within("K")
-    scale_by(s, add_vary(s, "transf_scale_1", "transf_scaleC_1", vary, False))
-    if s.on("transf_rotation2_enabled_false"):
-        s.turn("transf_rotation")
+    klein_ball(s, s.on("transf_function_enabledK_false") and s.within("K"))
     if s.within("O"):
         s.add("transf_addition_constantA_000")
 

@@ -23,6 +23,19 @@ def absolute_of(s: FormulaStep, on: Sequence[bool]) -> None:
         s.write("x, y, z = w", f"w = ({', '.join(parts)})")
 
 
+def differences(s: FormulaStep, vectors: Sequence[str], one: str, two: str) -> None:
+    """|x + a| - |x - b| - k x of three vectors by name, without the terms whose switches are off.
+
+    `one`, `two`: beginnings of the names of the switches.
+    """
+    parts = []
+    for p, a, b, k in zip("xyz", *map(s.vector, vectors), strict=True):
+        first = f"absolute({p} + {s.parameter(f'a_{p}', a)})" if s.on(one + p) else "0"
+        second = f"absolute({p} - {s.parameter(f'b_{p}', b)})" if s.on(two + p) else "0"
+        parts.append(f"{first} - {second} - {s.parameter(f'k_{p}', k)} * {p}")
+    s.write("x, y, z = w", f"w = ({', '.join(parts)})")
+
+
 def polygon(s: FormulaStep, axes: str, count: str) -> None:
     """Fold the angle in the plane of two axes into a sector of a polygon."""
     sector(s, axes, s.parameter(count, max(s.values.whole(count), 1)), "0")

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from functools import reduce
 
 import numpy as np
 
+from ...common.arrays import product, rotation
 from ...errors import SceneError
 from ...formulas import Node, get
 from . import appearance
@@ -130,11 +132,8 @@ def placed(node: Node, where: Triple, angles: Triple, factor: float = 1.0) -> No
     """Element scaled, turned about z, then y, then x by the opposite of angles in degrees, and moved."""
     if not any(where) and not any(angles) and factor == 1:
         return node
-    x, y, z = np.radians(angles)
-    about_x = np.array([[1, 0, 0], [0, np.cos(x), np.sin(x)], [0, -np.sin(x), np.cos(x)]])
-    about_y = np.array([[np.cos(y), 0, -np.sin(y)], [0, 1, 0], [np.sin(y), 0, np.cos(y)]])
-    about_z = np.array([[np.cos(z), np.sin(z), 0], [-np.sin(z), np.cos(z), 0], [0, 0, 1]])
-    turned = factor * (about_x @ about_y @ about_z)
+    about = (rotation((*axis, -angle)) for axis, angle in zip(np.eye(3), angles, strict=True))
+    turned = factor * reduce(product, about)
     rows = [round(float(v), 12) for row, moved in zip(turned, where, strict=True) for v in (*row, moved)]
     if not any(angles):
         return get("transform")(node, translate=where, scale=(factor,))

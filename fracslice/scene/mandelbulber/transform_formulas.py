@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from .box_formulas import turned_folds
-from .folds import PI, absolute, absolute_of, diagonals, mandalay, polygon, symmetric
+from .folds import PI, absolute, absolute_of, diagonals, differences, mandalay, polygon, symmetric
 from .sponge_formulas import box_offset
 from .step_text import LEFT_OUT, ORDERS, FormulaStep, known
 
@@ -552,13 +552,8 @@ def folding_planes(s: FormulaStep) -> None:
 @known(1029, "T>Abs Add Multi", MANDELBULBER, LEFT_OUT)
 def abs_add_multi(s: FormulaStep) -> None:
     """|x + a| - |x - b| - k x, without the terms whose switches are off."""
-    columns = (s.vector(f"transf_{name}") for name in ("addition_constant", "offset_000", "scale3D_111"))
-    parts = []
-    for p, a, b, k in zip("xyz", *columns, strict=True):
-        one = f"absolute({p} + {s.parameter(f'a_{p}', a)})" if s.on(f"transf_function_enabledA{p}") else "0"
-        two = f"absolute({p} - {s.parameter(f'b_{p}', b)})" if s.on(f"transf_function_enabled{p}") else "0"
-        parts.append(f"{one} - {two} - {s.parameter(f'k_{p}', k)} * {p}")
-    s.write("x, y, z = w", f"w = ({', '.join(parts)})")
+    vectors = [f"transf_{name}" for name in ("addition_constant", "offset_000", "scale3D_111")]
+    differences(s, vectors, "transf_function_enabledA", "transf_function_enabled")
     s.add("transf_offsetA_000")
 
 
