@@ -104,6 +104,8 @@ def test_a_person_looks_changes_undoes_and_saves(served: Served) -> None:
 def test_every_value_of_a_slider_arrives(served: Served) -> None:
     page = served.page
     row(page, "sphere").click()
+    shown = page.get_by_label("radius 1 as a number")
+    shown.wait_for()  # until then, the controls are those of another element
     thumb = page.locator(".v-slider-thumb").first.bounding_box()
     assert thumb
     x, y = thumb["x"] + thumb["width"] / 2, thumb["y"] + thumb["height"] / 2
@@ -111,7 +113,6 @@ def test_every_value_of_a_slider_arrives(served: Served) -> None:
     page.mouse.down()
     page.mouse.move(x + 40, y, steps=30)
     page.mouse.up()
-    shown = page.get_by_label("radius 1 as a number")
     wait_until(lambda: float(shown.input_value()) > 0.75)  # what it had before is in the text, too
     wait_until(lambda: f'radius="{float(shown.input_value()):.6g}"' in text(page))
     assert float(shown.input_value()) > 0.75
