@@ -13,7 +13,7 @@ from ..rendering.live import CameraInput
 from ..viewer.viewer import MOVES, PACES, Controls
 from .session import Session, jpeg
 
-QUALITIES = 75, 92
+DRAFT, STILL = 75, 92
 """Quality of JPEG frames, of drafts and of pictures at rest."""
 
 CONTROL = {"z": "undo", "y": "redo"}
@@ -150,10 +150,9 @@ class Frames:
         if now == self._sent or self._streamer is None:
             return
         self._sent = now
-        still = shown.samples > 0
         loop = asyncio.get_running_loop()
         pixels = await loop.run_in_executor(None, inside.over, shown, handle)
-        data = await loop.run_in_executor(None, jpeg, pixels, QUALITIES[still])
+        data = await loop.run_in_executor(None, jpeg, pixels, STILL if shown.samples else DRAFT)
         rows, columns, _ = pixels.shape
         meta = {"type": "image/jpeg", "codec": "", "w": columns, "h": rows, "st": 0, "key": "key"}
         self._streamer.push_content(AREA, meta, data)

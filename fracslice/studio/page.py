@@ -9,13 +9,12 @@ import secrets
 import threading
 import time
 import webbrowser
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from typing import Any
 
-from aiohttp import web
 from trame.app import get_server
 from trame.ui.vuetify3 import VAppLayout
-from trame.widgets import client, html, rca
+from trame.widgets import client, html
 from trame.widgets import vuetify3 as v
 
 from ..common.messages import format_count
@@ -23,23 +22,19 @@ from ..errors import FracsliceError, SceneError
 from ..export.images import IMAGES
 from . import panels
 from .film_page import HEIGHT, FilmPanel
-from .frames import AREA, PAD, Frames
+from .frames import DRAFT, PAD, Frames
+from .gate import BAR, INDEX, TREE, Gate
 from .inside_page import InsidePanel
-from .session import FILMS, PRINT_ENDINGS, Session
+from .session import FILMS, PRINT_ENDINGS, Session, jpeg
 from .sheets import SheetPanel, embedded
 from .tree_page import TreePanel
-from .widgets import NARROW, legend, named
-
-INDEX = "/index.html"
+from .widgets import NARROW, legend, named, picture_area, slider
 
 TICK = 1 / 60
 """Interval between two looks at the picture, seconds."""
 
 TELLING = 0.1
 """Interval between two looks at the rest of what is shown, whose texts take a millisecond, seconds."""
-
-PENDING = 2
-"""Frames that a page may have to fetch still before others are left out."""
 
 STYLE = ".v-field-label, .text-medium-emphasis { opacity: 0.85 !important }"
 """Contrast of 4.5 and more, as WCAG 2 wants it, for labels of Vuetify."""
@@ -76,9 +71,6 @@ HELP = (
     ("?", "this help"),
 )
 
-BAR = 48
-"""Height of the bar above the picture, pixels."""
-
 AWAY = 30.0
 """Time after the last tab was closed in which another one finds the same, seconds."""
 
@@ -89,6 +81,7 @@ class Page:
     def __init__(self, studio: Session) -> None:
         self.studio, self.token = studio, secrets.token_urlsafe(24)
         self.server = get_server(f"fracslice-{self.token[:8]}", client_type="vue3")
+        self.gate = Gate(self.server, self.token, lambda: jpeg(studio.shown.pixels, DRAFT))
         self.state, self.ctrl = self.server.state, self.server.controller
         self.frames = Frames(studio, self.act)
         self.state.trame__title = f"{studio.document.path.stem} - fracslice"
@@ -108,6 +101,7 @@ class Page:
                 "share": 0.5,
                 "scenes": studio.scenes,
                 "dark": True,
+                "held": {},
                 "file_name": f"{studio.document.path.stem}.3mf",
                 "resolution": 256,
                 "samples": 64,
@@ -115,15 +109,14 @@ class Page:
                 "job": {},
             }
         )
+        self.state.client_only("held")
         self.tree = TreePanel(self)
         self.sheets = SheetPanel(self)
         self.film = FilmPanel(self)
         self.inside = InsidePanel(self)
         self.refresh()
         self.state.change("xml")(self.write)
-        self._tabs, self._left = 0, 0.0
         self.server.trigger("pad")(self.frames.bend)
-        self.ctrl.on_server_bind.add(self.guard)
         self.ctrl.on_server_ready.add(lambda **_: asyncio.get_running_loop().create_task(self.follow()))
         self.build()
 
@@ -243,14 +236,10 @@ class Page:
                 self._forget()
             await asyncio.sleep(TICK)
 
-    def _count_tabs(self, more: int) -> None:
-        """Note that a tab was opened, or closed, or nothing of either."""
-        self._tabs, self._left = self._tabs + more, time.monotonic()
-
     def _forget(self) -> None:
         """Free what was made to look at, some time after the last tab was closed."""
         inside = self.studio.inside
-        if self._tabs == 0 and inside.has_made and time.monotonic() - self._left > AWAY:
+        if inside.has_made and self.gate.empty_for > AWAY:
             inside.release()
 
     def _say(self) -> None:
@@ -271,38 +260,6 @@ class Page:
         if any(self.state[name] != value for name, value in changes.items()):
             with self.state as state_now:
                 state_now.update(changes)
-
-    def guard(self, server: Any) -> None:
-        """Refuse requests that were made to another host, or by the page of another site; count tabs."""
-
-        @web.middleware
-        async def refuse(
-            request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
-        ) -> web.StreamResponse:
-            port = server.get_port()
-            known = {f"{name}:{port}" for name in ("127.0.0.1", "localhost", "[::1]", server.host)}
-            origin = request.headers.get("Origin")
-            if request.host not in known or (origin and origin.partition("//")[2] not in known):
-                raise web.HTTPForbidden(text="expected the address that fracslice studio has printed")
-            is_tab = request.headers.get("Upgrade", "").lower() == "websocket"
-            self._count_tabs(is_tab)
-            try:
-                return self._remembered(request, await handler(request))
-            finally:
-                self._count_tabs(-is_tab)
-
-        server.app.middlewares.append(refuse)
-
-    def _remembered(self, request: web.Request, response: web.StreamResponse) -> web.StreamResponse:
-        """Have a browser keep the token, which its script takes out of the address, for a reload."""
-        if request.path != INDEX:
-            return response
-        name, given = f"fracslice-{self.server.port}", request.query.get("secret")
-        if given is None and request.cookies.get(name) == self.token:
-            raise web.HTTPFound(f"{INDEX}?secret={self.token}")
-        if given == self.token:
-            response.set_cookie(name, self.token, httponly=True, samesite="Strict")
-        return response
 
     def serve(self, host: str, port: int, browser: bool, say: Callable[[str], None]) -> None:
         """Serve the page until it is interrupted; `say` is given its address."""
@@ -332,7 +289,7 @@ class Page:
 
     def _address(self, host: str) -> str:
         name = "127.0.0.1" if host in ("localhost", "0.0.0.0", "::") else host
-        return f"http://{name}:{self.server.port}{INDEX}?secret={self.token}"
+        return f"http://{name}:{self.server.port}{self.gate.path}"
 
     def _start(self, host: str, port: int, **how: Any) -> Any:
         os.environ["TRAME_ARGS"] = f"--authKey={self.token}"  # instead of this program's own arguments
@@ -351,7 +308,7 @@ class Page:
         """Lay the page out."""
         with VAppLayout(self.server, theme=("dark ? 'dark' : 'light'",)) as layout:
             self._bar()
-            with v.VNavigationDrawer(permanent=True, width=360, raw_attrs=named("Scene")):
+            with v.VNavigationDrawer(permanent=True, width=TREE, raw_attrs=named("Scene")):
                 self.tree.build()
             with v.VNavigationDrawer(
                 v_model=("editing",),
@@ -433,15 +390,7 @@ class Page:
     def _picture(self) -> None:
         below = f"${{filming ? {BAR + HEIGHT} : {BAR}}}px"
         with html.Div(style=(f"`position: relative; background: #181a1d; height: calc(100vh - {below})`",)):
-            area = rca.RemoteControlledArea(
-                name=AREA,
-                display="image",
-                send_mouse_move=True,
-                event_throttle_ms=15,
-                image_style=("{ width: '100%', height: '100%', objectFit: 'contain' }",),
-            )
-            area.set_drop_frames_pending_network_limit(PENDING)
-            area.add_view_handler(self.frames)
+            picture_area(self.server, self.frames)
             with html.Div(
                 classes="d-flex flex-wrap justify-space-between",
                 style="position: absolute; left: 8px; right: 8px; top: 8px; pointer-events: none; gap: 4px",
@@ -485,16 +434,16 @@ class Page:
                         variant="text",
                         raw_attrs=named(f"Cut across {axis}"),
                     )
-                v.VSlider(
+                slider(
+                    self.ctrl,
+                    "'cut'",
+                    "share",
+                    (self.cut, "[axis, $event]"),
+                    named("Place of the cut"),
                     v_if="axis",
-                    model_value=("share",),
-                    update_modelValue=(self.cut, "[axis, $event]"),
                     min=0,
                     max=1,
                     step=0.005,
-                    hide_details=True,
-                    density="compact",
-                    raw_attrs=named("Place of the cut"),
                 )
                 v.VBtn(
                     icon="mdi-gradient-vertical",

@@ -7,9 +7,38 @@ from typing import Any
 
 from trame.widgets import html
 from trame.widgets import vuetify3 as v
+from trame_client.widgets.core import AbstractElement
+from trame_rca import module as rca
 
 NARROW = 900
 """Width of a page below which panels at the right cover the picture, pixels."""
+
+
+PENDING = 2
+"""Frames that a page may have to fetch still before others are left out."""
+
+
+AREA = "remote-controlled-area"
+"""Element of trame-rca that shows frames and tells of mouse and keys."""
+
+
+def picture_area(server: Any, frames: Any) -> None:
+    """Area of a picture; `frames` is what trame-rca calls its adapter.
+
+    The widget of trame-rca itself loads VTK, a third of what the studio imports.
+    """
+    server.enable_module(rca)
+    sizes = "{width: '100%', height: '100%', objectFit: 'contain'}"
+    events = ':send-mouse-move="true"', ':event-throttle-ms="15"'
+    AbstractElement(
+        AREA, raw_attrs=[f'name="{frames.area_name}"', 'display="image"', f':image-style="{sizes}"', *events]
+    )
+
+    def register(**_: Any) -> None:
+        server.protocol_call("trame.rca.drop", frames.area_name, PENDING)
+        server.controller.rc_area_register(frames)
+
+    server.controller.on_server_ready.add(register)
 
 
 def named(label: str, title: str = "") -> list[str]:
@@ -43,6 +72,30 @@ def number_field(value: str, change: tuple[Callable[..., Any], str], label: list
         hide_details=True,
         style="flex: 0 0 84px; margin-top: -12px",
         raw_attrs=[*label, 'step="any"'],
+    )
+
+
+FOLLOWED = 500
+"""Time for which a slider shows where it was moved to, whatever the server says, milliseconds."""
+
+
+def slider(
+    controller: Any, key: str, value: str, change: tuple[Callable[..., Any], str], name: list[str], **how: Any
+) -> None:
+    """Slider of a number, an expression of the page, each of whose steps begins where the last one ended.
+
+    By itself, a slider waits for the server after each of them: keys that are held would be lost. `key` is an
+    expression that no other slider has, `how` more attributes. The page has the state `held`, of each tab.
+    """
+    act, arguments = change
+    held = f"{{of: {key}, value: $event, until: Date.now() + {FOLLOWED}}}"
+    v.VSlider(
+        model_value=(f"held.of === {key} && held.until > Date.now() ? held.value : {value}",),
+        update_modelValue=f"held = {held}; trigger('{controller.trigger_name(act)}', {arguments})",
+        density="compact",
+        hide_details=True,
+        raw_attrs=name,
+        **how,
     )
 
 
