@@ -154,6 +154,8 @@ REST = 0.1
 """Time without a move after which the picture sharpens, seconds."""
 NOISY = 4
 """Samples of each pixel below which a picture is smoothed."""
+SOON = 0.3
+"""Time of a sample of every pixel, seconds, above which a picture at rest gets finer in steps before."""
 SLOWER, STEADY = 1.5, 0.3
 """Ratio of the time of drafts to that, above which they are coarser, and the weight of the last one in it."""
 COARSEST = 8
@@ -344,15 +346,15 @@ class Live:
 
     def _draft(self, drafts: Follower, camera: Camera | None, size: tuple[int, int]) -> None:
         """Show a draft, and choose the spacing of the next one by the time that it took."""
-        coarse = max(size[0] // self._spacing, 1), max(size[1] // self._spacing, 1)
-        renderer = self._made(drafts, camera, coarse)
+        spacing = self._spacing
+        renderer = self._made(drafts, camera, _coarse(size, spacing))
         start = time.monotonic()
         pixels = _developed(renderer, renderer.draft())
         seconds = time.monotonic() - start
         seen = camera or renderer.setup.camera
         self.shown, self._drawn_by = Shown(pixels, 0.0, seen, drafts.distance, self._problem), None
-        self._resolved, self._drawn, self._passes = drafts.root, size, self._sharpened()
-        self._cost += STEADY * (seconds * self._spacing**2 - self._cost)
+        self._resolved, self._drawn, self._passes = drafts.root, size, self._sharpened(spacing)
+        self._cost += STEADY * (seconds * spacing**2 - self._cost)
         if self._cost > SLOWER * WITHIN * self._spacing**2:
             self._spacing = min(self._spacing + 1, COARSEST)
         elif self._cost < WITHIN * (self._spacing - 1) ** 2:
@@ -364,11 +366,16 @@ class Live:
             if next(self._passes, None) is None:
                 self._refining.cancel.wait(POLL)
         except Cancelled:  # ends a generator
-            self._passes = self._sharpened()
+            self._passes = self._sharpened(self._spacing)
             raise
 
-    def _sharpened(self) -> Iterator[Pass]:
-        """Show the picture of every pixel, pass by pass."""
+    def _sharpened(self, spacing: int) -> Iterator[Pass]:
+        """Show the picture of every pixel, pass by pass, and until then finer drafts, if that takes long."""
+        while self._cost > SOON and (spacing := spacing // 2) > 1:
+            renderer = self._made(self._finals, self.camera, _coarse(self._drawn, spacing))
+            done = renderer.draft()
+            self.shown = replace(self.shown, pixels=_developed(renderer, done))
+            yield done
         renderer = self._made(self._finals, self.camera, self._drawn)
         for done in renderer.passes():
             if done.samples < 1:  # in blocks: the smoothed draft is the better picture
@@ -416,6 +423,11 @@ class Live:
         except FracsliceError as error:
             self._problem = str(error)
             self.shown = replace(self.shown, problem=self._problem)
+
+
+def _coarse(size: tuple[int, int], spacing: int) -> tuple[int, int]:
+    """Size of a picture with every so many pixels, in both directions."""
+    return max(size[0] // spacing, 1), max(size[1] // spacing, 1)
 
 
 def _developed(renderer: Renderer, done: Pass) -> np.ndarray:

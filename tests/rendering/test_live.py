@@ -129,6 +129,18 @@ def test_a_draft_is_a_coarser_picture_in_the_same_light(path: Path, monkeypatch:
         live.close()
 
 
+def test_a_slow_picture_gets_finer_in_steps(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    developed, widths = module._developed, list[int]()
+    monkeypatch.setattr(module, "SOON", 0.0)
+    monkeypatch.setattr(module, "_developed", lambda by, done: (widths.append(by.width), developed(by, done))[1])
+    live = Live(SceneFile(path), size=(480, 320), work=Work(threads=1), device="cpu")
+    try:
+        sharp(live, live.first)
+        assert widths[:3] == [120, 240, 480]
+    finally:
+        live.close()
+
+
 def test_a_tap_on_a_key_is_never_lost(live: Live) -> None:
     sharp(live, live.first)
     live.steer(CameraInput(yaw=1))
