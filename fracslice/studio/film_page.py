@@ -9,7 +9,7 @@ from trame.widgets import vuetify3 as v
 
 from ..scene.view import CURVES
 from . import keyframes
-from .widgets import named, named_by, number_field
+from .widgets import named, named_by, number_field, slider
 
 if TYPE_CHECKING:
     from .page import Page
@@ -154,15 +154,15 @@ class FilmPanel:
                     variant="text",
                     raw_attrs=named_by("playing ? 'Pause' : 'Play'"),
                 )
-                v.VSlider(
-                    model_value=("seconds",),
-                    update_modelValue=(self.seek, "[$event]"),
+                slider(
+                    self.page.ctrl,
+                    "'seconds'",
+                    "seconds",
+                    (self.seek, "[$event]"),
+                    named("Time"),
                     min=0,
                     max=("length",),
                     step=0.01,
-                    hide_details=True,
-                    density="compact",
-                    raw_attrs=named("Time"),
                 )
                 html.Span("{{ seconds.toFixed(2) }} s of", classes="text-caption mx-2")
                 number_field(

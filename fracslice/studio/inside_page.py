@@ -12,7 +12,7 @@ from ..errors import FracsliceError
 from ..slicing.printers import PRINTERS
 from .inside import MODES
 from .solid import MEASURES
-from .widgets import NARROW, legend, named, named_by, number_field
+from .widgets import NARROW, legend, named, named_by, number_field, slider
 
 if TYPE_CHECKING:
     from .page import Page
@@ -190,15 +190,15 @@ class InsidePanel:
             )
         self._switch("bed", "Build volume in the picture", "!inside.printer")
         with html.Div(v_if="inside.count", classes="d-flex align-center"):
-            v.VSlider(
-                model_value=("inside.index",),
-                update_modelValue=(self.scrub, "[$event]"),
+            slider(
+                self._page.ctrl,
+                "'layer'",
+                "inside.index",
+                (self.scrub, "[$event]"),
+                named("Layer"),
                 min=0,
                 max=("inside.count - 1",),
                 step=1,
-                hide_details=True,
-                density="compact",
-                raw_attrs=named("Layer"),
             )
             number_field("inside.index", (self.scrub, "[$event.target.value]"), named("Layer as a number"))
         with html.Div(v_if="inside.count", classes="text-caption"):
@@ -274,16 +274,16 @@ class InsidePanel:
     def _print(self) -> None:
         with html.Div(v_for="e in edits", key="e.name", classes="mb-1 d-flex align-center"):
             html.Span("{{ e.name }}", title=("e.doc",), classes="text-body-2", style="width: 72px")
-            v.VSlider(
+            slider(
+                self._page.ctrl,
+                "e.name",
+                "e.value",
+                (self.edit, "[e.name, $event ? $event + 'mm' : null]"),
+                named_by("e.name"),
                 v_if="!e.choices",
-                model_value=("e.value",),
-                update_modelValue=(self.edit, "[e.name, $event ? $event + 'mm' : null]"),
                 min=0,
                 max=("e.most",),
                 step=("e.step",),
-                hide_details=True,
-                density="compact",
-                raw_attrs=named_by("e.name"),
             )
             v.VTextField(
                 v_if="!e.choices",

@@ -13,7 +13,7 @@ from trame.widgets import vuetify3 as v
 from ..errors import FracsliceError
 from ..formulas import Node
 from .session import jpeg
-from .widgets import named, named_by
+from .widgets import named, named_by, slider
 
 if TYPE_CHECKING:
     from .page import Page
@@ -147,15 +147,17 @@ class SheetPanel:
         """Lay what is beside the picture out."""
         with html.Div(classes="pa-2"):
             v.VBtn("Add this one", click=self.bookmark, variant="text")
-            v.VSlider(
+            slider(
+                self.page.ctrl,
+                "'mix'",
+                "mixed",
+                (self.set_mix, "[$event]"),
+                [],
                 v_if="mix",
-                model_value=("mixed",),
-                update_modelValue=(self.set_mix, "[$event]"),
                 min=0,
                 max=1,
                 step=0.01,
                 label=("'to ' + mix",),
-                hide_details=True,
             )
             with v.VCard(v_for="b in bookmarks", key="b.name", variant="tonal", classes="ma-1"):
                 html.Img(

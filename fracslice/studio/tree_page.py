@@ -8,7 +8,7 @@ from trame.widgets import html
 from trame.widgets import vuetify3 as v
 
 from . import panels
-from .widgets import named, named_by, number_field
+from .widgets import named, named_by, number_field, slider
 
 if TYPE_CHECKING:
     from .page import Page
@@ -172,15 +172,15 @@ class TreePanel:
                     html.Template(v_if="c.kind == 'slider'"),
                     html.Div(v_for="(value, i) in c.values", key="i", classes="d-flex align-center"),
                 ):
-                    v.VSlider(
-                        model_value=("value",),
-                        update_modelValue=(self.set_number, "[c.name, i, $event]"),
+                    slider(
+                        self.page.ctrl,
+                        "at.join('.') + c.name + i",
+                        "value",
+                        (self.set_number, "[c.name, i, $event]"),
+                        named_by("c.name + ' ' + (i + 1)"),
                         min=("c.least",),
                         max=("c.most",),
                         step=("c.step",),
-                        density="compact",
-                        hide_details=True,
-                        raw_attrs=named_by("c.name + ' ' + (i + 1)"),
                     )
                     number_field(
                         "value",

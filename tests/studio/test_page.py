@@ -118,6 +118,20 @@ def test_every_value_of_a_slider_arrives(served: Served) -> None:
     assert float(shown.input_value()) > 0.75
 
 
+def test_no_step_of_a_key_that_is_held_is_lost(served: Served) -> None:
+    page = served.page
+    row(page, "sphere").click()
+    shown = page.get_by_label("radius 1 as a number")
+    shown.wait_for()
+    thumb = page.locator(".v-slider-thumb").first
+    thumb.press("ArrowRight")
+    wait_until(lambda: float(shown.input_value()) > 0.5)
+    step = float(shown.input_value()) - 0.5
+    for _ in range(40):
+        thumb.press("ArrowRight")
+    wait_until(lambda: f'radius="{0.5 + 41 * step:.6g}"' in text(page))
+
+
 def test_a_wrong_text_is_said_at_its_line_while_the_picture_stays(served: Served) -> None:
     page, editor = served.page, served.page.get_by_label("Text of the scene")
     page.get_by_label("Text", exact=True).click()
