@@ -50,6 +50,7 @@ $(VENV)/.docs: docs/requirements.lock | $(VENV)/.locked
 	$(BIN)/python -m pip install --quiet -r docs/requirements.lock
 	touch $@
 
+nightly: PACKAGES += $(if $(BROWSER),firefox-esr)
 nightly: setup
 	$(BIN)/python -m pytest -n 2 -m nightly
 	$(BIN)/python -m tests.benchmarks stability.random_scenes

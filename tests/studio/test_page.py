@@ -318,6 +318,37 @@ def test_a_gamepad_flies(served: Served) -> None:
     page.evaluate("navigator.getGamepads = () => []")
 
 
+def press_until(page: playwright.Page, key: str, what: str) -> None:
+    """Press a key until what has the focus is so; an expression of it, `e`."""
+    for _ in range(100):
+        page.keyboard.press(key)
+        if page.evaluate(f"(e => {what})(document.activeElement)"):
+            return
+    pytest.fail(f"{key} leads to nothing with {what}")
+
+
+def test_the_keyboard_alone_suffices(served: Served) -> None:
+    page = served.page
+    press_until(page, "Tab", "e.closest('[aria-label=Elements]')")
+    press_until(page, "ArrowDown", "e.textContent.includes('sphere')")
+    page.keyboard.press("Enter")
+    page.get_by_label("radius 1 as a number").wait_for()
+    press_until(page, "Tab", "e.role === 'slider'")
+    page.keyboard.press("ArrowRight")
+    wait_until(lambda: 'radius="0.5"' not in text(page))
+    before = picture(page)
+    press_until(page, "Tab", "e.querySelector('img') && e.tabIndex === 0")
+    page.keyboard.down("w")
+    wait_until(lambda: page.locator(".v-main img").first.screenshot() != before)
+    page.keyboard.up("w")
+    page.keyboard.press("Control+z")
+    wait_until(lambda: text(page) == SCENE)
+    page.keyboard.press("?")
+    page.get_by_text("turn around what is under the mouse").wait_for()
+    page.keyboard.press("Escape")
+    page.get_by_text("turn around what is under the mouse").wait_for(state="hidden")
+
+
 def test_the_page_can_be_used_by_those_who_do_not_see_it_well(served: Served) -> None:
     """Labels, contrast, landmarks, by the rules of axe-core."""
     page = served.page
