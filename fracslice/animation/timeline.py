@@ -2,13 +2,14 @@
 to the surface.
 
 Smooth curves are monotone cubics (Fritsch and Carlson 1980; slopes of Fritsch and Butland 1984), which do not
-overshoot. Rotations are cubic splines of rotation vectors (Park and Ravani 1997). A path is a cubic spline
-through the points, over their centripetal parameters (Lee 1989), travelled by arc length.
+overshoot, except near a slope that a track gives. Rotations are cubic splines of rotation vectors (Park and
+Ravani 1997). A path is a cubic spline through the points, over their centripetal parameters (Lee 1989),
+travelled by arc length.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -17,6 +18,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.messages import format_count
 from ..common.parameters import Number, Vector
 from ..errors import SceneError
 from ..fields.depth import resolve_depths
@@ -73,6 +75,17 @@ def smooth(times: Values, values: Values) -> Curve:
     from scipy.interpolate import PchipInterpolator
 
     curve: Curve = PchipInterpolator(times, values)
+    return curve
+
+
+def bent(times: Values, values: Values, slopes: Mapping[int, Values]) -> Curve:
+    """Return the smooth curve with other slopes at some keyframes, by their numbers; as in `smooth`."""
+    from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
+
+    own = PchipInterpolator(times, values).derivative()(times)
+    for number, slope in slopes.items():
+        own[number] = slope
+    curve: Curve = CubicHermiteSpline(times, values, own)
     return curve
 
 
@@ -225,14 +238,17 @@ class Timeline:
             values = [kind.read(text) for _, text in track.keys]
         except ValueError as error:
             raise track.fail(f"keys of {track.of}: expected {error}") from None
-        name = track.curve if track.curve != "auto" else _automatic(track.of, kind)
+        name = _curve_name(track, kind)
         if name == "step" or len(times) == 1:
             return lambda time: values[max(int(np.searchsorted(times, time, side="right")) - 1, 0)]
         _check_curve(track, name, kind, values)
         table = np.array(values, float).reshape(len(times), -1)
         origin = self._target if name == "zoom" else lambda _: np.zeros(table.shape[1])
         try:
-            curve = CURVES[name](np.array(times), table - [origin(time) for time in times])
+            if track.slopes:
+                curve = bent(np.array(times), table, _slopes(track, name, table))
+            else:
+                curve = CURVES[name](np.array(times), table - [origin(time) for time in times])
         except ValueError as error:
             raise track.fail(f"keys of {track.of}: expected {error}") from None
 
@@ -272,10 +288,60 @@ class Timeline:
         SceneError
             If the attribute has no track.
         """
+        track, curve = self._track(of)
+        return str(kind_of(self.scene, of, track.fail).text(curve(seconds)))
+
+    def numbers(self, of: str, seconds: float) -> list[float]:
+        """Return the numbers of an attribute that moves; none of one that is no number.
+
+        Parameters
+        ----------
+        of : str
+            Attribute of a track.
+        seconds : float
+            Time, seconds.
+
+        Returns
+        -------
+        list of float
+            Its value, or its coordinates.
+
+        Raises
+        ------
+        SceneError
+            If the attribute has no track.
+        """
+        value = self._track(of)[1](seconds)
+        try:
+            return [float(number) for number in np.atleast_1d(value)]
+        except ValueError:
+            return []
+
+    def curve_of(self, of: str) -> str:
+        """Return the name of the curve of an attribute that moves, of `CURVES`, or step.
+
+        Parameters
+        ----------
+        of : str
+            Attribute of a track.
+
+        Returns
+        -------
+        str
+            The name.
+
+        Raises
+        ------
+        SceneError
+            If the attribute has no track.
+        """
+        track = self._track(of)[0]
+        return _curve_name(track, kind_of(self.scene, of, track.fail))
+
+    def _track(self, of: str) -> tuple[Track, Callable[[float], Any]]:
         if of not in self._tracks:
             raise SceneError(f"of={of!r}: expected the attribute of a track")
-        track, curve = self._tracks[of]
-        return str(kind_of(self.scene, of, track.fail).text(curve(seconds)))
+        return self._tracks[of]
 
     def at(self, seconds: float) -> Scene:
         """Return the scene at a time, without its animation.
@@ -321,12 +387,32 @@ class Timeline:
         return replace(scene, view=replace(scene.view, camera=seen))
 
 
-def _automatic(of: str, kind: Any) -> str:
-    """Curve of an attribute whose track leaves the choice."""
+def _curve_name(track: Track, kind: Any) -> str:
+    """Curve of a track; one that suits the attribute where the track leaves the choice."""
+    if track.curve != "auto":
+        return track.curve
     if not isinstance(kind, (Number, Vector)) or getattr(kind, "whole", False):
         return "step"
-    element, _, attribute = of.rpartition(".")
+    element, _, attribute = track.of.rpartition(".")
     return AUTOMATIC.get(f"{element.partition('[')[0]}.{attribute}", "smooth")
+
+
+def _slopes(track: Track, curve: str, values: Values) -> dict[int, Values]:
+    """Slopes that a track gives, by the numbers of their keyframes."""
+    if curve != "smooth":
+        raise track.fail(f"slopes: expected curve='smooth', and it is {curve!r}")
+    numbers = {time: number for number, (time, _) in enumerate(track.keys)}
+    slopes: dict[int, Values] = {}
+    for time, text in track.slopes or ():
+        try:
+            slope = np.array([float(word) for word in text.split()])
+        except ValueError:
+            slope = np.empty(0)
+        if time not in numbers or slope.shape != values.shape[1:] or not np.isfinite(slope).all():
+            expected = f"{format_count(values.shape[1], 'number')} at the time of a keyframe"
+            raise track.fail(f"slopes={text!r} at {time:g}s: expected {expected}")
+        slopes[numbers[time]] = slope
+    return slopes
 
 
 def _check_curve(track: Track, name: str, kind: Any, values: list[Any]) -> None:

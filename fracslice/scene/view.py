@@ -564,3 +564,6 @@ class Track(Part):
     ease: str = attribute(
         Choice, "none", "ends at which the motion begins or ends at rest", ("none", "in", "out", "both")
     )
+    slopes: Keyframes | None = attribute(
+        Keys, None, "slopes of a smooth curve at some of its keyframes, per second, such as 2.5s: 0.4"
+    )

@@ -9,12 +9,13 @@ from trame.widgets import vuetify3 as v
 
 from ..scene.view import CURVES
 from . import keyframes
+from .curve_page import CurvePanel
 from .widgets import named, named_by, number_field, slider
 
 if TYPE_CHECKING:
     from .page import Page
 
-HEIGHT = 168
+HEIGHT = 188
 """Of the panel, pixels."""
 
 
@@ -40,6 +41,7 @@ class FilmPanel:
                 "curves": list(CURVES),
             }
         )
+        self._curve = CurvePanel(page)
 
     def refresh(self) -> None:
         """Bring what is shown of the film up to date."""
@@ -48,6 +50,7 @@ class FilmPanel:
         state.length = keyframes.duration(document) or keyframes.LENGTH
         if not any(self.state.key.get("of") == row["of"] for row in state.tracks):
             state.key = {}
+        self._curve.refresh()
 
     def follow(self) -> None:
         """Show where the film is, while it plays."""
@@ -177,38 +180,52 @@ class FilmPanel:
                     size="small",
                     variant="text",
                 )
-            with html.Div(v_if="key.of", classes="d-flex align-center text-caption"):
-                html.Span("{{ key.of }} at", classes="mr-2")
-                number_field(
-                    "key.seconds", (self.move_key, "[$event.target.value]"), named("Time of the keyframe")
-                )
-                v.VBtn("Remove key", click=self.remove_key, size="small", variant="text")
-            with html.Div(
-                v_for="row in tracks", key="row.of", classes="d-flex align-center", style="height: 28px"
-            ):
-                html.Span("{{ row.of }}", classes="text-caption", style="width: 150px; overflow: hidden")
-                v.VSelect(
-                    model_value=("row.curve",),
-                    items=("curves",),
-                    update_modelValue=(self.set_curve, "[row.of, $event]"),
+            with html.Div(v_if="graph.of"):
+                self._curve.build()
+            with html.Div(v_else=True):
+                self._tracks()
+
+    def _tracks(self) -> None:
+        with html.Div(v_if="key.of", classes="d-flex align-center text-caption"):
+            html.Span("{{ key.of }} at", classes="mr-2")
+            number_field(
+                "key.seconds", (self.move_key, "[$event.target.value]"), named("Time of the keyframe")
+            )
+            v.VBtn("Remove key", click=self.remove_key, size="small", variant="text")
+        with html.Div(
+            v_for="row in tracks", key="row.of", classes="d-flex align-center", style="height: 28px"
+        ):
+            v.VBtn(
+                "{{ row.of }}",
+                click=(self._curve.toggle, "[row.of]"),
+                size="small",
+                variant="text",
+                classes="text-none justify-start px-0",
+                style="width: 150px; overflow: hidden",
+                raw_attrs=named_by("'curve of values of ' + row.of"),
+            )
+            v.VSelect(
+                model_value=("row.curve",),
+                items=("curves",),
+                update_modelValue=(self.set_curve, "[row.of, $event]"),
+                density="compact",
+                variant="plain",
+                hide_details=True,
+                style="max-width: 104px; margin-top: -12px",
+                raw_attrs=named_by("'curve of ' + row.of"),
+            )
+            with html.Div(style="position: relative; flex: 1; height: 100%; margin: 0 12px"):
+                html.Div(style="position: absolute; top: 13px; width: 100%; border-top: 1px solid #8888")
+                html.Div(style=(at("seconds", "top: 2px; height: 24px; border-left: 1px solid #e55"),))
+                v.VBtn(
+                    v_for="time in row.times",
+                    key="time",
+                    icon="mdi-rhombus",
+                    size="x-small",
+                    variant="text",
                     density="compact",
-                    variant="plain",
-                    hide_details=True,
-                    style="max-width: 104px; margin-top: -12px",
-                    raw_attrs=named_by("'curve of ' + row.of"),
+                    color=("key.of == row.of && key.seconds == time ? 'primary' : undefined",),
+                    click=(self.choose, "[row.of, time]"),
+                    style=(at("time", "top: 4px; margin-left: -10px"),),
+                    raw_attrs=named_by("row.of + ' at ' + time + ' s'"),
                 )
-                with html.Div(style="position: relative; flex: 1; height: 100%; margin: 0 12px"):
-                    html.Div(style="position: absolute; top: 13px; width: 100%; border-top: 1px solid #8888")
-                    html.Div(style=(at("seconds", "top: 2px; height: 24px; border-left: 1px solid #e55"),))
-                    v.VBtn(
-                        v_for="time in row.times",
-                        key="time",
-                        icon="mdi-rhombus",
-                        size="x-small",
-                        variant="text",
-                        density="compact",
-                        color=("key.of == row.of && key.seconds == time ? 'primary' : undefined",),
-                        click=(self.choose, "[row.of, time]"),
-                        style=(at("time", "top: 4px; margin-left: -10px"),),
-                        raw_attrs=named_by("row.of + ' at ' + time + ' s'"),
-                    )

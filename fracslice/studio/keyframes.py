@@ -36,10 +36,10 @@ def track_of(document: Document, of: str) -> Tag | None:
     return next((tag for tag in _parts(document, Track.element) if tag.attributes.get("of") == of), None)
 
 
-def keys_of(track: Tag | None) -> Keyframes:
-    """Keyframes of a track; none of one that is not valid."""
+def keys_of(track: Tag | None, attribute: str = "keys") -> Keyframes:
+    """Keyframes of a track, or its slopes; none of what is not valid."""
     try:
-        return KEYS.read(track.attributes["keys"]) if track else ()
+        return KEYS.read(track.attributes[attribute]) if track else ()
     except (KeyError, ValueError):
         return ()
 
@@ -80,17 +80,20 @@ def set_keys(document: Document, seconds: float, values: Mapping[str, str]) -> N
             begin(document)
         for of, text in values.items():
             track = track_of(document, of)
-            others = [key for key in keys_of(track) if abs(key[0] - seconds) > SAME]
+            others = [key for key in keys_of(track) if not _same(key[0], seconds)]
             _write_keys(document, of, track, sorted([*others, (seconds, text)]))
 
 
 def remove_key(document: Document, of: str, seconds: float) -> None:
     """Remove a keyframe; with the last one, its track."""
     track = _existing(document, of)
-    left = [key for key in keys_of(track) if abs(key[0] - seconds) > SAME]
+    left, slopes = (
+        [k for k in keys_of(track, name) if not _same(k[0], seconds)] for name in ("keys", "slopes")
+    )
     with document.one_edit():
         if left:
-            _write_keys(document, of, track, left)
+            _write_slopes(document, track, slopes)
+            _write_keys(document, of, _existing(document, of), left)
         else:
             document.remove(track.place)
 
@@ -98,17 +101,57 @@ def remove_key(document: Document, of: str, seconds: float) -> None:
 def move_key(document: Document, of: str, seconds: float, to: float) -> None:
     """Move a keyframe to another time."""
     track, to = _existing(document, of), round(max(to, 0.0), 3)
-    moved = [(to if abs(time - seconds) <= SAME else time, text) for time, text in keys_of(track)]
+    moved, slopes = (
+        sorted((to if _same(time, seconds) else time, text) for time, text in keys_of(track, name))
+        for name in ("keys", "slopes")
+    )
     if len({time for time, _ in moved}) < len(moved):
         raise SceneError(f"{of}: has a keyframe at {to:g}s already")
     with document.one_edit():
-        _write_keys(document, of, track, sorted(moved))
+        _write_slopes(document, track, slopes)
+        _write_keys(document, of, _existing(document, of), moved)
+
+
+def set_slope(document: Document, of: str, seconds: float, slope: Sequence[float] | None) -> None:
+    """Give the curve a slope at a keyframe, per second, of each number; None has it chosen again."""
+    track = _existing(document, of)
+    others = [key for key in keys_of(track, "slopes") if not _same(key[0], seconds)]
+    own = [] if slope is None else [(seconds, _words(slope))]
+    with document.one_edit():
+        _write_slopes(document, track, sorted([*others, *own]))
+
+
+def set_number(document: Document, of: str, seconds: float, part: int, value: float) -> None:
+    """Change one of the numbers of a keyframe."""
+    track = _existing(document, of)
+    keys = [(time, text.split()) for time, text in keys_of(track)]
+    for when, words in keys:
+        if _same(when, seconds):
+            words[part] = f"{value:.6g}"
+    with document.one_edit():
+        _write_keys(document, of, track, [(time, " ".join(words)) for time, words in keys])
+
+
+def _same(time: float, other: float) -> bool:
+    return abs(time - other) <= SAME
+
+
+def _words(numbers: Sequence[float]) -> str:
+    return " ".join(f"{number:.6g}" for number in numbers)
+
+
+def _write_slopes(document: Document, track: Tag, slopes: Sequence[tuple[float, str]]) -> None:
+    text = KEYS.text(KEYS.check(slopes)) if slopes else None
+    if text != track.attributes.get("slopes"):
+        document.set_value(track.place, "slopes", text)
 
 
 def set_curve(document: Document, of: str, curve: str) -> None:
-    """Choose the curve between the keyframes of an attribute."""
+    """Choose the curve between the keyframes of an attribute; only a smooth one has slopes."""
     track = _existing(document, of)
     with document.one_edit():
+        if curve not in ("auto", "smooth"):
+            _write_slopes(document, track, ())
         document.set_value(track.place, "curve", None if curve == "auto" else curve)
 
 

@@ -53,6 +53,19 @@ def test_tracks_move_attributes_of_any_element() -> None:
     assert timeline.at(-1) == timeline.at(0) and timeline.at(99) == timeline.at(4)
 
 
+def test_a_track_may_give_slopes_of_its_curve() -> None:
+    of, near = "light.strength", 1e-6
+    keys = f'of="{of}" keys="0s: 1; 2s: 2; 4s: 1"'
+    plain, bent = Timeline(film(keys)), Timeline(film(f'{keys} slopes="2s: 0.5"'))
+    ((before,), (after,)) = bent.numbers(of, 2 - near), bent.numbers(of, 2 + near)
+    assert (after - before) / (2 * near) == pytest.approx(0.5, abs=1e-5)
+    # in the middle of a cubic, by its values and slopes; the first slope stays that of the plain curve
+    first = (plain.numbers(of, near)[0] - 1) / near
+    assert bent.numbers(of, 1.0) == pytest.approx([1.5 + 2 * (first - 0.5) / 8], abs=1e-5)
+    assert bent.at(0.0) == plain.at(0.0) and bent.at(4.0) == plain.at(4.0)
+    assert 'slopes="2s: 0.5"' in to_xml(bent.scene)
+
+
 def test_a_scene_with_an_animation_is_written_and_read_and_otherwise_ignored() -> None:
     scene = film(
         'of="julia.c" keys="0s: 0 0 0 0; 2.5s: 1 0 0 0" ease="both"', animation='fps="12" shutter="0.5"'
@@ -103,6 +116,18 @@ def test_an_eye_keeps_its_clearance_and_moves_without_jumps() -> None:
         ('of="menger.level" keys="0: 1; 2: 3" curve="smooth"', r"curve='smooth': expected step"),
         ('of="camera.fov" keys="0: 40; 2: 50" curve="zoom"', "curve='zoom': expected of='camera.eye'"),
         ('of="camera.eye" keys="0: 4 0 0; 2: 5 0 0" curve="rotation"', "expected keys of 4 numbers each"),
+        (
+            'of="camera.fov" keys="0: 40; 2: 50" slopes="1: 3"',
+            r"slopes='3' at 1s: expected 1 number at",
+        ),
+        (
+            'of="camera.fov" keys="0: 40; 2: 50" slopes="2: a"',
+            r"slopes='a' at 2s: expected 1 number at",
+        ),
+        (
+            'of="light.strength" keys="0: 1; 2: 5" slopes="2: 1" curve="log"',
+            r"slopes: expected curve='smooth'",
+        ),
         ('of="camera.eye" keys="0: 0 0 0; 2: 1 0 0" curve="zoom"', r"expected points other than the target"),
         (
             'of="camera.fov" keys="0: 40; 2: 4"/><track of="camera.fov" keys="0: 4"',

@@ -132,7 +132,9 @@ def test_a_draft_is_a_coarser_picture_in_the_same_light(path: Path, monkeypatch:
 def test_a_slow_picture_gets_finer_in_steps(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     developed, widths = module._developed, list[int]()
     monkeypatch.setattr(module, "SOON", 0.0)
-    monkeypatch.setattr(module, "_developed", lambda by, done: (widths.append(by.width), developed(by, done))[1])
+    monkeypatch.setattr(
+        module, "_developed", lambda by, done: (widths.append(by.width), developed(by, done))[1]
+    )
     live = Live(SceneFile(path), size=(480, 320), work=Work(threads=1), device="cpu")
     try:
         sharp(live, live.first)

@@ -8,9 +8,11 @@ from types import SimpleNamespace
 
 import pytest
 
+from fracslice.animation import Timeline
 from fracslice.errors import SceneError
-from fracslice.scene.view import Camera
+from fracslice.scene.view import Camera, Keyframes
 from fracslice.studio import keyframes
+from fracslice.studio.curve_page import graph_of
 from fracslice.studio.document import Document
 from fracslice.studio.session import Session
 from tests.waiting import wait_until
@@ -69,6 +71,46 @@ def test_keys_are_replaced_moved_and_removed(document: Document) -> None:
     assert keyframes.rows(document) == []
     with pytest.raises(SceneError, match="no keyframes"):
         keyframes.remove_key(document, of, 0.0)
+
+
+def test_slopes_move_and_go_with_their_keys(document: Document) -> None:
+    of = "sphere[1].radius"
+
+    def slopes() -> Keyframes:
+        return keyframes.keys_of(keyframes.track_of(document, of), "slopes")
+
+    for seconds, value in (0.0, "5"), (1.0, "6"), (2.0, "5"):
+        keyframes.set_keys(document, seconds, {of: value})
+    keyframes.set_slope(document, of, 1.0, [2.5])
+    keyframes.set_slope(document, of, 0.0, [1.0])
+    keyframes.move_key(document, of, 1.0, 1.5)
+    assert slopes() == ((0.0, "1"), (1.5, "2.5")) and not document.problem
+    keyframes.set_number(document, of, 1.5, 0, 7.25)
+    assert keyframes.keys_of(keyframes.track_of(document, of))[1] == (1.5, "7.25")
+    keyframes.remove_key(document, of, 1.5)
+    keyframes.set_slope(document, of, 0.0, None)
+    assert slopes() == () and not document.problem
+    keyframes.set_slope(document, of, 0.0, [1.0])
+    keyframes.set_curve(document, of, "linear")
+    assert slopes() == () and not document.problem
+
+
+def test_a_curve_is_drawn_with_its_dots_and_handles(document: Document) -> None:
+    of = "sphere[1].radius"
+    for seconds, value in (0.0, "5"), (2.0, "7"), (4.0, "5"):
+        keyframes.set_keys(document, seconds, {of: value})
+    keyframes.set_slope(document, of, 2.0, [1.0])
+    graph = graph_of(Timeline(document.scene), of, (5.0, 9.0))
+    first, middle, last = graph["dots"]
+    assert [dot["at"] for dot in graph["dots"]] == [(0, 100), (50, 50), (100, 100)]
+    assert middle["slope"] == pytest.approx(1.0, abs=1e-3) and first["value"] == last["value"] == 5.0
+    (before, low), (after, high) = middle["handles"]
+    arm = 4 * (after - 50) / 100
+    assert before == pytest.approx(100 - after) and arm > 0
+    assert (low, high) == pytest.approx((50 + 25 * arm, 50 - 25 * arm), abs=0.01)
+    assert graph["lines"][0].startswith("0.00,100.00 ") and graph["lines"][0].endswith(" 100.00,100.00")
+    keyframes.set_curve(document, of, "linear")
+    assert graph_of(Timeline(document.scene), of)["dots"][1]["handles"] == []
 
 
 def test_views_are_keys_of_a_camera_that_the_scene_is_given(document: Document) -> None:
