@@ -480,7 +480,8 @@ class Page:
             v.VCard(title="Make a file", classes="pa-3"),
         ):
             v.VTextField(
-                v_model=("file_name",), label="File: .stl .3mf .ply .obj .glb .png .jpg .mp4 .goo .sl1 ..."
+                v_model=("file_name",),
+                label="File: .stl .3mf .obj .glb .png .jpg .mp4 .goo .sl1 .ipynb ...",
             )
             v.VTextField(v_model=("resolution",), type="number", label="Voxels along the longest side")
             v.VTextField(v_model=("samples",), type="number", label="Samples a pixel, of a picture or a film")

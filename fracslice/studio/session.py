@@ -22,6 +22,7 @@ from ..common.parameters import AUTO, Number
 from ..errors import Cancelled, FracsliceError, SceneError
 from ..export.images import IMAGES
 from ..export.layers import ENDINGS as LAYER_ENDINGS
+from ..export.notebooks import NOTEBOOK, write_notebook
 from ..fields.box import Box
 from ..fields.registry import Fixed
 from ..formats import ENDINGS, SOLIDS
@@ -31,7 +32,7 @@ from ..rendering import Renderer
 from ..rendering.live import Live, Shown
 from ..scene import library
 from ..scene.layout import SOLID, varied
-from ..scene.model import Scene
+from ..scene.model import Scene, to_xml
 from ..scene.view import Camera, View
 from ..work import Work
 from . import keyframes
@@ -496,9 +497,9 @@ class Session:
         return path
 
     def start(self, name: str, options: dict[str, Any]) -> None:
-        """Begin to make a file by its extension: a picture, a film, a mesh or layers; one at a time."""
+        """Begin to make a file by its extension, one at a time: a picture, film, mesh, layers or notebook."""
         path = self._inside(name)
-        known = *IMAGES, *ENDINGS, *FILMS, *PRINT_ENDINGS
+        known = *IMAGES, *ENDINGS, *FILMS, *PRINT_ENDINGS, NOTEBOOK
         if path.suffix.lower() not in known:
             raise SceneError(f"{name}: expected a file of {', '.join(known)}")
         if path.suffix.lower() in PRINT_ENDINGS:
@@ -528,7 +529,7 @@ class Session:
             job.problem = "there is not enough memory for it"
 
     def _file(self, path: Path, scene: Scene, camera: Camera, options: dict[str, Any], work: Work) -> str:
-        """Make a picture, a film, a mesh or layers."""
+        """Make a picture, a film, a mesh, layers or a notebook."""
         from ..api.calls import make_mesh, render
 
         ending = path.suffix.lower()
@@ -539,6 +540,9 @@ class Session:
             return f"{path.name} is written"
         if ending in PRINT_ENDINGS:
             return self.inside.write_layers(path, scene, work)
+        if ending == NOTEBOOK:
+            write_notebook(path, to_xml(scene), options["resolution"])
+            return f"{path.name} is written"
         if ending in FILMS:
             return self._film_of(path, scene, options["samples"], work)
         report = make_mesh(scene, work=work, path=path, **options).report
@@ -563,8 +567,10 @@ def _unseen(scene: Scene) -> tuple[Node, View]:
 
 
 def command(target: Path, name: str, options: dict[str, Any]) -> str:
-    """Command line that makes the same file."""
+    """Command line that makes the same file; none makes notebooks."""
     ending = Path(name).suffix.lower()
+    if ending == NOTEBOOK:
+        return ""
     verbs = {"render": IMAGES, "animate": FILMS, "slice": PRINT_ENDINGS}
     verb = next((verb for verb, endings in verbs.items() if ending in endings), "mesh")
     given = "".join(f" --{option} {value}" for option, value in options.items())

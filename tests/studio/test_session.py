@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -93,6 +94,19 @@ def test_files_are_made_in_the_folder_alone(studio: Session, tmp_path: Path) -> 
     for name in ("../ball.stl", "/ball.stl", "ball.txt"):
         with pytest.raises(SceneError, match=r"ball\.(stl|txt)"):
             studio.start(name, {})
+
+
+def test_a_notebook_makes_the_mesh_of_the_scene(
+    studio: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    studio.start("ball.ipynb", {"resolution": 24.0})
+    wait_until(lambda: studio.job is not None and studio.job.is_done)
+    assert studio.job and (studio.job.result, studio.job.command) == ("ball.ipynb is written", "")
+    code = [c["source"] for c in json.loads((tmp_path / "ball.ipynb").read_text())["cells"][1:]]
+    assert "studio = Studio(scene)" in code[1]
+    exec(f"{code[0]}\n{code[2]}", {})
+    assert Mesh.load(tmp_path / "ball.3mf").volume == pytest.approx(500 / 3 * np.pi, rel=0.02)
 
 
 def test_a_job_is_cancelled_without_a_file(studio: Session, tmp_path: Path) -> None:
