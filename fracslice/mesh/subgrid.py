@@ -61,7 +61,7 @@ round part, normals differ by half as much after each.
 """
 
 
-MOST_BENT = 1 << 17
+MOST_BENT = 1 << 15
 """Vertices from which on edges around bends are not split: each round doubles those around wires."""
 
 
