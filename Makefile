@@ -29,7 +29,9 @@ demo: setup
 	$(BIN)/fracslice mesh scenes/mandelbulb.xml -o out/mandelbulb.stl --quiet
 	@ls -l out/mandelbulb.*
 
-test: lint native-tests suite
+test: setup
+	$(MAKE) --jobs 2 --no-print-directory lint native-tests
+	$(MAKE) --no-print-directory suite
 
 suite: setup
 	$(BIN)/python -m tests.structure

@@ -25,6 +25,8 @@ HERE = [name for name in NAMES if not name.startswith("gpu.")]
 LONG = {
     "jobs.cluster",
     "jobs.workers",
+    "printing.islands",
+    "printing.orientations",
     "stability.random_hybrids",
     "stability.random_scenes",
     "frame.convergence",

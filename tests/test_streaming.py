@@ -27,6 +27,7 @@ from fracslice.jobs import mesh_steps
 from fracslice.mesh.models import read_mesh
 from fracslice.scene import Print, scene
 from fracslice.work import Work
+from tests.examples import stamped
 
 pytestmark = pytest.mark.once
 
@@ -76,7 +77,9 @@ def pieces(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mesh_steps, "BRICKS", 20)
 
 
-@pytest.mark.parametrize(("name", "job"), CASES)
+@pytest.mark.parametrize(
+    ("name", "job"), stamped(CASES, [("touching", "plain"), ("sharp", "plain"), ("nested", "dust")])
+)
 def test_streamed_is_what_would_have_been_made_in_memory(
     name: str, job: str, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:

@@ -51,7 +51,7 @@ PRISM = np.array(
         (0, 0, -1, 0.5),
     ]
 )
-TURN = (0.3, 0.5, 0.7, 52.2)
+STRAIGHT, TURN = (0, 0, 1, 0), (0.3, 0.5, 0.7, 52.2)
 
 
 def solid(sides: np.ndarray, turn: tuple[float, float, float, float]) -> tuple[Node, np.ndarray]:
@@ -93,8 +93,17 @@ def off(mesh: Mesh, points: np.ndarray, voxel: float) -> np.ndarray:
     return Nearest(mesh, closed=True).points(np.ascontiguousarray(points)) / voxel
 
 
-@pytest.mark.parametrize("turn", [(0, 0, 1, 0), TURN], ids=["straight", "turned"])
-@pytest.mark.parametrize("sides", [TETRAHEDRON, PRISM, BOX], ids=["tetrahedron", "prism", "box"])
+@pytest.mark.parametrize(
+    ("sides", "turn"),
+    [
+        pytest.param(TETRAHEDRON, STRAIGHT, id="tetrahedron", marks=pytest.mark.nightly),
+        pytest.param(PRISM, STRAIGHT, id="prism", marks=pytest.mark.nightly),
+        pytest.param(BOX, STRAIGHT, id="box"),
+        pytest.param(TETRAHEDRON, TURN, id="turned tetrahedron", marks=pytest.mark.nightly),
+        pytest.param(PRISM, TURN, id="turned prism"),
+        pytest.param(BOX, TURN, id="turned box", marks=pytest.mark.nightly),
+    ],
+)
 def test_edges_of_solids(sides: np.ndarray, turn: tuple[float, float, float, float]) -> None:
     """They were cut off by up to 0.6 voxels, and tips fell off."""
     root, edges = solid(sides, turn)

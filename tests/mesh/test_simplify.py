@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from itertools import product
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from fracslice.mesh.model import Nearest, edge_topology, self_intersecting_trian
 from fracslice.mesh.simplify import Collapse, simplify, simplify_to
 from fracslice.volume import plan, sample_scene
 from fracslice.work import Work
+from tests.examples import stamped
 
 from . import shapes
 
@@ -203,8 +205,13 @@ def test_a_mesh_with_a_hole_is_refused_and_work_can_be_cancelled():
         simplify(shapes.sphere(), 0.1, Work(cancel=stop))
 
 
-@pytest.mark.parametrize("count", [4000, 1000, 500])
-@pytest.mark.parametrize("shape", ["ball", "holes", "fractal"])
+@pytest.mark.parametrize(
+    ("shape", "count"),
+    stamped(
+        product(("ball", "holes", "fractal"), (4000, 1000, 500)),
+        [("ball", 500), ("holes", 1000), ("fractal", 4000)],
+    ),
+)
 def test_a_count_is_reached_within_the_least_tolerance(shape: str, count: int) -> None:
     plate = box(size=(2, 2, 0.5)) - (cylinder(0.2, 2) + (0.5, 0, 0)) - (cylinder(0.3, 2) + (-0.4, 0, 0))
     ball = transform(box(round=0.3), rotate=(1, 2, 3, 40))

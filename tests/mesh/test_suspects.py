@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from itertools import product
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from fracslice.mesh.checks import MeshReport, Tally, check_mesh
 from fracslice.mesh.cleaning import Finished, clean, grid_planes
 from fracslice.mesh.contouring import contour
 from fracslice.volume import plan, sample_scene
+from tests.examples import stamped
 
 pytestmark = pytest.mark.once
 
@@ -56,8 +58,13 @@ def test_a_mesh_as_it_was_contoured_is_proved(name: str) -> None:
     assert whole.searched_triangles == whole.triangles and whole.problems == ()
 
 
-@pytest.mark.parametrize("name", SOLIDS)
-@pytest.mark.parametrize("voxels", [2**16, 2**19, 2**21, 2**24])
+@pytest.mark.parametrize(
+    ("name", "voxels"),
+    stamped(
+        product(SOLIDS, (2**16, 2**19, 2**21, 2**24)),
+        [("edges", 2**16), ("thin", 2**19), ("turned", 2**21), ("fractal", 2**24)],
+    ),
+)
 def test_what_quantising_displaces_is_searched(name: str, voxels: int) -> None:
     """So far from the origin that a voxel has ever fewer steps of float32."""
     mesh, planes = made(name)

@@ -66,8 +66,13 @@ SHEET = intersection(gyroid(period=1.5, thickness=0.02), sphere())
 
 @pytest.mark.parametrize(
     ("root", "size", "voxel"),
-    [(PLATE, 7, 0.25), (PLATE, 7, 0.5), (ROD, 6, 0.2), (ROD, 6, 0.5), (SHEET, 6, 0.4)],
-    ids=["plate", "coarse plate", "rod", "coarse rod", "sheet"],
+    [
+        pytest.param(PLATE, 7, 0.25, id="plate"),
+        pytest.param(PLATE, 7, 0.5, id="coarse plate", marks=pytest.mark.nightly),
+        pytest.param(ROD, 6, 0.2, id="rod"),
+        pytest.param(ROD, 6, 0.5, id="coarse rod", marks=pytest.mark.nightly),
+        pytest.param(SHEET, 6, 0.4, id="sheet", marks=pytest.mark.nightly),
+    ],
 )
 def test_walls_are_as_thick_as_asked_or_named(root: Node, size: float, voxel: float) -> None:
     """With a voxel of half of the thickness, chords cut 7 to 60 % off round rims and rods."""

@@ -44,7 +44,7 @@ def on_sphere(radius: float, count: int) -> np.ndarray:
     ],
     ids=["ball", "short", "long", "one"],
 )
-@pytest.mark.parametrize("radius", [0.7, 3.0])
+@pytest.mark.parametrize("radius", stamped([0.7, 3.0], [0.7]))
 def test_every_sample_knows_the_nearest_stroke(start: np.ndarray, end: np.ndarray, radius: float) -> None:
     """Within a thousandth of a voxel on average and a tenth anywhere, beside the surface."""
     made = capsules(start, end, radius * VOXEL, LIKE).bricks

@@ -328,7 +328,13 @@ def test_time_is_linear_in_the_holes() -> None:
     assert seconds(100) < 10 * seconds(10)
 
 
-@pytest.mark.parametrize("root", [sphere(), julia(iterations=7)], ids=["sphere", "julia"])
+@pytest.mark.parametrize(
+    "root",
+    [
+        pytest.param(sphere(), id="sphere"),
+        pytest.param(julia(iterations=7), id="julia", marks=pytest.mark.nightly),
+    ],
+)
 def test_a_millimetre_is_a_millimetre(root: Node) -> None:
     """What is cut off or stands below is exact, and so is the scale: they are the field's."""
 

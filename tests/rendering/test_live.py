@@ -19,6 +19,8 @@ from fracslice.viewer.viewer import Controls
 from fracslice.work import Work
 from tests.waiting import wait_until
 
+pytestmark = pytest.mark.once
+
 SCENE = '<scene version="1"><solid size="80mm">{}</solid><camera eye="3 -2 1"/><film samples="4"/></scene>'
 SPHERE, BOX = "<sphere/>", '<box size="1 1 1"/>'
 

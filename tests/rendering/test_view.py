@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from fracslice.formulas import Box, Node, bounds, box, mandelbulb, sphere, torus
 from fracslice.rendering import Renderer
 from fracslice.scene import library, read
 from fracslice.scene.view import Camera, Film, Shading, View
+from tests.examples import stamped
 
 pytestmark = pytest.mark.once
 
@@ -22,13 +25,16 @@ SHAPES: dict[str, Node] = {
     "mandelbulb": mandelbulb(),
     "tiny": transform(mandelbulb(), scale=1e-4),
 }
+WIDE, HIGH = (48, 27), (27, 48)
 LIBRARY = ("lattice-cube", "menger-ball", "menger-sponge", "twisted-vase", "menger-tower")
 
 
 @pytest.mark.parametrize(
     ("name", "size"),
-    [(name, size) for name in SHAPES for size in ((48, 27), (27, 48))]
-    + [(name, (27, 48)) for name in LIBRARY],
+    stamped(
+        product((*SHAPES, *LIBRARY), (WIDE, HIGH)),
+        [("rod", WIDE), ("tower", HIGH), ("mandelbulb", WIDE), ("tiny", HIGH), ("twisted-vase", HIGH)],
+    ),
 )
 def test_the_whole_object_is_in_view_and_fills_it(name: str, size: tuple[int, int]) -> None:
     view = View(film=Film(background=BACK), shading=Shading(mode="depth"))

@@ -25,6 +25,8 @@ from tests.examples import stamped
 from .mandelbulber_oracle import FORMULAS as ORACLE
 from .mandelbulber_oracle import rotation as oracle_rotation
 
+pytestmark = pytest.mark.once
+
 HEADER = "# Mandelbulber settings file\n# version 2.33\n# only modified parameters\n"
 
 OFTEN = {2, 8, 10, 126, 207, 1100, 1108}

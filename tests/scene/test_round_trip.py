@@ -18,6 +18,8 @@ from fracslice.scene.manual import PATH
 
 from .trees import trees
 
+pytestmark = pytest.mark.once
+
 EXAMPLE = """\
 <scene version="1">
   <solid size="80mm">

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -33,8 +35,13 @@ def test_same_bricks(name: str, way: str, factor: float) -> None:
     assert np.isclose(other.voxel, factor * own.voxel, rtol=1e-6), "faces are known to 1e-6"
 
 
-@pytest.mark.parametrize("factor", [2.0**-20, 2.0**20])
-@pytest.mark.parametrize("name", ["mandelbulb", "quaternion-julia", "menger-ball"])
+@pytest.mark.parametrize(
+    ("name", "factor"),
+    stamped(
+        product(("mandelbulb", "quaternion-julia", "menger-ball"), (2.0**-20, 2.0**20)),
+        [("quaternion-julia", 2.0**-20), ("menger-ball", 2.0**20)],
+    ),
+)
 def test_same_mesh(name: str, factor: float) -> None:
     root = read(library.path(name)).root
     a, b = (mesh_of(r) for r in (root, SCALINGS["parameters"](root, factor)))
