@@ -199,8 +199,8 @@ class Room:
         along = start + (np.arange(count) / (count - 1))[:, None] * (end - start)
         return bool((self.away[self.at(along)] >= least).all())
 
-    def way(self, start: Points) -> list[Points]:
-        """Corners of the shortest way from a point down to the plate."""
+    def corner(self, start: Points) -> Points:
+        """First corner of the shortest way from a point down to the plate, or its end."""
         z, y, x = (int(axis) for axis in self.at(start))
         _, ny, nx = self.away.shape
         (low_x, low_y, low_z), (wide, deep, high) = self.origin.tolist(), self.cell.tolist()
@@ -223,23 +223,14 @@ class Room:
             points.append([*place, low_z + (z + 0.5) * high])
             y, x = to
         points[-1][2] = self.floor
-        return self._straight(list(np.array(points)))
+        return self._straight(np.array(points))
 
-    def _straight(self, points: list[Points]) -> list[Points]:
-        """Way with as few corners as its free cells permit."""
-        result, first = [points[0]], 0
-        while first < len(points) - 1:
-            step, last = len(points) - 1 - first, first + 1
-            while step:
-                if first + step < len(points) and self._steep(points[first], points[first + step]):
-                    least = self.wide if self.away[self.at(points[first])] >= self.wide else NARROW
-                    if self.is_free(points[first], points[first + step], least):
-                        last = first + step
-                        break
-                step //= 2
-            first = last
-            result.append(points[first])
-        return result
+    def _straight(self, way: Points) -> Points:
+        """Last point [3] of a way [n, 3] up to which it may be straight, as its free cells permit."""
+        least, step = self.wide if self.away[self.at(way[0])] >= self.wide else NARROW, len(way) - 1
+        while step > 1 and not (self._steep(way[0], way[step]) and self.is_free(way[0], way[step], least)):
+            step //= 2
+        return np.asarray(way[step])
 
     def _steep(self, start: Points, end: Points) -> bool:
         return bool(math.dist(start[:2], end[:2]) <= (start[2] - end[2]) * 1.001)
@@ -330,9 +321,9 @@ class Forest:
                 self._open[number] = False
                 self.down[k] = self.down[number] = self._add(meeting, heap)
                 return
-        corners = room.way(point)
-        if len(corners) > 2 or math.dist(corners[0][:2], corners[-1][:2]) > 0:
-            self.down[k] = self._add(corners[1], heap)
+        corner = room.corner(point)
+        if corner[2] > room.floor or math.dist(corner[:2], point[:2]) > 0:
+            self.down[k] = self._add(corner, heap)
             return
         self.trunks.append(k)
         self.joins.append([])
@@ -340,16 +331,22 @@ class Forest:
     def _meetings(self, point: Points) -> list[Meeting]:
         """What a node may be led to, first what saves most of the length of pillars."""
         own = float(self.room.cost[self.room.at(point)]) + FOOT
-        others = np.flatnonzero(self._open[: len(self.place)])
-        others = others[np.abs(self._points[others, :2] - point[:2]).max(1, initial=0) < FARTHEST]
-        branches, of_branches = self._with_branches(point, own, self._points[others])
-        trunks, of_trunks = self._with_trunks(point, own)
-        found = [(-s, False, k, m) for s, k, m in zip(of_branches, others.tolist(), branches, strict=True)]
-        found += [(-s, True, k, m) for k, (s, m) in enumerate(zip(of_trunks, trunks, strict=True))]
-        found = sorted((one for one in found if one[0] < 0), key=lambda one: one[:3])
-        return [Meeting(*one[1:]) for one in found[:TRIES]]
+        others, tops = np.flatnonzero(self._open[: len(self.place)]), np.array(self.trunks, np.int64)
+        others, trunks = others[self._near(point, others)], self._near(point, tops)
+        found = list[tuple[float, bool, int, Points]]()
+        for is_trunk, numbers, (places, saved) in (
+            (False, others, self._with_branches(point, own, self._points[others])),
+            (True, trunks, self._with_trunks(point, own, self._points[tops[trunks]])),
+        ):
+            best = np.argsort(-saved, kind="stable")[:TRIES]
+            found += [(-saved[k], is_trunk, int(numbers[k]), places[k]) for k in best if saved[k] > 0]
+        return [Meeting(*one[1:]) for one in sorted(found, key=lambda one: one[:3])[:TRIES]]
 
-    def _with_branches(self, point: Points, own: float, others: Points) -> tuple[Points, list[float]]:
+    def _near(self, point: Points, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Which of some nodes a branch may reach."""
+        return np.flatnonzero(np.abs(self._points[nodes, :2] - point[:2]).max(1, initial=0) < FARTHEST)
+
+    def _with_branches(self, point: Points, own: float, others: Points) -> tuple[Points, Points]:
         """Highest places [n, 3] below 45 degrees from a node and from others, and what they save."""
         away = np.linalg.norm((others - point)[:, :2], axis=1)
         low = np.minimum((point[2] + others[:, 2] - away) / 2, others[:, 2])
@@ -360,17 +357,16 @@ class Forest:
         cost = self.room.cost
         saved = own + cost[self.room.at(others)] - mine - theirs - cost[self.room.at(meeting)]
         saved[(np.maximum(mine, theirs) > FARTHEST) | (low < self.room.floor + LOWEST)] = -np.inf
-        return meeting, saved.tolist()
+        return meeting, saved
 
-    def _with_trunks(self, point: Points, own: float) -> tuple[Points, list[float]]:
+    def _with_trunks(self, point: Points, own: float, top: Points) -> tuple[Points, Points]:
         """Highest places [t, 3] of trunks below 45 degrees from a node, and what they save."""
-        top = np.array([self.place[k] for k in self.trunks]).reshape(-1, 3)
         away = np.linalg.norm((top - point)[:, :2], axis=1)
         meeting = np.column_stack([top[:, :2], np.minimum(point[2] - away, top[:, 2])])
         mine = np.linalg.norm(meeting - point, axis=1)
         saved = own - mine
         saved[(mine > FARTHEST) | (meeting[:, 2] < self.room.floor + LOWEST)] = -np.inf
-        return meeting, saved.tolist()
+        return meeting, saved
 
     def beams(self, largest: float, lowest: float) -> tuple[Points, Points, Points]:
         """Beams [m, 2, 4] of all branches, the feet of trunks [t, 4], and the radii of all nodes [n].
@@ -415,14 +411,15 @@ class Forest:
 
     def braces(self) -> Points:
         """Beams [m, 2, 4] across between tall trunks that are near each other."""
+        from scipy.spatial import cKDTree
+
         floor, result, held = self.room.floor, [], dict[int, int]()
         tops = np.array([self.place[k] for k in self.trunks]).reshape(-1, 3)
-        tall = np.flatnonzero(tops[:, 2] - floor > TALL).tolist()
-        pairs = sorted(
-            (math.dist(tops[a, :2], tops[b, :2]), a, b) for n, a in enumerate(tall) for b in tall[n + 1 :]
-        )
-        for far, a, b in pairs:
-            if far > NEAR or max(held.get(a, 0), held.get(b, 0)) >= 2 or far < 1.5:
+        tall = np.flatnonzero(tops[:, 2] - floor > TALL)
+        near = cKDTree(tops[tall, :2]).query_pairs(NEAR, output_type="ndarray") if len(tall) else tall
+        pairs = tall[near.reshape(-1, 2)].tolist()
+        for far, a, b in sorted((math.dist(tops[a, :2], tops[b, :2]), a, b) for a, b in pairs):
+            if max(held.get(a, 0), held.get(b, 0)) >= 2 or far < 1.5:
                 continue
             radius, low, made = self.strength.pillar * 0.35, floor + 3.0, 0
             while low + far < min(tops[a, 2], tops[b, 2]) - 2:
