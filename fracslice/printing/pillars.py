@@ -546,9 +546,17 @@ class Exits:
     of: Object
     room: Room
     shut: dict[float, set[tuple[int, ...]]] = field(default_factory=dict)  # samples without a way, by radii
+    known: dict[tuple[float, ...], bool] = field(default_factory=dict)  # verdicts on struts
 
     def lead_out(self, radius: float, top: Points, ground: float) -> bool:
         """True if a ball in the place of a strut straight down, or beside it, finds a way out."""
+        strut = radius, *top.tolist(), ground
+        if strut not in self.known:  # supports with a shorter reach have most struts again
+            self.known[strut] = self._found(radius, top, ground)
+        return self.known[strut]
+
+    def _found(self, radius: float, top: Points, ground: float) -> bool:
+        """See `lead_out`."""
         step, shut = radius / 2, self.shut.setdefault(radius, set())
         along = np.arange(ground, float(top[2]), step)
         x, y, z = (axis.ravel() for axis in np.meshgrid(SIDES * step, SIDES * step, along, indexing="ij"))
