@@ -12,9 +12,9 @@ from ..printing.walls import Widths, widths_of
 from ..slicing.feature_graph import (
     MARKS,
     Feature,
+    FeatureBox,
     Graph,
     LayerComponents,
-    Mark,
     Neck,
     Overhang,
     farthest,
@@ -77,11 +77,11 @@ class PrintReport:
         """Those of some hollows that are no sealed cavities."""
         return [hollow for hollow in hollows if hollow not in self.cavities]
 
-    def marks(self, tops: np.ndarray) -> list[Mark]:
+    def marks(self, tops: np.ndarray) -> list[FeatureBox]:
         """Boxes around islands and what is empty. `tops`: upper faces of the layers, mm, float64 [l]."""
         cups, traps = self.unsealed(self.cups), self.unsealed(self.traps)
         kinds = zip(MARKS, (self.islands, cups, traps, self.cavities), strict=True)
-        return [Mark.around(kind, feature, tops) for kind, features in kinds for feature in features]
+        return [FeatureBox.around(kind, feature, tops) for kind, features in kinds for feature in features]
 
 
 @dataclass(frozen=True, eq=False)

@@ -493,7 +493,7 @@ class Object:
         return normals.T
 
 
-class Window:
+class NearSamples:
     """Samples of the field in a box, taken where a way is looked for; they are numbered as they lie."""
 
     def __init__(self, of: Object, low: NDArray[np.int64], high: NDArray[np.int64], step: float) -> None:
@@ -574,7 +574,7 @@ class Exits:
             return start
         seen = [start]
         open_cells = self.room.exits(math.ceil(2 * radius / float(self.room.cell.min())))
-        window = Window(self.of, start.min(0) - POCKET, start.max(0) + POCKET, radius / 2)
+        window = NearSamples(self.of, start.min(0) - POCKET, start.max(0) + POCKET, radius / 2)
         front = window.enter(start)
         while len(front := window.free(front)):
             seen.append(window.places(front))

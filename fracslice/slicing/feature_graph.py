@@ -222,7 +222,7 @@ MARKS = {
 """Colours of the boxes around features, by their kind, sRGB."""
 
 
-class Mark(NamedTuple):
+class FeatureBox(NamedTuple):
     """A box around a feature of a kind of `MARKS`, for pictures; mm from the middle of the lower face."""
 
     kind: str
@@ -230,14 +230,14 @@ class Mark(NamedTuple):
     high: tuple[float, float, float]
 
     @classmethod
-    def around(cls, kind: str, feature: Feature, tops: np.ndarray) -> Mark:
+    def around(cls, kind: str, feature: Feature, tops: np.ndarray) -> FeatureBox:
         """Box as wide as the largest area of a feature. `tops`: upper faces of all layers, mm, [l]."""
         (x, y), half, (first, last) = feature.at, math.sqrt(feature.area) / 2, feature.layers
         bottom = float(tops[first - 1]) if first else 0.0
         return cls(kind, (x - half, y - half, bottom), (x + half, y + half, float(tops[last])))
 
 
-def counted(marks: Sequence[Mark]) -> dict[str, str]:
+def counted(marks: Sequence[FeatureBox]) -> dict[str, str]:
     """How many boxes of each kind there are, as text."""
     number = {kind: sum(mark.kind == kind for mark in marks) for kind in MARKS}
     plurals = {"sealed cavity": "sealed cavities"}

@@ -22,7 +22,7 @@ from ..common.parameters import record
 from ..errors import SliceError
 from ..records import RasterOptions
 from ..work import Work
-from .feature_graph import MARKS, Mark, counted
+from .feature_graph import MARKS, FeatureBox, counted
 from .layers import Layer, Pictures, ScreenView, Slicer, SupportedLayer
 from .printers import START, Printer, Resin
 from .stack import Stack
@@ -327,7 +327,7 @@ HELD = (60, 130, 200)
 """Colour of supports, sRGB."""
 
 
-def elevations(stack: Stack, marks: Sequence[Mark], file: BinaryIO, work: Work | None = None) -> None:
+def elevations(stack: Stack, marks: Sequence[FeatureBox], file: BinaryIO, work: Work | None = None) -> None:
     """Write a PNG from the front and from the right: an object as by X-rays, its supports and boxes."""
     from PIL import Image, ImageDraw
 
@@ -379,7 +379,7 @@ def page(
     areas: NDArray[np.float64],
     picture: bytes,
     sides: bytes,
-    marks: Sequence[Mark],
+    marks: Sequence[FeatureBox],
     views: Sequence[bytes] = (),
 ) -> bytes:
     """Compose a summary page.
@@ -410,7 +410,7 @@ def page(
     return "\n".join([*text, ""]).encode()
 
 
-def _legend(marks: Sequence[Mark]) -> str:
+def _legend(marks: Sequence[FeatureBox]) -> str:
     """What the boxes of an elevation are around, in their colours; supports are blue."""
     boxes = [f'<span style="color:rgb{MARKS[kind]}">{text}</span>' for kind, text in counted(marks).items()]
     return "As by X-rays; supports are blue. " + (f"Boxes: {', '.join(boxes)}." if boxes else "")

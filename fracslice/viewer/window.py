@@ -19,7 +19,7 @@ from ..common.parameters import Choice, Vector, validate_value
 from ..errors import RenderError
 from ..mesh.model import Mesh
 from ..mesh.models import read_coloured
-from ..slicing.feature_graph import MARKS, Mark, counted
+from ..slicing.feature_graph import MARKS, FeatureBox, counted
 from . import plotter
 from .plotter import body, set_lighting
 
@@ -151,7 +151,7 @@ CURVE = (0.34, 0.24)
 class Found(NamedTuple):
     """What a check found in the layers of a mesh."""
 
-    marks: Sequence[Mark]  # boxes around features
+    marks: Sequence[FeatureBox]  # boxes around features
     tops: np.ndarray  # upper faces of the layers, mm, float64 [l]
     areas: np.ndarray  # their areas, mm2, float64 [l]
 

@@ -12,7 +12,7 @@ from PIL import Image
 from fracslice.formulas import box, difference, transform, union
 from fracslice.records import Print
 from fracslice.slicing import SliceJob, Slicer, Stack, plan_stack
-from fracslice.slicing.feature_graph import MARKS, Mark
+from fracslice.slicing.feature_graph import MARKS, FeatureBox
 from fracslice.slicing.raster import HELD, animation, contact_sheet, elevations, page, thumbnail, worst_layers
 
 pytestmark = pytest.mark.once
@@ -40,7 +40,7 @@ def test_one_layer_is_a_preview(write: Callable[..., None]) -> None:
         picture.load()
 
 
-def seen(stack: Stack, marks: list[Mark]) -> np.ndarray:
+def seen(stack: Stack, marks: list[FeatureBox]) -> np.ndarray:
     file = io.BytesIO()
     elevations(stack, marks, file)
     with Image.open(file) as picture:
@@ -69,7 +69,7 @@ def widths(stack: Stack) -> tuple[int, int]:
 
 def test_boxes_of_elevations_are_where_features_are() -> None:
     stack = plan_stack(box(size=(4, 2, 4)), SliceJob(size=4, layer=0.1, pixel=0.05))
-    marks = [Mark("island", (0.5, -0.5, 1.0), (1.5, 0.5, 2.0))]
+    marks = [FeatureBox("island", (0.5, -0.5, 1.0), (1.5, 0.5, 2.0))]
     rows, columns = np.nonzero((seen(stack, marks) == MARKS["island"]).all(2))
     front, right = widths(stack)
     assert (rows.min(), rows.max()) == pytest.approx((240, 360), abs=2)
@@ -85,7 +85,9 @@ def test_supports_of_elevations_have_a_colour() -> None:
 
 
 def test_a_page_counts_its_boxes() -> None:
-    marks = [Mark("sealed cavity", (0, 0, 0), (1, 1, 1))] * 2 + [Mark("island", (0, 0, 0), (1, 1, 1))]
+    marks = [FeatureBox("sealed cavity", (0, 0, 0), (1, 1, 1))] * 2 + [
+        FeatureBox("island", (0, 0, 0), (1, 1, 1))
+    ]
     text = page("a", [], "would print", [], np.ones(1), np.ones(1), b"", b"", marks).decode()
     assert "Boxes: " in text and ">1 island</span>, <span" in text and ">2 sealed cavities</span>." in text
     assert f"rgb{MARKS['island']}" in text

@@ -12,7 +12,7 @@ from PIL import Image
 
 from fracslice.errors import ExportError, RenderError
 from fracslice.mesh import Mesh
-from fracslice.slicing.feature_graph import Mark
+from fracslice.slicing.feature_graph import FeatureBox
 from fracslice.viewer import picture, show, window
 from tests.mesh.shapes import cube, sphere
 
@@ -79,7 +79,7 @@ def test_boxes_of_a_check_stand_where_it_found_them(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(window, "set_lighting", lambda *given, **more: actor)
     mesh = cube()
     opened = window.ViewerWindow(mesh, "")
-    marks = [Mark("island", (-1, -2, 3), (1, 2, 4)), Mark("sealed cavity", (2, 2, 5), (3, 3, 9))]
+    marks = [FeatureBox("island", (-1, -2, 3), (1, 2, 4)), FeatureBox("sealed cavity", (2, 2, 5), (3, 3, 9))]
     opened.add(window.Found(marks, np.array([5.0, 10.0]), np.array([2.0, 1.0])), mesh)
     boxes = [call.args[0].bounds for call in plotter.add_mesh.call_args_list]
     x, y, z = (*mesh.bounds.mean(0)[:2], mesh.bounds[0, 2])
