@@ -229,8 +229,9 @@ class ViewerWindow:
             self.plotter.add_mesh(edges, color=MARKS[kind], line_width=3, lighting=False)
         if found.marks:
             self.see_through()
-            labels = [[text, MARKS[kind]] for kind, text in counted(found.marks).items()]
-            self.plotter.add_legend(labels, bcolor=None, size=(0.2, 0.025 * len(labels)), face="rectangle")
+        for line, (kind, text) in enumerate(counted(found.marks).items()):
+            place = (0.84, 0.96 - 0.03 * line)
+            self.plotter.add_text(text, place, font_size=10, color=MARKS[kind], viewport=True)
         chart = pyvista.Chart2D(size=CURVE, loc=(1 - CURVE[0], 0), x_label="height, mm", y_label="area, mm2")
         chart.line(found.tops, found.areas, color=INK)
         self.plotter.add_chart(chart)
