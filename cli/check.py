@@ -123,6 +123,7 @@ class CheckOptions(LayerOptions, MeshOptions, ClusterOptions):
     )
     machine: Printer | None = printer_option('The printer that the object must fit; "list" shows all.')
     picture: str | None = option(Name("FILE.png", ".png"), "Draw the worst layers.")
+    show: bool = flag("Open a window on the mesh, with boxes around what was found in its layers.")
     fix: bool = flag("Try what would mend the problems, and keep what helps.")
     fixed: str | None = option(
         Name("FILE", *ENDINGS),
@@ -168,6 +169,8 @@ def check(given: CheckOptions) -> int:
     """
     if not given.fix:
         refuse_options({"fixed"}, "only with --fix")
+    if given.show:
+        need_window(given)
     if is_model(given.source):
         refuse_options(OF_SCENES, "only for scenes, and a model was given")
         checked = of_model
@@ -185,6 +188,15 @@ def check(given: CheckOptions) -> int:
 
     click.echo(json.dumps(numbers, indent=2) if given.as_json else os.linesep.join(filter(None, lines)))
     return 1 if problems else 0
+
+
+def need_window(given: CheckOptions) -> None:
+    """Refuse a window where there is no mesh for it, or no screen, before a long examination."""
+    from fracslice.viewer import need_screen
+
+    if given.layer is not None and not is_model(given.source):
+        refuse_options({"show"}, "only with a mesh, and --layer checks layers alone")
+    need_screen()
 
 
 Checked = tuple[dict[str, Any], list[str], "Sequence[Problem]"]
@@ -360,6 +372,8 @@ def of_layers(made: Variant, given: CheckOptions, work: Work) -> Checked:
     if best.shown and given.html:
         drawn = views(made.mesh, given) if made.mesh is not None and best is first else []
         write_page(*best.shown, [figures_of(best.shown[1])], given.source, given.html, work, drawn)
+    if first.shown and given.show and made.mesh is not None:
+        open_window(made.mesh, *first.shown, given)
     if given.fixed:
         write_mesh(best.variant, given, work)
     lines = [f"{given.source}: {first.text}"]
@@ -378,6 +392,17 @@ def views(mesh: Mesh, given: CheckOptions) -> list[bytes]:
 
     shown = marked(mesh, given.wall, given.threads)
     return [thumbnail(shown, axes) for axes in (AXES, BELOW)]
+
+
+def open_window(mesh: Mesh, stack: Stack, report: PrintReport, given: CheckOptions) -> None:
+    """Open a window on a mesh, with what was found in its layers."""
+    import numpy as np
+
+    from fracslice import viewer
+    from fracslice.mesh.checks import marked
+
+    found = viewer.Found(report.marks(stack.tops), stack.tops, np.array(report.areas))
+    viewer.show(marked(mesh, given.wall, given.threads), found)
 
 
 def mended_object(first: Attempt, given: CheckOptions, work: Work) -> tuple[Attempt, list[str]]:

@@ -473,23 +473,21 @@ def write_page(
     from fracslice.common.files import replacing
     from fracslice.slicing.raster import elevations, page, worst_layers
 
+    marks, areas = report.marks(stack.tops), np.array(report.areas)
     with io.BytesIO() as picture, io.BytesIO() as sides, replacing(path) as file:
         worst_layers(stack, report.worst, picture, work)
-        if stack.supports:
-            elevations(stack, sides, work)
-            lines = [*lines, report.supports]
-        problems = [str(problem) for problem in report.problems]
-        areas, worst = np.array(report.areas), picture.getvalue()
+        elevations(stack, marks, sides, work)
         made = page(
             title,
-            lines,
+            [*lines, *filter(None, [report.supports])],
             verdict(report.problems),
-            problems,
+            [str(problem) for problem in report.problems],
             stack.tops,
             areas,
-            worst,
-            views,
+            picture.getvalue(),
             sides.getvalue(),
+            marks,
+            views,
         )
         file.write(made)
 

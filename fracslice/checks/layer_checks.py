@@ -10,7 +10,9 @@ import numpy as np
 
 from ..printing.walls import Widths, widths_of
 from ..slicing.feature_graph import (
+    MARKS,
     Feature,
+    FeatureBox,
     Graph,
     LayerComponents,
     Neck,
@@ -70,6 +72,16 @@ class PrintReport:
     def as_dict(self) -> dict[str, Any]:
         """The report as plain JSON types."""
         return asdict(self)
+
+    def unsealed(self, hollows: list[Feature]) -> list[Feature]:
+        """Those of some hollows that are no sealed cavities."""
+        return [hollow for hollow in hollows if hollow not in self.cavities]
+
+    def marks(self, tops: np.ndarray) -> list[FeatureBox]:
+        """Boxes around islands and what is empty. `tops`: upper faces of the layers, mm, float64 [l]."""
+        cups, traps = self.unsealed(self.cups), self.unsealed(self.traps)
+        kinds = zip(MARKS, (self.islands, cups, traps, self.cavities), strict=True)
+        return [FeatureBox.around(kind, feature, tops) for kind, features in kinds for feature in features]
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,7 +39,7 @@ def _hollows(
     """Look at hollows of a kind that are not sealed."""
 
     def find(of: LayersEvidence) -> Iterator[Problem]:
-        remaining = [hollow for hollow in hollows(of.report) if hollow not in of.report.cavities]
+        remaining = of.report.unsealed(hollows(of.report))
         if not remaining:
             return
         largest = max(remaining, key=lambda h: h.area)

@@ -22,6 +22,14 @@ BRIDGE = (("bridge", "1mm"),)
 SUPPORTED = (("supports", "medium"),)
 """Print setting that adds supports."""
 
+FILLED = (("cavities", "fill"),)
+"""Print setting that fills cavities, in which supports are not, as they could not be taken out."""
+
+
+def _held(of: LayersEvidence) -> tuple[tuple[str, str], ...]:
+    """Print setting that holds what hangs in the air."""
+    return FILLED if of.stack.supports else SUPPORTED
+
 
 def _bodies(of: LayersEvidence) -> Iterator[Problem]:
     bodies = of.report.bodies
@@ -38,14 +46,14 @@ def _islands(of: LayersEvidence) -> Iterator[Problem]:
         first = min(i.layers[0] for i in islands)
         text = f"{format_count(len(islands), 'island')} in the air, the first from layer {first} on"
         text += f", the largest of {significant(largest.area)} mm2"
-        yield Problem("islands", text, mend=SUPPORTED, count=len(islands), **of.where(largest))
+        yield Problem("islands", text, mend=_held(of), count=len(islands), **of.where(largest))
 
 
 def _overhangs(of: LayersEvidence) -> Iterator[Problem]:
     if far := of.report.overhang:
         text = f"a flat overhang reaches {far.reach:.3g} mm, {significant(far.area)} mm2 of it too far"
         at = (*far.at, of.bottom(far.layer))
-        yield Problem("overhangs", text, far.layer, at, SUPPORTED, advice="--up")
+        yield Problem("overhangs", text, far.layer, at, _held(of), advice="--up")
 
 
 def _necks(of: LayersEvidence) -> Iterator[Problem]:

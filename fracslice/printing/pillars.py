@@ -79,8 +79,8 @@ SUNK = np.array(
 PIECE = 0.05
 """What radii of pieces to be taken out are multiples of, mm."""
 
-POCKET = 5_000
-"""Most places of a pocket that are looked through for its exit."""
+POCKET = 80
+"""How far from a strut the exit of a pocket is looked for, steps of half a radius."""
 
 LENGTHS = 2.0, 1.4, 1.0, 0.7
 """Lengths of the cones of tips, mm."""
@@ -117,14 +117,24 @@ class Room:
     cell: Points  # sides of a cell, [3]
     away: NDArray[np.uint8]  # steps from the nearest cell with a part of the object, at most 255; [z, y, x]
     wide: int  # steps from which on a way is free
+    dense: NDArray[np.bool_]  # cells that the object fills
 
     @classmethod
     def around(
-        cls, full: NDArray[np.bool_], origin: Points, floor: float, cell: Points, clear: float
+        cls,
+        full: NDArray[np.bool_],
+        dense: NDArray[np.bool_],
+        origin: Points,
+        floor: float,
+        cell: Points,
+        clear: float,
     ) -> Room:
-        """Room around cells with parts of an object, which holds a pillar's axis `clear` mm from it."""
+        """Room around cells with parts of an object, some of which it fills.
+
+        `clear`: least distance of a pillar's axis from it, mm.
+        """
         wide = max(math.ceil(clear / float(cell.min())), NARROW + 1)
-        return cls(origin, floor, cell, steps_from(full, wide), wide)
+        return cls(origin, floor, cell, steps_from(full, wide), wide, dense)
 
     @cached_property
     def cost(self) -> NDArray[np.float32]:
@@ -162,6 +172,14 @@ class Room:
         return self._exits[least]
 
     @cached_property
+    def sealed(self) -> NDArray[np.bool_]:
+        """Cells from which no way leads out, however narrow."""
+        from scipy.ndimage import label
+
+        labels, _ = label(~self.dense)
+        return np.asarray(labels != labels[0, 0, 0])
+
+    @cached_property
     def _exits(self) -> dict[int, NDArray[np.bool_]]:
         return {}
 
@@ -181,8 +199,8 @@ class Room:
         along = start + (np.arange(count) / (count - 1))[:, None] * (end - start)
         return bool((self.away[self.at(along)] >= least).all())
 
-    def way(self, start: Points) -> list[Points]:
-        """Corners of the shortest way from a point down to the plate."""
+    def corner(self, start: Points) -> Points:
+        """First corner of the shortest way from a point down to the plate, or its end."""
         z, y, x = (int(axis) for axis in self.at(start))
         _, ny, nx = self.away.shape
         (low_x, low_y, low_z), (wide, deep, high) = self.origin.tolist(), self.cell.tolist()
@@ -205,23 +223,14 @@ class Room:
             points.append([*place, low_z + (z + 0.5) * high])
             y, x = to
         points[-1][2] = self.floor
-        return self._straight(list(np.array(points)))
+        return self._straight(np.array(points))
 
-    def _straight(self, points: list[Points]) -> list[Points]:
-        """Way with as few corners as its free cells permit."""
-        result, first = [points[0]], 0
-        while first < len(points) - 1:
-            step, last = len(points) - 1 - first, first + 1
-            while step:
-                if first + step < len(points) and self._steep(points[first], points[first + step]):
-                    least = self.wide if self.away[self.at(points[first])] >= self.wide else NARROW
-                    if self.is_free(points[first], points[first + step], least):
-                        last = first + step
-                        break
-                step //= 2
-            first = last
-            result.append(points[first])
-        return result
+    def _straight(self, way: Points) -> Points:
+        """Last point [3] of a way [n, 3] up to which it may be straight, as its free cells permit."""
+        least, step = self.wide if self.away[self.at(way[0])] >= self.wide else NARROW, len(way) - 1
+        while step > 1 and not (self._steep(way[0], way[step]) and self.is_free(way[0], way[step], least)):
+            step //= 2
+        return np.asarray(way[step])
 
     def _steep(self, start: Points, end: Points) -> bool:
         return bool(math.dist(start[:2], end[:2]) <= (start[2] - end[2]) * 1.001)
@@ -312,9 +321,9 @@ class Forest:
                 self._open[number] = False
                 self.down[k] = self.down[number] = self._add(meeting, heap)
                 return
-        corners = room.way(point)
-        if len(corners) > 2 or math.dist(corners[0][:2], corners[-1][:2]) > 0:
-            self.down[k] = self._add(corners[1], heap)
+        corner = room.corner(point)
+        if corner[2] > room.floor or math.dist(corner[:2], point[:2]) > 0:
+            self.down[k] = self._add(corner, heap)
             return
         self.trunks.append(k)
         self.joins.append([])
@@ -322,16 +331,22 @@ class Forest:
     def _meetings(self, point: Points) -> list[Meeting]:
         """What a node may be led to, first what saves most of the length of pillars."""
         own = float(self.room.cost[self.room.at(point)]) + FOOT
-        others = np.flatnonzero(self._open[: len(self.place)])
-        others = others[np.abs(self._points[others, :2] - point[:2]).max(1, initial=0) < FARTHEST]
-        branches, of_branches = self._with_branches(point, own, self._points[others])
-        trunks, of_trunks = self._with_trunks(point, own)
-        found = [(-s, False, k, m) for s, k, m in zip(of_branches, others.tolist(), branches, strict=True)]
-        found += [(-s, True, k, m) for k, (s, m) in enumerate(zip(of_trunks, trunks, strict=True))]
-        found = sorted((one for one in found if one[0] < 0), key=lambda one: one[:3])
-        return [Meeting(*one[1:]) for one in found[:TRIES]]
+        others, tops = np.flatnonzero(self._open[: len(self.place)]), np.array(self.trunks, np.int64)
+        others, trunks = others[self._near(point, others)], self._near(point, tops)
+        found = list[tuple[float, bool, int, Points]]()
+        for is_trunk, numbers, (places, saved) in (
+            (False, others, self._with_branches(point, own, self._points[others])),
+            (True, trunks, self._with_trunks(point, own, self._points[tops[trunks]])),
+        ):
+            best = np.argsort(-saved, kind="stable")[:TRIES]
+            found += [(-saved[k], is_trunk, int(numbers[k]), places[k]) for k in best if saved[k] > 0]
+        return [Meeting(*one[1:]) for one in sorted(found, key=lambda one: one[:3])[:TRIES]]
 
-    def _with_branches(self, point: Points, own: float, others: Points) -> tuple[Points, list[float]]:
+    def _near(self, point: Points, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Which of some nodes a branch may reach."""
+        return np.flatnonzero(np.abs(self._points[nodes, :2] - point[:2]).max(1, initial=0) < FARTHEST)
+
+    def _with_branches(self, point: Points, own: float, others: Points) -> tuple[Points, Points]:
         """Highest places [n, 3] below 45 degrees from a node and from others, and what they save."""
         away = np.linalg.norm((others - point)[:, :2], axis=1)
         low = np.minimum((point[2] + others[:, 2] - away) / 2, others[:, 2])
@@ -342,17 +357,16 @@ class Forest:
         cost = self.room.cost
         saved = own + cost[self.room.at(others)] - mine - theirs - cost[self.room.at(meeting)]
         saved[(np.maximum(mine, theirs) > FARTHEST) | (low < self.room.floor + LOWEST)] = -np.inf
-        return meeting, saved.tolist()
+        return meeting, saved
 
-    def _with_trunks(self, point: Points, own: float) -> tuple[Points, list[float]]:
+    def _with_trunks(self, point: Points, own: float, top: Points) -> tuple[Points, Points]:
         """Highest places [t, 3] of trunks below 45 degrees from a node, and what they save."""
-        top = np.array([self.place[k] for k in self.trunks]).reshape(-1, 3)
         away = np.linalg.norm((top - point)[:, :2], axis=1)
         meeting = np.column_stack([top[:, :2], np.minimum(point[2] - away, top[:, 2])])
         mine = np.linalg.norm(meeting - point, axis=1)
         saved = own - mine
         saved[(mine > FARTHEST) | (meeting[:, 2] < self.room.floor + LOWEST)] = -np.inf
-        return meeting, saved.tolist()
+        return meeting, saved
 
     def beams(self, largest: float, lowest: float) -> tuple[Points, Points, Points]:
         """Beams [m, 2, 4] of all branches, the feet of trunks [t, 4], and the radii of all nodes [n].
@@ -397,14 +411,15 @@ class Forest:
 
     def braces(self) -> Points:
         """Beams [m, 2, 4] across between tall trunks that are near each other."""
+        from scipy.spatial import cKDTree
+
         floor, result, held = self.room.floor, [], dict[int, int]()
         tops = np.array([self.place[k] for k in self.trunks]).reshape(-1, 3)
-        tall = np.flatnonzero(tops[:, 2] - floor > TALL).tolist()
-        pairs = sorted(
-            (math.dist(tops[a, :2], tops[b, :2]), a, b) for n, a in enumerate(tall) for b in tall[n + 1 :]
-        )
-        for far, a, b in pairs:
-            if far > NEAR or max(held.get(a, 0), held.get(b, 0)) >= 2 or far < 1.5:
+        tall = np.flatnonzero(tops[:, 2] - floor > TALL)
+        near = cKDTree(tops[tall, :2]).query_pairs(NEAR, output_type="ndarray") if len(tall) else tall
+        pairs = tall[near.reshape(-1, 2)].tolist()
+        for far, a, b in sorted((math.dist(tops[a, :2], tops[b, :2]), a, b) for a, b in pairs):
+            if max(held.get(a, 0), held.get(b, 0)) >= 2 or far < 1.5:
                 continue
             radius, low, made = self.strength.pillar * 0.35, floor + 3.0, 0
             while low + far < min(tops[a, 2], tops[b, 2]) - 2:
@@ -478,53 +493,96 @@ class Object:
         return normals.T
 
 
+class NearSamples:
+    """Samples of the field in a box, taken where a way is looked for; they are numbered as they lie."""
+
+    def __init__(self, of: Object, low: NDArray[np.int64], high: NDArray[np.int64], step: float) -> None:
+        """`low`, `high`: corners, steps from the origin, [3]; `step` in mm."""
+        self.of, self.low, self.step = of, low, step
+        self.shape = tuple((high - low).tolist())
+        self._known = np.zeros(math.prod(self.shape), np.int8)  # 1 outside of the solid, 2 in it
+        self._entered = np.ones(self.shape, bool)
+        self._entered[2:-2, 2:-2, 2:-2] = False
+        self._steps = np.array([[s, -s] for s in (self.shape[1] * self.shape[2], self.shape[2], 1)]).ravel()
+
+    def places(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Samples [n, 3], steps from the origin."""
+        places: NDArray[np.int64] = np.column_stack(np.unravel_index(numbers, self.shape)) + self.low
+        return places
+
+    def points(self, numbers: NDArray[np.int64]) -> Points:
+        """Samples [n, 3], mm."""
+        return np.asarray(self.places(numbers) * self.step, np.float64)
+
+    def enter(self, places: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Numbers of samples [n, 3] from which a way begins."""
+        return self._new(np.asarray(np.ravel_multi_index(tuple((places - self.low).T), self.shape)))
+
+    def beside(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Neighbours of samples that were not entered yet."""
+        return self._new((numbers[:, None] + self._steps).ravel())
+
+    def free(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Those of some samples where a ball of two steps is outside of the solid."""
+        ball = numbers[:, None] + np.append(0, 2 * self._steps)
+        new = np.unique(ball[self._known[ball] == 0])
+        self._known[new] = 1 + (self.of.values(self.points(new)) <= 0)
+        return np.asarray(numbers[(self._known[ball] == 1).all(1)])
+
+    def _new(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+        entered = self._entered.reshape(-1)
+        new = np.unique(numbers[~entered[numbers]])
+        entered[new] = True
+        return new
+
+
 @dataclass(eq=False)
 class Exits:
-    """Ways out for balls of one radius, on samples of the field half as far apart.
+    """Ways out of an object for balls, on samples of the field half a radius apart.
 
     Cells hold the object where a part of it is in them, so that they lack narrow exits.
     """
 
     of: Object
     room: Room
-    radius: float  # mm
-    shut: set[tuple[int, ...]] = field(default_factory=set)  # places without a way out
+    shut: dict[float, set[tuple[int, ...]]] = field(default_factory=dict)  # samples without a way, by radii
+    known: dict[tuple[float, ...], bool] = field(default_factory=dict)  # verdicts on struts
 
-    @cached_property
-    def open(self) -> NDArray[np.bool_]:
-        """Cells that have a way out of cells."""
-        return self.room.exits(math.ceil(self.radius / float(self.room.cell.min())) + 1)
-
-    def lead_out(self, top: Points, ground: float) -> bool:
+    def lead_out(self, radius: float, top: Points, ground: float) -> bool:
         """True if a ball in the place of a strut straight down, or beside it, finds a way out."""
-        step = self.radius / 2
+        strut = radius, *top.tolist(), ground
+        if strut not in self.known:  # supports with a shorter reach have most struts again
+            self.known[strut] = self._found(radius, top, ground)
+        return self.known[strut]
+
+    def _found(self, radius: float, top: Points, ground: float) -> bool:
+        """See `lead_out`."""
+        step, shut = radius / 2, self.shut.setdefault(radius, set())
         along = np.arange(ground, float(top[2]), step)
         x, y, z = (axis.ravel() for axis in np.meshgrid(SIDES * step, SIDES * step, along, indexing="ij"))
         halfway = np.column_stack([top[0] + x / 2, top[1] + y / 2, z])
-        start = np.column_stack([top[0] + x, top[1] + y, z])[self.of.values(halfway) > 0]
-        return self._flood(np.unique(np.round(start / step).astype(np.int64), axis=0))
+        start = np.column_stack([top[0] + x, top[1] + y, z])
+        start = start[(self.of.values(halfway) > 0) & ~self.room.sealed[self.room.at(start)]]
+        places = set(map(tuple, np.round(start / step).astype(np.int64).tolist())) - shut
+        seen = self._flood(radius, np.array(sorted(places), np.int64).reshape(-1, 3))
+        shut.update(map(tuple, seen.tolist()))
+        return bool(places) and not len(seen)
 
-    def _flood(self, front: NDArray[np.int64]) -> bool:
-        """True if a way leads out from one of some places [n, 3]."""
-        seen = set[tuple[int, ...]]()
-        while len(seen) < POCKET and len(front := self._free(front)):
-            if self.open[self.room.at(front * self.radius / 2)].any():
-                return True
-            seen.update(map(tuple, front.tolist()))
-            near = set(map(tuple, (front[:, None] + STEPS).reshape(-1, 3).tolist()))
-            fresh = sorted(near - seen - self.shut)
-            front = np.array(fresh, np.int64).reshape(-1, 3)
-        self.shut |= seen
-        return False
+    def _flood(self, radius: float, start: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Samples [m, 3] that are reached from some, [n, 3]; none if a way leads out from one of them."""
+        if not len(start):
+            return start
+        seen = [start]
+        open_cells = self.room.exits(math.ceil(2 * radius / float(self.room.cell.min())))
+        window = NearSamples(self.of, start.min(0) - POCKET, start.max(0) + POCKET, radius / 2)
+        front = window.enter(start)
+        while len(front := window.free(front)):
+            seen.append(window.places(front))
+            if open_cells[self.room.at(window.points(front))].any():
+                return start[:0]
+            front = window.beside(front)
+        return np.concatenate(seen)
 
-    def _free(self, places: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Those of some places where a ball is outside the solid."""
-        ends = np.concatenate([np.zeros((1, 3)), 2 * STEPS])[:, None]
-        return places[(self.of.values((places + ends) * self.radius / 2) > 0).all(0)]
-
-
-STEPS = np.concatenate([np.eye(3, dtype=np.int64), -np.eye(3, dtype=np.int64)])
-"""Steps to neighbours."""
 
 SIDES = np.arange(-4, 5)
 """Places beside a strut from which a way out is looked for, steps."""
@@ -575,13 +633,11 @@ def tip_ends(room: Room, contacts: Points, normals: Points) -> Points:
     return result
 
 
-def support(
-    of: Object, room: Room, where: Contacts, strength: Strength, raft: float
-) -> tuple[Supports, float]:
+def support(exits: Exits, where: Contacts, strength: Strength, raft: float) -> tuple[Supports, float]:
     """Supports of points of the surface, and the share of the cross-section that they have to have next to
     it; `raft`: height of the raft, mm.
     """
-    points, tips = where
+    (points, tips), of, room = where, exits.of, exits.room
     lowest = float(points[:, 2].min())
     ends = tip_ends(room, points, of.slopes(points, strength.tip / 4))
     led = np.isfinite(ends[:, 0])
@@ -591,19 +647,23 @@ def support(
         [np.column_stack([points, tips])[led], np.column_stack([ends[led], radii[: forest.tips]])], 1
     )
     ground = of.first_below(points[~led], room.floor, float(room.cell.min()) / 2, tips[~led])
-    inner = ground > room.floor
-    struts, caught = _struts(of, room, np.column_stack([points, tips])[~led], ground, strength.pillar / 2)
-    feet = np.concatenate([feet, struts[len(ground) :, 1][~inner]])
-    beams = np.concatenate([cones, branches, struts, forest.braces()])
+    struts, shut = _struts(exits, np.column_stack([points, tips])[~led], ground, strength.pillar / 2)
+    ends = struts[:, 1, 1]
+    inner = ends[:, 2] > room.floor
+    feet = np.concatenate([feet, ends[~inner]])
+    beams = np.concatenate([cones, branches, struts.reshape(-1, 2, 4), forest.braces()])
     discs = np.stack([feet + [0, 0, 0, RIM], feet + [0, 0, RISE, 0]], 1)
     plate, area = _raft(feet, room.floor - raft, raft) if raft else (np.empty((0, 4)), 0.0)
     pillars = Pillars(
         np.concatenate([beams, discs]) / of.scale, room.floor / of.scale, plate / [1, 1, 1, of.scale]
     )
     volume = _volume(pillars.beams * of.scale) + area * raft
-    counts = len(points), int(inner.sum()), caught
-    scars = math.pi * float((tips**2).sum() + (tips[~led][inner] ** 2).sum())
-    made = Supports(of.root, _node(pillars), pillars, strength.tip, *counts, volume, scars)
+    counts = len(cones) + len(struts), int(inner.sum())
+    scars = math.pi * float(
+        (tips[led] ** 2).sum() + (struts[:, 0, 0, 3] ** 2).sum() + (ends[inner, 3] ** 2).sum()
+    )
+    bare = points[~led][shut]
+    made = Supports(of.root, _node(pillars), pillars, strength.tip, *counts, volume, scars, bare)
     return made, of.carried(beams, lowest)
 
 
@@ -626,28 +686,27 @@ def sections(beams: Points, heights: NDArray[np.float64]) -> NDArray[np.float64]
 
 
 def _struts(
-    of: Object, room: Room, tops: Points, ground: NDArray[np.float64], pillar: float
-) -> tuple[Points, int]:
-    """Beams straight down from balls [n, 4] to what is below, thicker between if they are long and a piece as
-    wide can be taken out, thinner if only that can, and the number of those of which no piece can.
+    exits: Exits, tops: Points, ground: NDArray[np.float64], pillar: float
+) -> tuple[Points, NDArray[np.bool_]]:
+    """Beams [m, 2, 2, 4] straight down from balls [n, 4] to what is below, thicker between if they are long
+    and a piece as wide can be taken out, thinner if only that can; and which of the balls, [n], have none, as
+    no piece can.
     """
     tops, low, middle = tops.copy(), tops.copy(), tops.copy()
     low[:, 2] = ground
     middle[:, 2] = (tops[:, 2] + ground) / 2
     middle[:, 3] = np.clip((tops[:, 2] - ground) / 8, tops[:, 3], np.maximum(tops[:, 3], pillar))
-    exits, caught = dict[int, Exits](), 0
-    for k in np.flatnonzero(ground > room.floor).tolist():
+    shut = ground > exits.room.floor
+    for k in np.flatnonzero(shut).tolist():
         tip = float(tops[k, 3])
         for radius in (float(middle[k, 3]), tip, tip / 2):
-            size = max(round(min(radius, (tops[k, 2] - ground[k]) / 2) / PIECE), 1)
-            way = exits.setdefault(size, Exits(of, room, size * PIECE))
-            if way.lead_out(tops[k, :3], float(ground[k])):
+            piece = PIECE * max(round(min(radius, (tops[k, 2] - ground[k]) / 2) / PIECE), 1)
+            if exits.lead_out(piece, tops[k, :3], float(ground[k])):
                 middle[k, 3], tops[k, 3], low[k, 3] = radius, min(tip, radius), min(tip, radius)
+                shut[k] = False
                 break
-        else:
-            middle[k, 3] = tip
-            caught += 1
-    return np.concatenate([np.stack([tops, middle], 1), np.stack([middle, low], 1)]), caught
+    made = np.stack([np.stack([tops, middle], 1), np.stack([middle, low], 1)], 1)
+    return made[~shut], shut
 
 
 def _volume(beams: Points) -> float:

@@ -14,9 +14,11 @@ Carr, Snoeyink and Axen 2003).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,6 +26,7 @@ from .. import _slices
 from .._native import graph_components
 from .._slices import count_pixels, distances, narrow_pixels, painted
 from ..common.arrays import Rows
+from ..common.messages import format_count
 from ..printing.walls import BINS
 
 
@@ -208,6 +211,37 @@ class Feature:
     area: float  # maximum area in a layer, mm^2
     volume: float  # volume, mm^3
     at: tuple[float, float]  # centroid in its first layer, mm from the middle of the object
+
+
+MARKS = {
+    "island": (214, 60, 60),
+    "suction cup": (220, 60, 170),
+    "resin trap": (110, 60, 190),
+    "sealed cavity": (20, 150, 90),
+}
+"""Colours of the boxes around features, by their kind, sRGB."""
+
+
+class FeatureBox(NamedTuple):
+    """A box around a feature of a kind of `MARKS`, for pictures; mm from the middle of the lower face."""
+
+    kind: str
+    low: tuple[float, float, float]
+    high: tuple[float, float, float]
+
+    @classmethod
+    def around(cls, kind: str, feature: Feature, tops: np.ndarray) -> FeatureBox:
+        """Box as wide as the largest area of a feature. `tops`: upper faces of all layers, mm, [l]."""
+        (x, y), half, (first, last) = feature.at, math.sqrt(feature.area) / 2, feature.layers
+        bottom = float(tops[first - 1]) if first else 0.0
+        return cls(kind, (x - half, y - half, bottom), (x + half, y + half, float(tops[last])))
+
+
+def counted(marks: Sequence[FeatureBox]) -> dict[str, str]:
+    """How many boxes of each kind there are, as text."""
+    number = {kind: sum(mark.kind == kind for mark in marks) for kind in MARKS}
+    plurals = {"sealed cavity": "sealed cavities"}
+    return {kind: format_count(n, kind, plurals.get(kind, "")) for kind, n in number.items() if n}
 
 
 @dataclass(eq=False)

@@ -22,6 +22,7 @@ from ..common.parameters import record
 from ..errors import SliceError
 from ..records import RasterOptions
 from ..work import Work
+from .feature_graph import MARKS, FeatureBox, counted
 from .layers import Layer, Pictures, ScreenView, Slicer, SupportedLayer
 from .printers import START, Printer, Resin
 from .stack import Stack
@@ -317,33 +318,42 @@ def worst_layers(stack: Stack, layers: Sequence[int], file: BinaryIO, work: Work
 
 
 ROWS = 480
-"""Layers of an elevation, at most."""
+"""Layers of an elevation, at most, and its height, pixels."""
 
-SIDES = np.array([(255, 255, 255), (120, 120, 120), (60, 130, 200)], np.uint8)
-"""Colours of an elevation: of nothing, the object and its supports."""
+XRAY = np.array([(225, 222, 215), (60, 58, 54)], float)
+"""Colours of an elevation where the way through the object is short, and where it is longest, sRGB."""
+
+HELD = (60, 130, 200)
+"""Colour of supports, sRGB."""
 
 
-def elevations(stack: Stack, file: BinaryIO, work: Work | None = None) -> None:
-    """Write a PNG of an object and its supports, in another colour, from the front and from the right."""
-    from PIL import Image
+def elevations(stack: Stack, marks: Sequence[FeatureBox], file: BinaryIO, work: Work | None = None) -> None:
+    """Write a PNG from the front and from the right: an object as by X-rays, its supports and boxes."""
+    from PIL import Image, ImageDraw
 
-    assert stack.supports is not None
     work, chosen = work or Work(), _spread_layers(range(len(stack.z)), ROWS)
 
     def sides(layer: Layer) -> list[np.ndarray]:
-        assert isinstance(layer, SupportedLayer)
-        solids = _solid(layer.own), _solid(layer.supports)
-        return [np.asarray(solid.any(axis)) for axis in (0, 1) for solid in solids]
+        own, whole = _solid(layer.own if isinstance(layer, SupportedLayer) else layer), _solid(layer)
+        return [np.asarray(solid.mean(axis)) for axis in (0, 1) for solid in (own, whole)]
 
-    front, front_held, right, right_held = (
-        np.array(rows) for rows in zip(*Slicer(stack, work).map(sides, chosen), strict=True)
-    )
-    high, pictures = len(chosen), []
-    for own, held, pixel in zip((front, right), (front_held, right_held), stack.pixel, strict=True):
-        shown = SIDES[np.where(held & ~own, 2, own)][::-1]
-        across = own.shape[1] * pixel * high / float(stack.tops[-1])
-        pictures.append(Image.fromarray(shown).resize((max(round(across), 1), high), Image.Resampling.BOX))
-    both = Image.new("RGB", (sum(p.width for p in pictures) + 8, high), "white")
+    seen = [np.array(rows) for rows in zip(*Slicer(stack, work).map(sides, chosen), strict=True)]
+    share, pictures = ROWS / float(stack.tops[-1]), []
+    for axis, (own, whole) in enumerate((seen[:2], seen[2:])):
+        across = own.shape[1] * stack.pixel[axis] * share
+        shades = XRAY[0] + (own / max(own.max(), 1e-9))[..., None] * (XRAY[1] - XRAY[0])
+        shades[own == 0] = np.where((whole > 0)[..., None], HELD, 255)[own == 0]
+        shown = Image.fromarray(shades.astype(np.uint8)[::-1])
+        picture = shown.resize((max(round(across), 1), ROWS), Image.Resampling.BOX)
+        draw = ImageDraw.Draw(picture)
+        for kind, low, top in marks:
+            left, right = (across / 2 + share * corner[axis] for corner in (low, top))
+            upper, lower = (ROWS - share * corner[2] for corner in (top, low))
+            wider = 2 * list(MARKS).index(kind)  # boxes of two kinds around the same
+            box = left - wider, upper - wider, right + wider, lower + wider
+            draw.rectangle(box, outline=MARKS[kind], width=2)
+        pictures.append(picture)
+    both = Image.new("RGB", (sum(p.width for p in pictures) + 8, ROWS), "white")
     both.paste(pictures[0], (0, 0))
     both.paste(pictures[1], (pictures[0].width + 8, 0))
     both.save(file, "PNG")
@@ -368,20 +378,16 @@ def page(
     tops: NDArray[np.float64],
     areas: NDArray[np.float64],
     picture: bytes,
+    sides: bytes,
+    marks: Sequence[FeatureBox],
     views: Sequence[bytes] = (),
-    sides: bytes = b"",
 ) -> bytes:
     """Compose a summary page.
 
-    `tops`, `areas`: float64 [n], mm, mm2; `views`: pictures of the object, PNG; `sides`: see `elevations`,
-    empty if there are no supports.
+    `tops`, `areas`: float64 [n], mm, mm2; `picture`: PNG of `worst_layers`, `sides`: of `elevations`,
+    `views`: of the object.
     """
     shown = [f'<img alt="The object" width="48%" src="{_source(view)}">' for view in views]
-    held = [
-        "<h2>Supports</h2>",
-        "<p>From the front and from the right.</p>",
-        f'<img alt="Supports" src="{_source(sides)}">',
-    ]
     text = [
         "<!DOCTYPE html>",
         f'<html lang="en"><meta charset="utf-8"><title>{escape(title)}</title><style>{_STYLE}</style>',
@@ -390,7 +396,9 @@ def page(
         f"<h2>{escape(verdict.capitalize())}</h2>",
         *(["<ul>", *(f"<li>{escape(problem)}</li>" for problem in problems), "</ul>"] if problems else []),
         *(["<h2>The object</h2>", "<p>Red hangs in the air, orange is thin.</p>", *shown] if shown else []),
-        *(held if sides else []),
+        "<h2>From the front and from the right</h2>",
+        f"<p>{_legend(marks)}</p>",
+        f'<img alt="From the front and from the right" src="{_source(sides)}">',
         "<h2>Cross-section over height</h2>",
         "<p>The force that peels a layer from the film grows with its area.</p>",
         plot(tops, areas),
@@ -400,6 +408,12 @@ def page(
         "</html>",
     ]
     return "\n".join([*text, ""]).encode()
+
+
+def _legend(marks: Sequence[FeatureBox]) -> str:
+    """What the boxes of an elevation are around, in their colours; supports are blue."""
+    boxes = [f'<span style="color:rgb{MARKS[kind]}">{text}</span>' for kind, text in counted(marks).items()]
+    return "As by X-rays; supports are blue. " + (f"Boxes: {', '.join(boxes)}." if boxes else "")
 
 
 def _source(picture: bytes) -> str:

@@ -27,6 +27,7 @@ from ..printing.pillars import (
     STRENGTHS,
     WIDEST,
     Contacts,
+    Exits,
     Object,
     Room,
     Strength,
@@ -68,7 +69,7 @@ GROWN, TALL = 0.1, 0.3
 """Area, mm2, and height, mm, that a speck reaches alone if it has a tip."""
 
 POCKET = 4.5
-"""Reach in holes without exit, mm, where tips stay for good: below the limit of `fracslice.checks`."""
+"""Reach in holes whose exits are narrow, mm: tips in them are dear. Below the limit of `fracslice.checks`."""
 
 REGAINED = 1.0
 """Reach that is regained for each mm of material above."""
@@ -107,12 +108,12 @@ def supported(planned: Plan, stack: Stack, how: Print, work: Work, thinnest: flo
     survey = _Survey.of(stack, work)
     of = Object(stack.root, stack.scale, np.array(survey.areas), float(stack.heights[0]), work)
     room = survey.room(strength, how.raft)
-    around = 0
+    exits, around = Exits(of, room), 0
     for turn in range(ROUNDS):
         contacts = survey.contacts(of, room, strength, around)
         if not len(contacts.points):
             return planned
-        made, carried = support(of, room, contacts, strength, how.raft)
+        made, carried = support(exits, contacts, strength, how.raft)
         if carried >= 1:
             break
         strength = replace(strength, reach=strength.reach * min(max(0.5, math.sqrt(carried)), CLOSER))
@@ -127,8 +128,8 @@ def _joined(planned: Plan, made: Supports, scale: float, room: Room, raft: float
     low = (room.floor - raft) / scale
     box = planned.box | made.node.bounds.box
     box = replace(box, lo=(*box.lo[:2], low)) & replace(box, hi=(*box.hi[:2], planned.box.hi[2]))
-    made = replace(made, box=box)
     x, y, _ = planned.box.centre
+    made = replace(made, box=box, bare=made.bare - np.array([x, y, low]) * scale)
     box = box.about((x, y, box.centre[2]))
     outer = (planned.outer | box).about(planned.outer.centre)
     root = edited_field(planned.root, "add", made.node)
@@ -163,6 +164,7 @@ class _Survey:
     areas: list[float] = field(default_factory=list)  # of all layers, mm2
     births: list[_Birth] = field(default_factory=list)
     full: list[NDArray[np.bool_]] = field(default_factory=list)  # cells of each layer of cells, [y, x]
+    dense: list[NDArray[np.bool_]] = field(default_factory=list)  # those that the object fills
 
     @classmethod
     def of(cls, stack: Stack, work: Work) -> _Survey:
@@ -172,24 +174,27 @@ class _Survey:
         times = max(round(side / max(stack.pixel)), 1)
         made = cls(stack, (times, times, max(round(side / height), 1)))
 
-        def look(layer: Layer) -> tuple[LayerComponents, float, NDArray[np.bool_]]:
+        def look(layer: Layer) -> tuple[LayerComponents, float, NDArray[np.int32]]:
             runs = layer.runs
-            return layer_components(runs)[0], layer.area, count_pixels(runs, times) > 0
+            return layer_components(runs)[0], layer.area, count_pixels(runs, times)
 
         made.add(Slicer(stack, work).map(look))
         return made
 
-    def add(self, layers: Iterator[tuple[LayerComponents, float, NDArray[np.bool_]]]) -> None:
+    def add(self, layers: Iterator[tuple[LayerComponents, float, NDArray[np.int32]]]) -> None:
         """Follow the components of layers upwards, each with the oldest of what it grew together of."""
         before: LayerComponents | None = None
         oldest = np.empty(0, np.int64)  # births that the components of the layer before are named by
         square = self.stack.pixel[0] * self.stack.pixel[1]
-        for k, (now, area, full) in enumerate(layers):
+        for k, (now, area, count) in enumerate(layers):
             self.areas.append(area)
+            full, dense = count > 0, count == self.cell[0] * self.cell[1]
             if k % self.cell[2] == 0:
                 self.full.append(full)
+                self.dense.append(dense)
             else:
                 self.full[-1] |= full
+                self.dense[-1] &= dense
             names = np.full(len(now), -1)
             pairs = overlaps(before, now) if before is not None else np.empty((0, 2), np.int64)
             if len(pairs):
@@ -278,10 +283,10 @@ class _Survey:
         slab, cell = SLAB * float(self.stack.heights[0]), self.sides
         lift = math.ceil((LIFT + raft) / slab) * slab - raft
         below = math.ceil(lift / cell[2])
-        full = np.pad(np.array(self.full), ((below, 0), (0, 0), (0, 0)))
+        full, dense = (np.pad(np.array(of), ((below, 0), (0, 0), (0, 0))) for of in (self.full, self.dense))
         origin = self.low - [0, 0, below * cell[2]]
         clear = CLEARANCE + strength.pillar / 2
-        return Room.around(full, origin, float(self.low[2] - lift), cell, clear)
+        return Room.around(full, dense, origin, float(self.low[2] - lift), cell, clear)
 
     def on_surface(self, of: Object, cells: NDArray[np.int64]) -> NDArray[np.float64]:
         """Lowest points of the solid in cells (z, y, x), [n, 3]; those without any are left out."""

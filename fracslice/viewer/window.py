@@ -7,9 +7,9 @@ import ctypes.util
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from ..common.parameters import Choice, Vector, validate_value
 from ..errors import RenderError
 from ..mesh.model import Mesh
 from ..mesh.models import read_coloured
+from ..slicing.feature_graph import MARKS, FeatureBox, counted
 from . import plotter
 from .plotter import body, set_lighting
 
@@ -139,18 +140,34 @@ def has_screen() -> bool:
 
 
 INK = "#303438"
-HELP = "drag: turn   wheel: zoom   W, S: wires, surface   C: cut open   V: first view   Q: close"
+HELP = "drag: turn   wheel: zoom   W, S: wires, surface   C: cut   X: see through   V: first view   Q: close"
+CLEAR = 0.35
+"""Opacity of a mesh that is see-through."""
+
+CURVE = (0.34, 0.24)
+"""Width and height of the curve of areas, shares of the window."""
 
 
-def show(mesh: Mesh | str | Path) -> None:
+class Found(NamedTuple):
+    """What a check found in the layers of a mesh."""
+
+    marks: Sequence[FeatureBox]  # boxes around features
+    tops: np.ndarray  # upper faces of the layers, mm, float64 [l]
+    areas: np.ndarray  # their areas, mm2, float64 [l]
+
+
+def show(mesh: Mesh | str | Path, found: Found | None = None) -> None:
     """Open a window on a mesh and return when it is closed.
 
-    Keys: W wireframe, S surface, C clipping plane on and off (drag it), V first view, Q close.
+    Keys: W wireframe, S surface, C clipping plane on and off (drag it), X see-through on and off, V first
+    view, Q close.
 
     Parameters
     ----------
     mesh : Mesh, str or Path
         A mesh or a model file.
+    found : Found, optional
+        Boxes and a curve to draw beside it; the mesh is see-through then.
 
     Raises
     ------
@@ -162,7 +179,10 @@ def show(mesh: Mesh | str | Path) -> None:
     name = "" if isinstance(mesh, Mesh) else f"{Path(mesh).name}: "
     model = mesh if isinstance(mesh, Mesh) else read_coloured(mesh)
     need_screen()
-    ViewerWindow(model, name).plotter.show()
+    window = ViewerWindow(model, name)
+    if found:
+        window.add(found, model)
+    window.plotter.show()
 
 
 def caption(mesh: Mesh) -> str:
@@ -195,6 +215,31 @@ class ViewerWindow:
         self.plotter.add_axes(color=INK)
         self.bind("c", self.toggle_cut)
         self.bind("v", self.reset)
+        self.bind("x", self.see_through)
+
+    def add(self, found: Found, mesh: Mesh) -> None:
+        """Draw boxes around what was found in a mesh, and the curve of areas over height."""
+        import pyvista
+
+        (x0, y0, z0), (x1, y1, _) = mesh.bounds.tolist()
+        middle = np.array([(x0 + x1) / 2, (y0 + y1) / 2, z0])
+        for kind, low, high in found.marks:
+            sides = np.column_stack([middle + low, middle + high]).ravel()
+            edges = pyvista.Box(sides).extract_feature_edges()
+            self.plotter.add_mesh(edges, color=MARKS[kind], line_width=3, lighting=False)
+        if found.marks:
+            self.see_through()
+        for line, (kind, text) in enumerate(counted(found.marks).items()):
+            place = (0.84, 0.96 - 0.03 * line)
+            self.plotter.add_text(text, place, font_size=10, color=MARKS[kind], viewport=True)
+        chart = pyvista.Chart2D(size=CURVE, loc=(1 - CURVE[0], 0), x_label="height, mm", y_label="area, mm2")
+        chart.line(found.tops, found.areas, color=INK)
+        self.plotter.add_chart(chart)
+
+    def see_through(self) -> None:
+        """Switch between a mesh that hides what is in it and one that does not."""
+        self.actor.prop.opacity = 1.0 if self.actor.prop.opacity < 1 else CLEAR
+        self.plotter.render()
 
     def bind(self, key: str, action: Callable[[], None]) -> None:
         """Bind a key and remove pyvista's own bindings of it."""

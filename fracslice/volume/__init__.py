@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..common.messages import format_count, significant
+from ..common.messages import format_count, place, significant
 from ..errors import VolumeError
 from ..fields.box import Box, Triple
 from ..fields.depth import depth_notes, resolve_depths, visible, with_depth_advice
@@ -115,12 +115,13 @@ class Supports:
         Number of tips.
     inner
         Number of those whose branch ends on the object.
-    caught
-        Number of these in a hole from which none can be taken.
     volume
         Volume, with the feet and the raft.
     scars
         Area of all contacts.
+    bare
+        Places in holes without exit, which have no support, as none could be taken out, float64 [n, 3], mm;
+        once both are joined, from the middle of the object and above the lowest point.
     box
         Bounds of both together, scene units; None before they are joined.
     """
@@ -131,9 +132,9 @@ class Supports:
     tip: float
     tips: int
     inner: int
-    caught: int
     volume: float
     scars: float
+    bare: np.ndarray
     box: Box | None = None
 
     def distances(self, points: np.ndarray) -> np.ndarray:
@@ -154,10 +155,14 @@ class Supports:
     def __str__(self) -> str:
         """A line on them."""
         inner = f", {self.inner} of them from the object itself" if self.inner else ""
-        caught = f", {self.caught} in holes without exit (--cavities fill, or --up)" if self.caught else ""
-        tips = f"{format_count(self.tips, 'tip')} of {self.tip:g} mm{inner}{caught}"
+        tips = f"{format_count(self.tips, 'tip')} of {self.tip:g} mm{inner}"
         volume, scars = significant(self.volume), significant(self.scars)
-        return f"supports: {tips}; {volume} mm3, scars of {scars} mm2"
+        made = f"supports: {tips}; {volume} mm3, scars of {scars} mm2"
+        if not len(self.bare):
+            return made
+        count = format_count(len(self.bare), "place has none", "places have none")
+        lowest = place(self.bare[self.bare[:, 2].argmin()].tolist())
+        return f"{made}; {count}, in holes without exit, the lowest at {lowest} mm (--cavities fill, or --up)"
 
 
 @dataclass(frozen=True, eq=False)

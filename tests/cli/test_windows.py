@@ -9,6 +9,7 @@ from fracslice.cli.main import run
 
 from fracslice.mesh import Mesh
 from fracslice.scene.view import Camera
+from fracslice.viewer import Found
 
 
 def test_show_opens_on_the_mesh_of_a_scene(ball: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -18,6 +19,22 @@ def test_show_opens_on_the_mesh_of_a_scene(ball: Path, monkeypatch: pytest.Monke
     words = ["--set", "solid.size=4cm", "--size", "2cm", "--resolution", "24", "--base", "5mm", "--quiet"]
     assert run(["show", str(ball), *words]) == 0
     assert meshes[0].size == pytest.approx((20, 20, 15), abs=0.1)
+
+
+def test_check_opens_on_what_it_found(
+    ball: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shown: list[tuple[Mesh, Found]] = []
+    monkeypatch.setattr("fracslice.viewer.show", lambda *what: shown.append(what))
+    monkeypatch.setattr("fracslice.viewer.need_screen", lambda: None)
+    words = ["--size", "2cm", "--resolution", "24", "--cavities", "keep", "--quiet", "--show"]
+    assert run(["check", str(ball), *words]) == 1
+    ((mesh, found),) = shown
+    assert mesh.colours is not None and found.marks == []
+    assert len(found.tops) == len(found.areas) and found.areas.max() == pytest.approx(314, rel=0.02)
+    capsys.readouterr()
+    assert run(["check", str(ball), "--layer", "1mm", "--show"]) == 2
+    assert "--show: only with a mesh" in capsys.readouterr().err
 
 
 def test_fly_says_where_it_ended(

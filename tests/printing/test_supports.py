@@ -15,6 +15,7 @@ from scipy.ndimage import distance_transform_edt, label
 from fracslice import MeshJob, make_mesh, slice_layers
 from fracslice._slices import Encoding
 from fracslice.checks.layer_checks import check_layers
+from fracslice.common.messages import place
 from fracslice.errors import SceneError
 from fracslice.formulas import (
     Node,
@@ -30,7 +31,7 @@ from fracslice.formulas import (
 )
 from fracslice.jobs.mesh import make_apart, make_implicit
 from fracslice.jobs.plates import write_bodies
-from fracslice.printing.pillars import Object, Room, steps_from
+from fracslice.printing.pillars import Exits, Object, Room, steps_from
 from fracslice.scene import Print, scene
 from fracslice.slicing import SliceJob, Slicer, Stack, plan_stack
 from fracslice.slicing.layers import Layer, ScreenView
@@ -87,7 +88,7 @@ def test_nothing_begins_or_hangs_in_the_air(root: Node) -> None:
     assert islands(pictures(stack)) == 0
     assert {problem.kind for problem in report.problems} <= {"thin"}
     assert report.overhang is None and len(report.bodies) <= 1
-    assert stack.supports is not None and stack.supports.caught == 0
+    assert stack.supports is not None and not len(stack.supports.bare)
     assert str(stack.supports) == report.supports
 
 
@@ -135,21 +136,42 @@ def test_a_mesh_has_the_size_of_object_and_supports() -> None:
     )
 
 
-def test_what_hangs_in_a_cavity_is_caught() -> None:
-    held = supported(CAVITY).supports
-    assert held is not None and held.caught == held.inner == 1
-    assert "1 in holes without exit (--cavities fill" in str(held)
+def test_what_hangs_in_a_cavity_has_no_support() -> None:
+    stack = supported(CAVITY)
+    held = stack.supports
+    assert held is not None and held.inner == 0 and len(held.bare) == 1
+    report = check_layers(stack, None, None, Work(threads=1))
+    (island,) = [problem for problem in report.problems if problem.kind == "islands"]
+    assert island.at is not None and island.mend == (("cavities", "fill"),)
+    assert held.bare[0] == pytest.approx(island.at, abs=2 * STEP)
+    where = f"the lowest at {place(held.bare[0])} mm (--cavities fill, or --up)"
+    assert str(held).endswith(f"; 1 place has none, in holes without exit, {where}")
     filled = supported(CAVITY, cavities="fill").supports  # type: ignore[arg-type]
-    assert filled is not None and filled.caught == 0
+    assert filled is not None and not len(filled.bare)
 
 
-@pytest.mark.parametrize(("hole", "caught"), [(1.2, 0), (0.3, 1)])
-def test_what_comes_out_of_a_hole_is_not_caught(hole: float, caught: int) -> None:
+@pytest.mark.parametrize(("hole", "bare"), [(1.2, 0), (0.3, 0), (0.15, 1)])
+def test_what_comes_out_of_a_hole_is_supported(hole: float, bare: int) -> None:
     room = difference(
         CAVITY, transform(cylinder(radius=hole / 2, height=8), rotate=(0, 1, 0, 90), translate=(5, 0, 0))
     )
     held = supported(room).supports
-    assert held is not None and held.inner == 1 and held.caught == caught
+    assert held is not None and held.inner == 1 - bare and len(held.bare) == bare
+
+
+def test_a_ball_comes_out_of_a_hole_as_wide() -> None:
+    wall = difference(box(size=(6, 6, 6)), box(size=(4, 4, 4)))
+    full = np.pad(np.ones((6, 6, 6), bool), 3)
+    full[4:8, 4:8, 4:8] = False
+    dense = full & ~np.pad(np.ones((4, 4, 4), bool), 4)
+    room = Room.around(full, np.zeros_like(full), np.full(3, -6.0), -6.0, np.ones(3), 3.0)
+    shut = Room.around(full, dense, np.full(3, -6.0), -6.0, np.ones(3), 3.0)
+    for hole, out in ((0.5, True), (0.39, False)):
+        tunnel = transform(cylinder(radius=hole, height=2), rotate=(0, 1, 0, 90), translate=(2.5, 0, 0))
+        of = Object(difference(wall, tunnel), 1.0, np.ones(1), 0.1, Work(threads=1))
+        top = np.array([1.0, 0.0, 0.0])
+        assert Exits(of, room).lead_out(0.4, top, -2.0) == out
+        assert not Exits(of, shut).lead_out(0.4, top, -2.0)
 
 
 def test_a_strut_stands_on_what_is_as_wide() -> None:
@@ -272,11 +294,13 @@ def test_steps_are_at_most_distances() -> None:
 def test_ways_go_around() -> None:
     full = np.zeros((40, 40, 40), bool)
     full[20, 8:32, 8:32] = True  # a plate
-    room = Room.around(full, np.zeros(3), 0.0, np.ones(3), 3.0)
+    room = Room.around(full, full, np.zeros(3), 0.0, np.ones(3), 3.0)
     start = np.array([20.5, 20.5, 36.5])
     assert math.isinf(room.cost[room.at(start - [0, 0, 15])])  # inside the plate's surroundings
     assert room.cost[room.at(np.array([2.5, 2.5, 36.5]))] == pytest.approx(36)
-    way = room.way(np.array([11.5, 20.5, 39.5]))
+    way = [np.array([11.5, 20.5, 39.5])]
+    while way[-1][2] > 0:
+        way.append(room.corner(way[-1]))
     for one, other in pairwise(way):
         assert room.is_free(one, other, room.wide)
         assert math.dist(one[:2], other[:2]) <= 1.001 * (one[2] - other[2])

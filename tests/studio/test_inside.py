@@ -141,7 +141,7 @@ def test_supports_of_a_layer_are_told_from_the_object() -> None:
     size = Sizing.of(6.0)
     stack = plan_stack(ball | rod, SliceJob(layer=0.5, pixel=0.1), WORK, size)
     ends = np.array([[[0, 0, -1.0, 0.5], [0, 0, 3, 0.5]]])
-    held = Supports(ball, rod, Pillars(ends, 0.0, np.empty((0, 4))), 0.5, 1, 0, 0, 1.0, 0.1)
+    held = Supports(ball, rod, Pillars(ends, 0.0, np.empty((0, 4))), 0.5, 1, 0, 1.0, 0.1, np.empty((0, 3)))
     layers = PrintLayers(replace(stack, supports=held), WORK, None, None)
     assert (layers.look(1).classes == HELD).sum() == pytest.approx(100 * np.pi / 4, rel=0.2)
     assert not (layers.look(8).classes == HELD).any()

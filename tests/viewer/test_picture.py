@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from PIL import Image
 
 from fracslice.errors import ExportError, RenderError
 from fracslice.mesh import Mesh
+from fracslice.slicing.feature_graph import FeatureBox
 from fracslice.viewer import picture, show, window
 from tests.mesh.shapes import cube, sphere
 
@@ -68,3 +71,25 @@ def test_a_window_needs_a_screen(monkeypatch: pytest.MonkeyPatch) -> None:
         with pytest.raises(RenderError, match="no screen"):
             show(cube())
     assert window.caption(cube()) == "10.0 x 10.0 x 10.0 mm, 12 triangles"
+
+
+def test_boxes_of_a_check_stand_where_it_found_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    plotter, actor = MagicMock(), SimpleNamespace(prop=SimpleNamespace(opacity=1.0))
+    monkeypatch.setattr(window, "_plotter", lambda title: plotter)
+    monkeypatch.setattr(window, "set_lighting", lambda *given, **more: actor)
+    mesh = cube()
+    opened = window.ViewerWindow(mesh, "")
+    marks = [FeatureBox("island", (-1, -2, 3), (1, 2, 4)), FeatureBox("sealed cavity", (2, 2, 5), (3, 3, 9))]
+    opened.add(window.Found(marks, np.array([5.0, 10.0]), np.array([2.0, 1.0])), mesh)
+    boxes = [call.args[0].bounds for call in plotter.add_mesh.call_args_list]
+    x, y, z = (*mesh.bounds.mean(0)[:2], mesh.bounds[0, 2])
+    assert boxes[0] == pytest.approx((x - 1, x + 1, y - 2, y + 2, z + 3, z + 4))
+    assert boxes[1] == pytest.approx((x + 2, x + 3, y + 2, y + 3, z + 5, z + 9))
+    texts = [call.args[0] for call in plotter.add_text.call_args_list]
+    assert texts[-2:] == ["1 island", "1 sealed cavity"]
+    ((chart,), _) = plotter.add_chart.call_args
+    (line,) = chart.plots("line")
+    assert (line.x == [5, 10]).all() and (line.y == [2, 1]).all()
+    assert actor.prop.opacity == window.CLEAR
+    opened.see_through()
+    assert actor.prop.opacity == 1

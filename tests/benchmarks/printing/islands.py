@@ -33,7 +33,7 @@ def rows(
     names = library.names()[:shipped]
     objects: list[tuple[str, Field]] = [(name, read(library.path(name)).root) for name in names]
     objects += [(str(tree), random_scene(tree, 0)) for tree in range(first, first + count)]
-    total = dict.fromkeys(("objects", "refused", "needed", "tips", "on the object", "caught"), 0)
+    total = dict.fromkeys(("objects", "refused", "needed", "tips", "on the object", "without"), 0)
     left = dict.fromkeys(("islands", "overhangs", "necks"), 0)
     for name, root in objects:
         made = examined(root, size, layer, Work(threads=run.threads[0]))
@@ -62,7 +62,7 @@ def examined(root: Field, size: float, layer: float, work: Work) -> dict[str, fl
         return str(error)
     kinds = [problem.kind for problem in report.problems]
     held = stack.supports
-    counts = {"tips": held.tips, "on the object": held.inner, "caught": held.caught} if held else {}
+    counts = {"tips": held.tips, "on the object": held.inner, "without": len(held.bare)} if held else {}
     return {
         **counts,
         "needed": bool(held),

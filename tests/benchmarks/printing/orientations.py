@@ -51,7 +51,8 @@ def _row(run: Run, root: Node, work: Work) -> Row:
         found["orient"] = orientations(root, Sizing(SIZE), work)[0].up
 
     acts: dict[str, Any] = {"orient": ours}
-    if not lacking("MeshTweaker", "the comparison needs"):
+    lacks = lacking("MeshTweaker", "the comparison needs")
+    if not lacks:
         corners = make_mesh(root, size=SIZE, resolution=VOXELS, threads=run.threads[0]).corners.reshape(-1, 3)
         tweak = importlib.import_module("MeshTweaker").Tweak
 
@@ -63,6 +64,8 @@ def _row(run: Run, root: Node, work: Work) -> Row:
     figures = run.interleaved(acts, warm=False)
     volumes = {name: _supports(root, up, work) for name, up in found.items()}
     row: Row = {f"{name}, mm3": volume for name, volume in volumes.items()}
+    if lacks:
+        row["Tweaker-3"] = "not installed"
     row |= {f"{name}, CPU s": figures.spread(name, "cpu_s") for name in acts}
     if volumes.get("Tweaker-3"):
         row["ratio"] = volumes["orient"] / volumes["Tweaker-3"]

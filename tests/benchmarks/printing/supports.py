@@ -10,8 +10,9 @@ import shutil
 import subprocess
 import tempfile
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 from fracslice import MeshJob, make_mesh
 from fracslice.formulas import Node, box, cylinder, mandelbulb, sphere, transform, union
@@ -42,51 +43,60 @@ OBJECTS: dict[str, tuple[Node, float]] = {
 SETTINGS = """printer_technology = SLA
 supports_enable = 1
 pad_enable = 0
-layer_height = 0.05
-initial_layer_height = 0.05
+layer_height = {0}
+initial_layer_height = {0}
 """
 
 
 def rows(run: Run, names: tuple[str, ...] = tuple(OBJECTS), peer: int = 1) -> Iterator[Row]:
     for name in names:
-        row = _ours(run, *OBJECTS[name])
-        if peer and shutil.which("prusa-slicer"):
-            row |= _prusa(*OBJECTS[name], float(row["supports, CPU s"].median), row["supports, mm3"])
+        row = ours(run, *OBJECTS[name], layer=0.05)
+        if peer:
+            root, size = OBJECTS[name]
+            with tempfile.TemporaryDirectory() as folder:
+                model = Path(folder) / "o.stl"
+                own = make_mesh(scene(root, size=size), MeshJob(simplify=0.02), path=model).report.mesh
+                row |= prusa(model, own.volume_mm3, 0.05, row)
         yield {"": name, **row}
 
 
-def _ours(run: Run, root: Node, size: float) -> Row:
-    """Volume of supports, and the time of both searches."""
+def ours(run: Run, root: Node, size: float, layer: float, orient: bool = True) -> Row:
+    """Volume of our supports, and the time of both searches."""
     work, made = Work(threads=run.threads[0]), list[float]()
-    job = SliceJob(size=size, layer=0.05, printing=Print(supports="medium"))
+    job = SliceJob(size=size, layer=layer, printing=Print(supports="medium"))
 
     def supports() -> None:
         stack = plan_stack(root, job, work)
         made.append(stack.supports.volume if stack.supports else 0.0)
 
-    acts = {"supports": supports, "orient": lambda: orientations(root, Sizing(size), work)}
+    acts: dict[str, Callable[[], Any]] = {"supports": supports}
+    if orient:
+        acts["orient"] = lambda: orientations(root, Sizing(size), work)
     figures = run.interleaved(acts, warm=False)
     return {"supports, mm3": made[-1], **{f"{act}, CPU s": figures.spread(act, "cpu_s") for act in acts}}
 
 
-def _prusa(root: Node, size: float, seconds: float, volume: float) -> Row:
-    """Supports of PrusaSlicer, and ours in relation to them."""
-    with tempfile.TemporaryDirectory() as folder:
-        model, settings, output = (Path(folder) / name for name in ("o.stl", "sla.ini", "o.sl1"))
-        settings.write_text(SETTINGS)
-        own = make_mesh(scene(root, size=size), MeshJob(simplify=0.02), path=model).report.mesh.volume_mm3
-        words = ["prusa-slicer", "--load", settings, "--export-sla", model, "--output", output]
-        try:
-            figures: Figures = process(["timeout", str(LIMIT), *words])
-        except (SystemExit, subprocess.SubprocessError):
-            return {"PrusaSlicer": f"none within {LIMIT} s"}
-        with zipfile.ZipFile(output) as archive:
-            lines = archive.read("config.ini").decode().splitlines()
-        used = next(float(line.partition("=")[2]) for line in lines if line.startswith("usedMaterial"))
-        theirs = 1000 * used - own
-        return {
-            "PrusaSlicer, mm3": theirs,
-            "PrusaSlicer, CPU s": figures["cpu_s"],
-            "volume, ratio": volume / theirs,
-            "time, ratio": seconds / figures["cpu_s"],
-        }
+def prusa(model: Path, own: float, layer: float, of: Row) -> Row:
+    """Supports of PrusaSlicer for an STL file, and ours in relation to them.
+
+    `own`: volume of the model, mm3; `of`: what `ours` found.
+    """
+    if not shutil.which("prusa-slicer"):
+        return {"PrusaSlicer": "not installed"}
+    settings, output = model.with_suffix(".ini"), model.with_suffix(".sl1")
+    settings.write_text(SETTINGS.format(layer))
+    words = ["prusa-slicer", "--load", settings, "--export-sla", model, "--output", output]
+    try:
+        figures: Figures = process(["timeout", str(LIMIT), *words])
+    except (SystemExit, subprocess.SubprocessError):
+        return {"PrusaSlicer": f"none within {LIMIT} s"}
+    with zipfile.ZipFile(output) as archive:
+        lines = archive.read("config.ini").decode().splitlines()
+    used = next(float(line.partition("=")[2]) for line in lines if line.startswith("usedMaterial"))
+    theirs = 1000 * used - own
+    return {
+        "PrusaSlicer, mm3": theirs,
+        "PrusaSlicer, CPU s": figures["cpu_s"],
+        "volume, ratio": of["supports, mm3"] / theirs,
+        "time, ratio": of["supports, CPU s"].median / figures["cpu_s"],
+    }
