@@ -16,14 +16,19 @@ from fracslice.fields.orbits import growth_of, steps
 from fracslice.formulas import Node
 from fracslice.scene import reads, to_xml
 from fracslice.scene.mandelbulber import import_scene
+from fracslice.scene.mandelbulber.measures import FAR, own_solid, solid_of, surface
 from fracslice.scene.mandelbulber.objects import orbits
-from fracslice.scene.mandelbulber.sequences import definition, element, order, steps_of
+from fracslice.scene.mandelbulber.sequences import definition, distance_of, element, order, steps_of
 from fracslice.scene.mandelbulber.settings import SettingsSection, default_of, parse_settings
-from fracslice.scene.mandelbulber.step_text import ADDED, FORMULAS, SWAPPED
+from fracslice.scene.mandelbulber.step_text import ADDED, FORMULAS, OWN_SOLID, SWAPPED
 from tests.examples import stamped
 
-from .mandelbulber_oracle import FORMULAS as ORACLE
+from . import mandelbulber_solids
+from .mandelbulber_oracle import FORMULAS as ESCAPES
 from .mandelbulber_oracle import rotation as oracle_rotation
+from .mandelbulber_solids import FOURS, SOLIDS
+
+ORACLE = {**ESCAPES, **mandelbulber_solids.FORMULAS}
 
 HEADER = "# Mandelbulber settings file\n# version 2.33\n# only modified parameters\n"
 
@@ -125,6 +130,7 @@ VALUES = {  # of formulas whose defaults leave much out
     1152: "transf_offset_000 0.1 0 0; transf_offsetA_000 0.5 0.4 0.3",
     1155: "transf_scale 0.9; mandelbox_offset 0.2 0 0; transf_function_enabledP_false true",
     1158: "transf_addition_constant_0555 0.5 0.4 0.3; transf_offsetA_000 -0.2 0 0; transf_scale_1 1.5",
+    **mandelbulber_solids.VALUES,
 }
 
 
@@ -210,8 +216,34 @@ def agrees(number: int, count: int) -> None:
         assert (within == known)[usual & ~beside].mean() > 0.9999
 
 
+@pytest.mark.parametrize("number", sorted(SOLIDS))
+def test_distances_are_those_of_the_oracle(number: int) -> None:
+    """Formulas with a distance of their own measure each point with that solid."""
+    source = text(f"formula_1 {number}; N 3", VALUES.get(number, ""))
+    orbit = orbits(parse_settings(source, "x.fract"))[0]
+    kind, points = distance_of(orbit), np.random.default_rng(number).uniform(-1.6, 1.6, (3, 1000))
+    node = surface(orbit, kind, "") if kind != OWN_SOLID else own_solid(orbit, steps_of(orbit), 0, "")
+    expected = SOLIDS[number](points, Values(parse_settings(source, "x").fractals[0]))
+    assert abs(node.distance(points.T) - expected).max() < 1e-6
+
+
+@pytest.mark.parametrize("count", [1000, pytest.param(100_000, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("number", sorted(FOURS))
+def test_solids_of_four_dimensions_are_those_of_the_oracle(number: int, count: int) -> None:
+    source = text(f"formula_1 {number}; N 5", VALUES.get(number, ""))
+    settings = parse_settings(source, "x.fract")
+    points = np.random.default_rng(number).uniform(-1.5, 1.5, (3, count))
+    q, c = np.vstack([points, 0 * points[:1]]), points
+    with np.errstate(all="ignore"):
+        for k in range(5):
+            q, c = FOURS[number](q, c, k, Values(settings.fractals[0]))
+    near = np.linalg.norm(q, axis=0) < FAR
+    assert (near == (solid_of(orbits(settings)[0], "").distance(points.T) < 0)).all()
+    assert 0.005 < near.mean() < 0.5
+
+
 def test_every_formula_has_an_oracle_and_is_in_the_manual() -> None:
-    assert set(ORACLE) == set(FORMULAS)
+    assert {*ORACLE, *FOURS} == set(FORMULAS)
     page = (Path(__file__).parents[2] / "docs/tasks/import.md").read_text(encoding="utf-8")
     rows = re.findall(r"^- \*\*[^*]+\*\*: ((?:.+\n)(?:  .+\n)*)", page, re.MULTILINE)
     listed = {" ".join(name.split()) for row in rows for name in row.split(";")}
@@ -279,11 +311,11 @@ def test_periodic_steps_are_rounds_and_others_are_unrolled(tmp_path: Path) -> No
 
 
 def test_formula_that_is_not_known_is_refused_or_left_out(tmp_path: Path) -> None:
-    source = text("hybrid_fractal_enable true; formula_1 8; formula_2 1627")
-    with pytest.raises(SceneError, match=r"x\.fract:7: formula_2 1627 \(transfDIFSSphereGrid\): not known"):
+    source = text("hybrid_fractal_enable true; formula_1 8; formula_2 1619")
+    with pytest.raises(SceneError, match=r"x\.fract:7: formula_2 1619 \(transfDIFSGearV1\): not known"):
         imported(tmp_path, source)
     made = imported(tmp_path, source, leave_out=True)
-    assert made.formulas == ("Mandelbox",) and "1627" in made.missing[0]
+    assert made.formulas == ("Mandelbox",) and "1619" in made.missing[0]
     variant = text("formula_1 119", "transf_function_enabledy_false true")
     with pytest.raises(SceneError, match=r"x\.fract:7: transf_function_enabledy_false: this variant"):
         imported(tmp_path, variant)
