@@ -45,8 +45,8 @@ def preimage(child, x, y, z, iterations, given, every, stages, order):  # type: 
     The first element is an escape-time fractal or an `orbit`, of which the steps alone count; the others are
     the solid. The value is that of the solid at the orbit's last point, divided by the stretch of its steps,
     or the least of all rounds. A stretch below 1 counts as 1, for an inversion shrinks what is far alone.
-    L = the solid's if the steps stretch alike everywhere; else twice that, which is measured. Where a step
-    tears space, the value jumps.
+    L = the solid's if the steps stretch alike everywhere; else twice that, which is measured, once for one
+    inside another. Where a step tears space, the value jumps.
     """
     start = (x, y, z)
     constants = tuple(constant_of(start, given[k], stages[k]) for k in order)
@@ -118,8 +118,9 @@ def preimage_arguments(node: Node) -> dict[str, object]:
 
 @preimage.slope
 def preimage_slope(node: Node) -> float:
-    (solid,) = node.fields
-    return solid.bounds.lipschitz * (1.0 if preimage_proves_slope(node) else LIPSCHITZ)
+    known = node.fields[0].bounds
+    counted = preimage.name in known.measured or preimage_proves_slope(node)
+    return known.lipschitz * (1.0 if counted else LIPSCHITZ)
 
 
 @preimage.proves_slope

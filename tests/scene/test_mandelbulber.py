@@ -227,6 +227,37 @@ def test_distances_are_those_of_the_oracle(number: int) -> None:
     assert abs(node.distance(points.T) - expected).max() < 1e-6
 
 
+def test_solids_within_a_round_are_behind_the_steps_before_them(tmp_path: Path) -> None:
+    """A box before the first step, a ball after the second, in two rounds."""
+    source = text(
+        "hybrid_fractal_enable true; formula_1 606; formula_2 1604; N 4",
+        "transf_scale_2 2; transf_offsetT_1 0.6; transf_offset_05 0.1",
+        "transf_offsetR_1 0.3",
+    )
+    made = imported(tmp_path, source)
+    assert reads(to_xml(made.scene)) == made.scene
+    torus, ball = (Values(section) for section in parse_settings(source, "x").fractals[:2])
+    points = np.random.default_rng(2).uniform(-1.5, 1.5, (3, 500))
+    w, stretch, parts = points, 1.0, []
+    for k in range(4):
+        if k % 2 == 0:
+            parts.append(SOLIDS[606](w[[2, 1, 0]], torus) / stretch)
+            w, stretch = ORACLE[606](w, points, torus, k), 2 * stretch
+        else:
+            parts.append(SOLIDS[1604](w, ball) / stretch)
+    assert made.scene.root.distance(points.T) == pytest.approx(np.min(parts, axis=0), abs=1e-6)
+
+
+def test_orbits_without_a_solid_or_of_four_dimensions_in_a_hybrid_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=r"x\.fract:6: a distance of the formulas that have none"):
+        imported(tmp_path, text("formula_1 8; delta_DE_function 5"))
+    with pytest.raises(SceneError, match=r"x\.fract:6: a formula of four dimensions in a hybrid"):
+        imported(tmp_path, text("hybrid_fractal_enable true; formula_1 4; formula_2 8"))
+    late = "transf_start_iterations 20"
+    with pytest.raises(SceneError, match="a distance that begins after 12 iterations"):
+        imported(tmp_path, text("formula_1 603; N 30", late))
+
+
 @pytest.mark.parametrize("count", [1000, pytest.param(100_000, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize("number", sorted(FOURS))
 def test_solids_of_four_dimensions_are_those_of_the_oracle(number: int, count: int) -> None:

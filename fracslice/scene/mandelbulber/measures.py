@@ -26,7 +26,7 @@ from .sequences import (
 )
 from .step_text import FOUR, JOS, KLEINIAN, OWN_SOLID, RADIUS, UnknownError
 
-ROUNDS, UNROLLED = 12, 16
+ROUNDS, UNROLLED = 12, 12
 """Most iterations of an orbit that is measured, and of one whose steps do not recur."""
 
 FAR = 4.0
@@ -141,6 +141,8 @@ def measured(orbit: Orbit, steps: Sequence[Text], name: str) -> Node:
     """Solids that any point of an orbit is in."""
     made, rounds = few(orbit, steps)
     places = [k for k, step in enumerate(made) if step.solid]
+    if not places:
+        raise UnknownError(f"{orbit.slots[0].line}: a distance that begins after {UNROLLED} iterations")
     thin = any(step.solid.thin for step in made if step.solid)
     whole = assembled(orbit, made, rounds, name)
     last = made[-1].solid
@@ -148,18 +150,27 @@ def measured(orbit: Orbit, steps: Sequence[Text], name: str) -> Node:
         return thick(
             orbit, get("preimage")(whole, own_solid(orbit, made, len(made) - 1, name), of="every"), thin
         )
-    inside = []
-    for k in places:
-        one = own_solid(orbit, made, k, name)
-        before = made[:k] if (of := made[k].solid) and of.first else made[: k + 1]
-        inside.append(
-            get("preimage")(assembled(orbit, before, 1, f"{name}to{k + 1}_"), one) if before else one
-        )
-    solid = inside[0] if len(inside) == 1 else get("union")(*inside)
+    solid = chain(orbit, made, name)
     if rounds == 1:
         return thick(orbit, solid, thin)
     rest = assembled(orbit, made, rounds - 1, name)
     return thick(orbit, get("union")(solid, get("preimage")(rest, solid, of="every")), thin)
+
+
+def chain(orbit: Orbit, made: Sequence[Text], name: str) -> Node:
+    """Solids of the steps of a round, each behind the steps before it."""
+    node: Node | None = None
+    for k in reversed(range(len(made))):
+        step = made[k]
+        own = [own_solid(orbit, made, k, name)] if step.solid else []
+        after = [*([] if step.solid and step.solid.first else own), *([node] if node else [])]
+        if after:
+            taken = assembled(orbit, [step], 1, f"{name}at{list(made).index(step) + 1}_")
+            node = get("preimage")(taken, *after)
+        if step.solid and step.solid.first:
+            node = get("union")(*own, *([node] if node else []))
+    assert node is not None
+    return node
 
 
 def thick(orbit: Orbit, node: Node, thin: bool) -> Node:

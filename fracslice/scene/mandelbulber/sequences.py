@@ -294,6 +294,8 @@ def steps_of(orbit: Orbit) -> list[Text]:
 def distance_of(orbit: Orbit) -> str:
     """What the points of an orbit are measured with: where formulas differ, that of the most iterations."""
     number = orbit.settings.main.whole("delta_DE_function", "0")
+    if any(slot.known and slot.known.distance == FOUR for slot in orbit.slots):
+        return FOUR
     if number != PREFERRED:
         return DISTANCES.get(number, RADIUS)
     counts = Counter[str]()
