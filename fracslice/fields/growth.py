@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass, replace
 from functools import lru_cache, reduce
 from itertools import accumulate, islice, product
 from operator import mul
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -401,7 +401,10 @@ def _read(text: str) -> Growth | None:
     import json
 
     values = json.loads(text)
-    return values and Growth(**{k: tuple(v) if isinstance(v, list) else v for k, v in values.items()})
+    if values is None:
+        return None
+    known: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in values.items()}
+    return Growth(**known)
 
 
 def _search(steps: Round, given: tuple[Given, ...], iterations: int) -> Growth | None:

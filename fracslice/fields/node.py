@@ -589,10 +589,6 @@ class Node(Operators, Field):
         """Children whose fields this one is made of; those of a hybrid are steps, not fields."""
         return () if self.formula.kind == "shape" else self.children[self.formula.steps :]
 
-    def with_fields(self, fields: tuple[Node, ...], **values: Any) -> Node:
-        """Copy with other fields and values; its steps stay."""
-        return self.changed((*self.children[: len(self.children) - len(self.fields)], *fields), **values)
-
     def solids(self) -> Iterator[Node]:
         """Iterate over this node and all fields below it, parents first.
 

@@ -33,7 +33,7 @@ from .step_text import (
     Element,
     FormulaStep,
     KnownFormula,
-    Solid,
+    MeasuredSolid,
     UnknownError,
 )
 
@@ -91,7 +91,7 @@ Values = tuple[tuple[str, Any], ...]
 
 
 class SolidText(NamedTuple):
-    """Distance of a formula at an iteration; see `step_text.Solid`."""
+    """Distance of a formula at an iteration; see `step_text.MeasuredSolid`."""
 
     text: str
     parameters: Values
@@ -234,7 +234,7 @@ def four_dimensional(step: FormulaStep, orbit: Orbit, slot: Slot) -> Text:
     return Text("\n".join(lines), tuple(step.parameters.items()), None, slot.place)
 
 
-def solid_text(solid: Solid | None) -> SolidText | None:
+def solid_text(solid: MeasuredSolid | None) -> SolidText | None:
     """Text of a formula's own distance."""
     if solid is None:
         return None

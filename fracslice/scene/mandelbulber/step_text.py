@@ -63,14 +63,14 @@ class FormulaStep:
     parameters: dict[str, float | Triple] = field(default_factory=dict)
     element: Element | None = None
     constant: str = "c"  # the constant where a formula adds it itself
-    solid: Solid | None = None  # what the formula measures the distance to
+    solid: MeasuredSolid | None = None  # what the formula measures the distance to
 
     def measure(
         self, first: bool = False, last: bool = False, thin: bool = False, slope: float = 1.0
     ) -> FormulaStep:
-        """Begin the text of the formula's own distance, of x, y and z, and return it; see `Solid`."""
+        """Begin the text of the formula's own distance, of x, y and z, and return it; see `MeasuredSolid`."""
         inner = FormulaStep(self.values, self.index)
-        self.solid = Solid(inner, first, last, thin, slope)
+        self.solid = MeasuredSolid(inner, first, last, thin, slope)
         return inner
 
     def write(self, *lines: str) -> None:
@@ -288,7 +288,7 @@ class FormulaStep:
 
 
 @dataclass(frozen=True)
-class Solid:
+class MeasuredSolid:
     """Solid that points of an orbit are measured with."""
 
     step: FormulaStep  # text of its distance
