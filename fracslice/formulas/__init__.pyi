@@ -1138,8 +1138,8 @@ def preimage(*elements: Node, of: Literal['last', 'every'] = 'last') -> Node:
     The first element is an escape-time fractal or an `orbit`, of which the steps alone count; the others are
     the solid. The value is that of the solid at the orbit's last point, divided by the stretch of its steps,
     or the least of all rounds. A stretch below 1 counts as 1, for an inversion shrinks what is far alone.
-    L = the solid's if the steps stretch alike everywhere; else twice that, which is measured. Where a step
-    tears space, the value jumps.
+    L = the solid's if the steps stretch alike everywhere; else twice that, which is measured, once for one
+    inside another. Where a step tears space, the value jumps.
 
     Parameters
     ----------
