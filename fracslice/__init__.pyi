@@ -61,6 +61,7 @@ from .formulas import offset as offset
 from .formulas import onion as onion
 from .formulas import orbit as orbit
 from .formulas import plane as plane
+from .formulas import preimage as preimage
 from .formulas import prism as prism
 from .formulas import pseudo_kleinian as pseudo_kleinian
 from .formulas import quaternion_mandelbrot as quaternion_mandelbrot

@@ -67,6 +67,7 @@ from fracslice.formulas import (
     onion,
     orbit,
     plane,
+    preimage,
     prism,
     pseudo_kleinian,
     quaternion_mandelbrot,
@@ -183,6 +184,7 @@ EXAMPLES: dict[str, Node] = {
     "revolve": revolve(WASHER, size=0.6, offset=0.4),
     "sweep": sweep(WASHER, size=0.4, points="-0.7 -0.6 0, 0.7 -0.5 0.1, 0.2 0.7 0", closed="yes"),
     "beams": beams(TRUSS, thickness=0.15, smooth=0.2),
+    "preimage": preimage(mandelbox(scale=-1.5, iterations=2), sphere(radius=4), of="every"),
     "scaffold": scaffold(box(size=(1.2, 0.9, 1.0)), count=12, thickness=0.2),
     "scaffold on a surface": scaffold(
         sphere(0.8), of="delaunay", where="surface", count=12, thickness=0.2, smooth=0.1
@@ -292,7 +294,8 @@ REPRESENTATIVES = {
     "heightmap", "honeycomb",
     "hybrid transformed", "julia 4d", "kaleidoscopic octahedron", "kelvin struts", "koch",
     "lambda bulb", "lithophane wall", "mandelbox -1.5", "mandelbulb", "mandelbulb 7.5", "many", "material",
-    "menger", "mirror", "model", "octahedron flake", "perlin noise", "prism", "pseudo kleinian",
+    "menger", "mirror", "model", "octahedron flake", "perlin noise", "preimage", "prism",
+    "pseudo kleinian",
     "quaternion julia 4", "repeat overlapping", "revolve", "rounded box", "schwarz_d wall", "shell",
     "smooth intersection", "smooth union", "snowflake", "sphere", "superquadric", "sweep", "text", "thread",
     "transform", "tree", "twist x", "volume",

@@ -46,6 +46,7 @@ def test_there_are_at_least_ten_and_they_show_what_there_is():
         "thicken",
         "onion",
         "scaffold",
+        "preimage",
     }
 
 

@@ -35,9 +35,10 @@ from .orbit_code import Code, stages
 from .orbits import HOOKS, LIPSCHITZ, OWN, growth_of, orbit_select, orbit_step, steps
 from .registry import Formula, Hook, Node, get, names
 
-LONGEST, DEEPEST, MOST = 4000, 24, 600
-"""Characters of a text, levels of its tree, and operations with its powers and loops written out, where a
-statement counts as one at least.
+LONGEST, DEEPEST, MOST, SLOWEST = 4000, 24, 600, 20_000
+"""Characters of a text, levels of its tree, operations that are compiled, with powers written out, where a
+statement counts as one at least, and operations that are computed at a point. A step is compiled with its
+loops written out.
 """
 
 HIGHEST, LARGEST = 16, 1e9
@@ -71,8 +72,10 @@ def is_name(text: str) -> bool:
     return _NAME.fullmatch(text) is not None and text not in RESERVED and not iskeyword(text)
 
 
-def parse_checked(text: str, given: Iterable[str], functions: Iterable[str], fail: Fail) -> list[ast.stmt]:
-    """Parse a text and check it."""
+def parse_checked(
+    text: str, given: Iterable[str], functions: Iterable[str], fail: Fail, written_out: bool = True
+) -> list[ast.stmt]:
+    """Parse a text and check it; `written_out`: whether it is compiled with its loops written out."""
     if len(text) > LONGEST:
         raise fail(1, f"has a text of {len(text)} characters: expected at most {LONGEST}")
     try:
@@ -86,8 +89,9 @@ def parse_checked(text: str, given: Iterable[str], functions: Iterable[str], fai
     check.body(body)
     if not body or not isinstance(body[-1], ast.Return):
         raise fail(getattr(body[-1], "lineno", 1) if body else 1, "expected a return as the last statement")
-    if check.cost(body) > MOST:
-        raise fail(1, f"has more than {MOST} operations with its loops and powers written out")
+    if check.cost(body, written_out) > MOST or check.cost(body) > SLOWEST:
+        most = MOST if written_out else SLOWEST
+        raise fail(1, f"has more than {most} operations with its loops and powers written out")
     return body
 
 
@@ -193,19 +197,19 @@ class _Check:
                 return
         self.refuse(node, f"a whole exponent from 1 to {HIGHEST}, or 0.5")
 
-    def cost(self, node: ast.AST | list[ast.stmt]) -> int:
-        """Operations of a tree whose loops and powers are written out."""
+    def cost(self, node: ast.AST | list[ast.stmt], ranges: bool = True) -> int:
+        """Operations of a tree whose powers and loops are written out, those over ranges if they are, too."""
         match node:
             case list():
-                return sum(map(self.cost, node))
+                return sum(self.cost(inner, ranges) for inner in node)
             case ast.BinOp(base, ast.Pow(), ast.Constant(int(n))):
-                return n * (1 + self.cost(base))
+                return n * (1 + self.cost(base, ranges))
             case ast.For(_, ast.Call(_, [ast.Constant(int(n))]), body):
-                return n * self.cost(body)
+                return (n if ranges else 1) * self.cost(body, ranges)
             case ast.For(_, ast.Tuple(elements) as values, body):
-                return self.cost(values) + len(elements) * self.cost(body)
+                return self.cost(values, ranges) + len(elements) * self.cost(body, ranges)
         own = 8 if isinstance(node, ast.Call) else isinstance(node, (ast.operator, ast.Compare))
-        inner = own + sum(map(self.cost, ast.iter_child_nodes(node)))
+        inner = own + sum(self.cost(child, ranges) for child in ast.iter_child_nodes(node))
         return max(inner, 1) if isinstance(node, ast.stmt) else inner
 
 
@@ -259,7 +263,7 @@ def formula(definition: Definition) -> Defined:
     _check_names(definition)
     called = [*vocabulary.NAMES - {"any_of"}, *(VERBS if definition.kind == "step" else ())]
     given = [*POINTS[definition.kind], *dict(definition.parameters)]
-    body = parse_checked(definition.text, given, called, definition.fail)
+    body = parse_checked(definition.text, given, called, definition.fail, definition.kind == "step")
     made = _make_definition(definition, given, body)
     try:
         _try(made)

@@ -76,7 +76,7 @@ def resolve_depths(root: Node, detail: float) -> Node:
     """
     detail = _within(root, detail)
     children = tuple(resolve_depths(child, detail) for child in root.fields)
-    root = root if children == root.fields else root.changed(children)
+    root = root if children == root.fields else _with_fields(root, children)
     automatic = tuple(name for name, value in root.values.items() if value == AUTO)
     return _at(root, automatic, _depth(root, automatic, detail)) if automatic else root
 
@@ -112,7 +112,7 @@ def visible(root: Node, voxel: float) -> tuple[Node, tuple[str, ...]]:
     ]
     shown = [visible(child, _within(root, voxel)) for child in root.fields]
     children = tuple(child for child, _ in shown)
-    whole = coarser if children == root.fields else coarser.changed(children)
+    whole = coarser if children == root.fields else _with_fields(coarser, children)
     return whole, tuple(dict.fromkeys([*changed, *(note for _, notes in shown for note in notes)]))
 
 
@@ -144,7 +144,12 @@ def _automatic(root: Node) -> Node:
     """Scene with all depths automatic that may be."""
     kinds = root.formula.parameters.items()
     depths = {name: AUTO for name, kind in kinds if isinstance(kind, Count) and AUTO in kind.words}
-    return root.changed(tuple(map(_automatic, root.fields)) or root.children, **depths)
+    return _with_fields(root, tuple(map(_automatic, root.fields)), **depths)
+
+
+def _with_fields(node: Node, fields: tuple[Node, ...], **values: Any) -> Node:
+    """Copy of a node with other fields and values; its steps stay."""
+    return node.changed((*node.children[: len(node.children) - len(node.fields)], *fields), **values)
 
 
 def _within(node: Node, voxel: float) -> float:

@@ -10,15 +10,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache, reduce
 from itertools import accumulate, islice, product
 from operator import mul
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
 from ..expr.intervals import ARRAYS, Interval, evaluate_on_cells
+from ..expr.runtime import kept_text
 from .box import Box, Corners, possible_cells, proved_half, undecided_cells
 from .maps import CORE, levels
 from .orbit_code import Form, Given, Round, constant_of, field, sign, size, stage_image, stages
@@ -371,12 +372,43 @@ class Growth:
         )
 
 
+SEARCHES = "growth"
+"""Kind of the texts of cached searches."""
+
+
 @lru_cache(maxsize=256)
 def growth(steps: Round, given: tuple[Given, ...], iterations: int) -> Growth | None:
-    """Sample the growth of an orbit.
+    """Sample the growth of an orbit; that of several steps, which takes seconds to minutes, is cached.
 
     Returns None if orbits do not escape.
     """
+    if len(steps) == 1:
+        return _search(steps, given, iterations)
+    codes = tuple((stage.step.text, stage.julia, stage.moved) for stage in stages(steps))
+    made_of = np.__version__, repr(codes), repr(given), iterations
+    return _read(kept_text(SEARCHES, made_of, lambda: _written(_search(steps, given, iterations))))
+
+
+def _written(bound: Growth | None) -> str:
+    """Text of a growth."""
+    import json  # hybrids alone need it
+
+    return json.dumps(bound and asdict(bound))
+
+
+def _read(text: str) -> Growth | None:
+    """Growth of a text."""
+    import json
+
+    values = json.loads(text)
+    if values is None:
+        return None
+    known: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in values.items()}
+    return Growth(**known)
+
+
+def _search(steps: Round, given: tuple[Given, ...], iterations: int) -> Growth | None:
+    """Growth of an orbit by samples, proved where it can be."""
     images = [image(steps, place, given) for place in range(len(steps))]
     whole = compose_steps(images)
     rays, origin = directions(), np.zeros(3)

@@ -587,7 +587,7 @@ class Node(Operators, Field):
     @property
     def fields(self) -> tuple[Node, ...]:
         """Children whose fields this one is made of; those of a hybrid are steps, not fields."""
-        return () if self.formula.kind == "shape" else self.children
+        return () if self.formula.kind == "shape" else self.children[self.formula.steps :]
 
     def solids(self) -> Iterator[Node]:
         """Iterate over this node and all fields below it, parents first.

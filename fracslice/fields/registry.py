@@ -168,6 +168,8 @@ class Formula(Hooks):
         True for an escape-time fractal, see `Bounds`.
     hooks : dict of str to callable
         Functions of a `Node` that supply its box, bounds and kernel arguments.
+    steps : int
+        Number of the first elements that are steps of an orbit, not fields.
     """
 
     name: str
@@ -178,6 +180,7 @@ class Formula(Hooks):
     lipschitz: float = 1.0
     exterior_only: bool = False
     hooks: dict[str, Hook] = field(default_factory=dict)
+    steps: int = 0
 
     def __post_init__(self) -> None:
         for name, value in (

@@ -1132,6 +1132,27 @@ def plane(normal: Sequence[float] = (0.0, 0.0, 1.0), offset: float = 0.0) -> Nod
     Node
     """
 
+def preimage(*elements: Node, of: Literal['last', 'every'] = 'last') -> Node:
+    """The points that the orbit of a fractal leads into a solid (Knighty 2012, fractalforums.com).
+
+    The first element is an escape-time fractal or an `orbit`, of which the steps alone count; the others are
+    the solid. The value is that of the solid at the orbit's last point, divided by the stretch of its steps,
+    or the least of all rounds. A stretch below 1 counts as 1, for an inversion shrinks what is far alone.
+    L = the solid's if the steps stretch alike everywhere; else twice that, which is measured, once for one
+    inside another. Where a step tears space, the value jumps.
+
+    Parameters
+    ----------
+    *elements : Node
+        What it is made of.
+    of : last or every, default 'last'
+        points of an orbit that count: the last, or one after every round
+
+    Returns
+    -------
+    Node
+    """
+
 def prism(sides: int = 6, radius: float = 0.5, height: float = 1.0) -> Node:
     """A regular prism along the z axis, with a corner on the x axis (Quilez 2020, "Distance functions").
 

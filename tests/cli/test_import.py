@@ -12,7 +12,7 @@ from fracslice.scene import read
 
 KNOWN = "# version 2.33\n[main_parameters]\nformula_1 5;\nN 4;\nhdr true;\n"
 HYBRID = (
-    "# version 2.33\n[main_parameters]\nhybrid_fractal_enable true;\nN 3;\nformula_1 5;\nformula_2 1627;\n"
+    "# version 2.33\n[main_parameters]\nhybrid_fractal_enable true;\nN 3;\nformula_1 5;\nformula_2 1619;\n"
 )
 
 
@@ -33,10 +33,10 @@ def test_a_formula_that_is_not_known_is_left_out_if_asked(
     source.write_text(HYBRID)
     words = ["import", str(source), "-o", str(target), "--json"]
     assert run(words) == 2
-    assert "my.fract:6: formula_2 1627 (transfDIFSSphereGrid): not known here" in capfd.readouterr().err
+    assert "my.fract:6: formula_2 1619 (transfDIFSGearV1): not known here" in capfd.readouterr().err
     assert not target.exists()
     assert run([*words, "--leave-out"]) == 1
     figures = json.loads(capfd.readouterr().out)
     assert figures["formulas"] == ["Quaternion"]
-    assert figures["missing"] == [f"{source}:6: formula_2 1627 (transfDIFSSphereGrid)"]
+    assert figures["missing"] == [f"{source}:6: formula_2 1619 (transfDIFSGearV1)"]
     assert target.exists()

@@ -223,6 +223,8 @@ def raised(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
     return np.sqrt(x * x + y * y + z * z) - 0.7 - 0.2 * level(x, y, 1.0)
 
 
+BOX_ORBIT = f.mandelbox(scale=-1.5, iterations=2)
+
 TRUTHS: dict[str, list[Truth]] = {
     "beams": [
         Equal(
@@ -230,6 +232,9 @@ TRUTHS: dict[str, list[Truth]] = {
             f.transform(EXAMPLES["beams"].changed(smooth=0), scale=3 / 1.4),
             sign=True,
         )
+    ],
+    "preimage": [
+        Equal(f.preimage(BOX_ORBIT, f.sphere(radius=growth_of(BOX_ORBIT).surface)), BOX_ORBIT, sign=True)
     ],
     "scaffold": [
         Equal(

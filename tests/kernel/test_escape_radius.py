@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fracslice.fields import growth as growth_module
 from fracslice.fields.growth import (
     _prove_growth,
     compose_steps,
@@ -179,3 +180,12 @@ def test_a_report_can_name_the_formulas_whose_bound_is_measured() -> None:
     root = union(proved, transform(mandelbox(iterations=3)), benesi(iterations=3), mandelbox(iterations=2))
     assert proved.bounds.measured == () and sphere().bounds.measured == ()
     assert root.bounds.measured == ("mandelbox", "benesi")
+
+
+def test_search_of_a_hybrid_is_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another process finds the radius in the cache, to the last bit."""
+    hybrid = orbit(mandelbox(scale=1.7), mandelbox(scale=-1.6), iterations=3)
+    first = growth_of(hybrid)
+    monkeypatch.setattr(growth_module, "_search", None)
+    growth_module.growth.cache_clear()
+    assert growth_of(hybrid) == first

@@ -16,14 +16,19 @@ from fracslice.fields.orbits import growth_of, steps
 from fracslice.formulas import Node
 from fracslice.scene import reads, to_xml
 from fracslice.scene.mandelbulber import import_scene
+from fracslice.scene.mandelbulber.measures import FAR, own_solid, solid_of, surface
 from fracslice.scene.mandelbulber.objects import orbits
-from fracslice.scene.mandelbulber.sequences import definition, element, order, steps_of
+from fracslice.scene.mandelbulber.sequences import definition, distance_of, element, order, steps_of
 from fracslice.scene.mandelbulber.settings import SettingsSection, default_of, parse_settings
-from fracslice.scene.mandelbulber.step_text import ADDED, FORMULAS, SWAPPED
+from fracslice.scene.mandelbulber.step_text import ADDED, FORMULAS, OWN_SOLID, SWAPPED
 from tests.examples import stamped
 
-from .mandelbulber_oracle import FORMULAS as ORACLE
+from . import mandelbulber_solids
+from .mandelbulber_oracle import FORMULAS as ESCAPES
 from .mandelbulber_oracle import rotation as oracle_rotation
+from .mandelbulber_solids import FOURS, SOLIDS
+
+ORACLE = {**ESCAPES, **mandelbulber_solids.FORMULAS}
 
 pytestmark = pytest.mark.once
 
@@ -127,6 +132,7 @@ VALUES = {  # of formulas whose defaults leave much out
     1152: "transf_offset_000 0.1 0 0; transf_offsetA_000 0.5 0.4 0.3",
     1155: "transf_scale 0.9; mandelbox_offset 0.2 0 0; transf_function_enabledP_false true",
     1158: "transf_addition_constant_0555 0.5 0.4 0.3; transf_offsetA_000 -0.2 0 0; transf_scale_1 1.5",
+    **mandelbulber_solids.VALUES,
 }
 
 
@@ -212,8 +218,65 @@ def agrees(number: int, count: int) -> None:
         assert (within == known)[usual & ~beside].mean() > 0.9999
 
 
+@pytest.mark.parametrize("number", sorted(SOLIDS))
+def test_distances_are_those_of_the_oracle(number: int) -> None:
+    """Formulas with a distance of their own measure each point with that solid."""
+    source = text(f"formula_1 {number}; N 3", VALUES.get(number, ""))
+    orbit = orbits(parse_settings(source, "x.fract"))[0]
+    kind, points = distance_of(orbit), np.random.default_rng(number).uniform(-1.6, 1.6, (3, 1000))
+    node = surface(orbit, kind, "") if kind != OWN_SOLID else own_solid(orbit, steps_of(orbit), 0, "")
+    expected = SOLIDS[number](points, Values(parse_settings(source, "x").fractals[0]))
+    assert abs(node.distance(points.T) - expected).max() < 1e-6
+
+
+def test_solids_within_a_round_are_behind_the_steps_before_them(tmp_path: Path) -> None:
+    """A box before the first step, a ball after the second, in two rounds."""
+    source = text(
+        "hybrid_fractal_enable true; formula_1 606; formula_2 1604; N 4",
+        "transf_scale_2 2; transf_offsetT_1 0.6; transf_offset_05 0.1",
+        "transf_offsetR_1 0.3",
+    )
+    made = imported(tmp_path, source)
+    assert reads(to_xml(made.scene)) == made.scene
+    torus, ball = (Values(section) for section in parse_settings(source, "x").fractals[:2])
+    points = np.random.default_rng(2).uniform(-1.5, 1.5, (3, 500))
+    w, stretch, parts = points, 1.0, []
+    for k in range(4):
+        if k % 2 == 0:
+            parts.append(SOLIDS[606](w[[2, 1, 0]], torus) / stretch)
+            w, stretch = ORACLE[606](w, points, torus, k), 2 * stretch
+        else:
+            parts.append(SOLIDS[1604](w, ball) / stretch)
+    assert made.scene.root.distance(points.T) == pytest.approx(np.min(parts, axis=0), abs=1e-6)
+
+
+def test_orbits_without_a_solid_or_of_four_dimensions_in_a_hybrid_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=r"x\.fract:6: a distance of the formulas that have none"):
+        imported(tmp_path, text("formula_1 8; delta_DE_function 5"))
+    with pytest.raises(SceneError, match=r"x\.fract:6: a formula of four dimensions in a hybrid"):
+        imported(tmp_path, text("hybrid_fractal_enable true; formula_1 4; formula_2 8"))
+    late = "transf_start_iterations 20"
+    with pytest.raises(SceneError, match="a distance that begins after 12 iterations"):
+        imported(tmp_path, text("formula_1 603; N 30", late))
+
+
+@pytest.mark.parametrize("count", [1000, pytest.param(100_000, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("number", sorted(FOURS))
+def test_solids_of_four_dimensions_are_those_of_the_oracle(number: int, count: int) -> None:
+    source = text(f"formula_1 {number}; N 5", VALUES.get(number, ""))
+    settings = parse_settings(source, "x.fract")
+    points = np.random.default_rng(number).uniform(-1.5, 1.5, (3, count))
+    q, c = np.vstack([points, 0 * points[:1]]), points
+    with np.errstate(all="ignore"):
+        for k in range(5):
+            q, c = FOURS[number](q, c, k, Values(settings.fractals[0]))
+    near = np.linalg.norm(q, axis=0) < FAR
+    assert (near == (solid_of(orbits(settings)[0], "").distance(points.T) < 0)).all()
+    assert 0.005 < near.mean() < 0.5
+
+
 def test_every_formula_has_an_oracle_and_is_in_the_manual() -> None:
-    assert set(ORACLE) == set(FORMULAS)
+    assert {*ORACLE, *FOURS} == set(FORMULAS)
     page = (Path(__file__).parents[2] / "docs/tasks/import.md").read_text(encoding="utf-8")
     rows = re.findall(r"^- \*\*[^*]+\*\*: ((?:.+\n)(?:  .+\n)*)", page, re.MULTILINE)
     listed = {" ".join(name.split()) for row in rows for name in row.split(";")}
@@ -281,11 +344,11 @@ def test_periodic_steps_are_rounds_and_others_are_unrolled(tmp_path: Path) -> No
 
 
 def test_formula_that_is_not_known_is_refused_or_left_out(tmp_path: Path) -> None:
-    source = text("hybrid_fractal_enable true; formula_1 8; formula_2 1627")
-    with pytest.raises(SceneError, match=r"x\.fract:7: formula_2 1627 \(transfDIFSSphereGrid\): not known"):
+    source = text("hybrid_fractal_enable true; formula_1 8; formula_2 1619")
+    with pytest.raises(SceneError, match=r"x\.fract:7: formula_2 1619 \(transfDIFSGearV1\): not known"):
         imported(tmp_path, source)
     made = imported(tmp_path, source, leave_out=True)
-    assert made.formulas == ("Mandelbox",) and "1627" in made.missing[0]
+    assert made.formulas == ("Mandelbox",) and "1619" in made.missing[0]
     variant = text("formula_1 119", "transf_function_enabledy_false true")
     with pytest.raises(SceneError, match=r"x\.fract:7: transf_function_enabledy_false: this variant"):
         imported(tmp_path, variant)

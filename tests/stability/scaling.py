@@ -52,7 +52,7 @@ LENGTHS: dict[str, tuple[str, ...]] = {
 
 def scaled(root: Node, factor: float) -> Node:
     """The same object `factor` times as large: ``scaled(f)(factor p) = factor f(p)``."""
-    if not root.fields and root.formula.name not in LENGTHS:
+    if root.formula.steps or (not root.fields and root.formula.name not in LENGTHS):
         return transform(root, scale=(factor,))
     children = tuple(scaled(child, factor) for child in root.children)
     values = {name: _times(root[name], factor) for name in LENGTHS[root.formula.name]}

@@ -1,6 +1,13 @@
 """Scenes of Mandelbulber 2: its settings files read into scenes of ours."""
 
-from . import box_formulas, bulb_formulas, sponge_formulas, transform_formulas  # noqa: F401
+from . import (  # noqa: F401
+    box_formulas,
+    bulb_formulas,
+    kleinian_formulas,
+    solid_formulas,
+    sponge_formulas,
+    transform_formulas,
+)
 from .importer import Imported, import_scene
 from .settings import Settings, read_settings
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from .folds import absolute, absolute_of, differences, mandalay, polygon
+from .folds import absolute, absolute_of, bulge, differences, mandalay, polygon
 from .step_text import CYLINDER, LEFT_OUT, ORDERS, SQUARE, SWAPPED, FormulaStep, UnknownError, known
 
 LOWE = "Lowe 2010, fractalforums.com: Amazing Fractal"
@@ -110,6 +110,25 @@ def scale_by(s: FormulaStep, value: float) -> None:
         s.write(f"w = {s.parameter('scale', value)} * w")
 
 
+def fold_with_height(s: FormulaStep) -> None:
+    """Fold into a box of another height; of folds that tear, none is known."""
+    limit, image, share = (
+        s.value(name) for name in ("mandelbox_folding_limit", "mandelbox_folding_value", "transf_scale_1")
+    )
+    if image != 2 * limit or share <= 0:
+        s.refuse_values("mandelbox_folding_value")
+    flat, height = s.number("mandelbox_folding_limit"), s.parameter("folding_height", limit * share)
+    s.write(f"w = fold_to(w, ({flat}, {flat}, {height}))")
+
+
+def bulged(s: FormulaStep, name: str) -> None:
+    """Push the coordinates of a folded box towards its middle, by squares, in the iterations of D."""
+    if s.on("transf_function_enabled_false") and s.during(
+        "transf_start_iterations_D", "transf_stop_iterations_D1"
+    ):
+        bulge(s, name, "transf_scale3D_000")
+
+
 def fold_ball(s: FormulaStep, offset: str | None) -> None:
     """Ball whose radii are squared in the file."""
     s.ball(s.value("transf_minR2_p25"), s.value("transf_maxR2_1"), offset)
@@ -129,8 +148,7 @@ def abox_mod_11(s: FormulaStep) -> None:
         s.fold("transf_addition_constant_111") if s.on("transf_function_enabled") else s.fold_flat(
             "transf_addition_constant_111"
         )
-        if s.during("transf_start_iterations_D", "transf_stop_iterations_D1"):
-            s.refuse("transf_function_enabled_false")
+        bulged(s, "transf_addition_constant_111")
     swap(s, "transf_function_enabledSw_false", "(z, y, x)")
     if s.within("S"):
         s.refuse("transf_function_enabledy_false")
@@ -175,10 +193,10 @@ def amazing_surf_mod_2(s: FormulaStep) -> None:
     if s.on("transf_function_enabledBz_false") and s.within("X"):
         s.refuse("transf_function_enabledBx_false", "transf_function_enabledBy_false")
     s.add("transf_addition_constant")
-    if s.on("transf_function_enabledAy"):
-        s.refuse("transf_function_enabled_false")
-        if s.within("M"):
-            fold_ball(s, "mandelbox_offset")
+    if s.on("transf_function_enabledAy") and s.within("M"):
+        weight = f"(1 - {s.number('transf_scaleB_1')})" if s.on("transf_function_enabled_false") else "1"
+        square = SQUARE if weight == "1" else f"{CYLINDER} + {weight} * z * z"
+        s.ball(s.value("transf_minR2_p25"), s.value("transf_maxR2_1"), "mandelbox_offset", square=square)
     resets = s.on("transf_function_enabledM_false")
     vary = s.on("transf_function_enabledF_false") and s.within("Y")
     scaled = s.within("S")
@@ -501,8 +519,7 @@ def abox_mod_13(s: FormulaStep) -> None:
             s.fold("transf_addition_constant_111")
         else:
             s.fold_flat("transf_addition_constant_111")
-    if s.during("transf_start_iterations_D", "transf_stop_iterations_D1"):
-        s.refuse("transf_function_enabled_false")
+    bulged(s, "transf_addition_constant_111")
     swap(s, "transf_function_enabledSw_false", "(z, y, x)")
     if s.within("S"):
         fold_ball(s, "mandelbox_offset")
@@ -527,8 +544,8 @@ def fold_box_mod_1(s: FormulaStep) -> None:
     if s.within(""):
         vectors = [f"transf_{name}_111" for name in ("addition_constant", "addition_constantA", "scale3D")]
         differences(s, vectors, "transf_function_enabled", "transf_function_enabledA")
-    if s.within("A"):
-        s.refuse("transf_function_enabled_false")
+    if s.on("transf_function_enabled_false") and s.within("A"):
+        fold_with_height(s)
     if s.within("B"):
         mandelbox_ball(s, None)
     if s.within("D"):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .folds import PI, absolute, sector, symmetric
-from .step_text import LEFT_OUT, OWN, FormulaStep, known
+from .step_text import FOUR, LEFT_OUT, OWN, FormulaStep, known
 
 NYLANDER = "White and Nylander 2009, fractalforums.com"
 
@@ -228,7 +228,6 @@ def mandelbar_options(s: FormulaStep) -> None:
 @known(259, "Mandelnest Full", "Mermelada 2020, fractalforums.org", LEFT_OUT)
 def mandelnest_full(s: FormulaStep) -> None:
     """Sines of multiples of the angles to the three planes, with the sign that stays nearer."""
-    s.refuse("transf_function_enabled_false")
     n, o, k = s.number("power"), s.point("transf_offsetA_000"), s.point("transf_constant_multiplierA_111")
     s.write("x, y, z = w", "s = maximum(x * x + y * y + z * z, 1e-30)")
     for p in "xyz":
@@ -243,6 +242,9 @@ def mandelnest_full(s: FormulaStep) -> None:
     s.write("w = (r * ux + ax, r * uy + ay, r * uz + az)")
     if not inside:
         s.write("w = w + (kx * cx, ky * cy, kz * cz)")
+    if s.on("transf_function_enabled_false"):
+        s.write(f"px, py, pz = {s.point('transf_offset_000')}")
+        s.write("w = w - (where(cx < 0, -px, px), where(cy < 0, -py, py), where(cz < 0, -pz, pz))")
 
 
 def kali_angles(s: FormulaStep, beta: str, alpha: str) -> None:
@@ -404,3 +406,48 @@ def eiffie_msltoe(s: FormulaStep) -> None:
 def lkmitch(s: FormulaStep) -> None:
     """A square of numbers of three parts."""
     s.write("x, y, z = w", "w = (x * x - 2 * y * z, z * z + 2 * x * y, y * y - 2 * x * z)")
+
+
+@known(4, "Hypercomplex", "Norton 1982, with other signs", distance=FOUR)
+def hypercomplex(s: FormulaStep) -> None:
+    """A square of numbers of four parts, where a product of two units is minus the third."""
+    s.write(
+        "g, e = 2 * sqrt(n), 0",
+        "u, v = p * p - q * q - r * r - s * s, 2 * (p * q - r * s)",
+        "w, t = 2 * (p * r - q * s), 2 * (p * s - q * r)",
+    )
+
+
+@known(19, "Aexion", "Aexion 2009, fractalforums.com", OWN, distance=FOUR)
+def aexion(s: FormulaStep) -> None:
+    """A square in four dimensions. The start point and the constant are the distances to the planes of a
+    tetrahedron, moved.
+    """
+    k = s.number("cadd")
+    s.write(f"a = absolute(x + y + z) + {k}", f"b = absolute(z - x - y) + {k}")
+    s.write(f"c = absolute(y - x - z) + {k}", f"d = absolute(x - y - z) + {k}")
+    if s.index == 0:
+        s.write("p, q, r, s = a, b, c, d", "n = p * p + q * q + r * r + s * s", "m = 2 * m")
+    s.write(
+        "g, e = 2 * sqrt(2 * n), 2",
+        "u, v = p * p - q * q + 2 * r * s + a, q * q - p * p + 2 * r * s + b",
+        "w, t = r * r - s * s + 2 * p * q + c, s * s - r * r + 2 * p * q + d",
+    )
+
+
+@known(
+    250, "Newton Pow3", "Newton's method of z^3 = 1, by triplex numbers (White and Nylander 2009)", LEFT_OUT
+)
+def newton(s: FormulaStep) -> None:
+    """Newton's method for the cube roots of one, with the root 1 at infinity."""
+    s.refuse("transf_function_enabledO_false")
+    if s.on("transf_function_enabledA_false"):
+        absolute(s, *(f"transf_function_enabledA{axis}_false" for axis in "xyz"))
+    s.write("x, y, z = w", f"k = {s.number('transf_scaleA_1')} / maximum(x * x + y * y + z * z, 1e-18)")
+    s.write("x, y, z = k * x + 1, -k * y, -k * z", "s = maximum(x * x + y * y, 1e-18)")
+    s.write("r = s + z * z", "k = 1 / (3 * r * r)", "m = (1 - z * z / s) * k")
+    s.write("a, b, d = m * (x * x - y * y), -2 * m * x * y, -2 * k * z * sqrt(s)")
+    s.write("x, y, z = 2 * x / 3 + a - 1, 2 * y / 3 + b, 2 * z / 3 + d")
+    s.write(f"k = {s.number('transf_scaleB_1')} / maximum(x * x + y * y + z * z, 1e-18)")
+    s.write("w = (k * x, -k * y, -k * z)")
+    s.add("transf_offset_000")

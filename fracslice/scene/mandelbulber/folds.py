@@ -90,3 +90,14 @@ def mandalay(s: FormulaStep, serial: bool) -> None:
         s.write(f"t, m = u - 2 * f{p}, v - 4 * f{p}", f"m = maximum(absolute(t + f{p}) - f{p}, m)")
         s.write(f"q{p} = minimum(minimum(m, maximum(t - g{p}, v)), u)")
     s.write(*(f"{p} = where({p} < 0, -q{p}, q{p})" for p in "xyz"), "w = (x, y, z)")
+
+
+def bulge(s: FormulaStep, limits: str, shares: str) -> None:
+    """Push coordinates that were folded at limits towards the middle, by shares of their squares."""
+    s.write(f"a, b, d = {s.point(limits)}", f"u, v, r = {s.point(shares)}")
+    s.write("x, y, z = w")
+    for p, a, k in (("x", "a", "u"), ("y", "b", "v"), ("z", "d", "r")):
+        s.write(f"t, q = absolute({p}), 2 * absolute({a}) - absolute({p})")
+        s.write(f"m = where(t < {a}, t * t, where((t > {a}) & (q > 0), q * q, 0)) / maximum(2 * {a}, 1e-18)")
+        s.write(f"{p} = {p} - where({p} < 0, -1, 1) * {k} * m")
+    s.write("w = (x, y, z)")

@@ -12,8 +12,9 @@ from ...common.arrays import product, rotation
 from ...errors import SceneError
 from ...formulas import Node, get
 from . import appearance
+from .measures import solid_of
 from .names import NAMES
-from .sequences import Orbit, Slot, all_slots, hybrid_slots, nodes
+from .sequences import Orbit, Slot, all_slots, hybrid_slots
 from .settings import Settings, SettingsSection, Triple
 
 OPERATORS = ("intersection", "union", "difference")
@@ -113,7 +114,7 @@ def _joined(main: SettingsSection, name: str, default: str, first: Node, second:
 def _placed_orbit(orbit: Orbit, apart: bool) -> Node:
     """Orbit in its place, with its material."""
     main, slot = orbit.settings.main, orbit.slots[0]
-    node = nodes(orbit, f"o{slot.place}" if apart else "")
+    node = solid_of(orbit, f"o{slot.place}" if apart else "")
     names = [(f"formula_{what}_{slot.place}", f"fractal_{what}") for what in ("position", "rotation")]
     where, angles = (
         main.vector(own if main.given(own) and not orbit.is_hybrid else whole, "0 0 0")

@@ -8,25 +8,32 @@ the first on, one period of them is the round of an `<orbit>`; else each iterati
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
 from ...common.parameters import AUTO, Number, Parameter, Vector
 from ...errors import SceneError
-from ...fields.definitions import Definition, formula
+from ...fields.definitions import Defined, Definition, formula
 from ...fields.orbits import REPEAT
 from ...formulas import Node, get
 from .settings import FRACTALS, Settings, SettingsSection, Triple
 from .step_text import (
     ADDED,
     FORMULAS,
+    FOUR,
+    JOS,
+    KLEINIAN,
     LEFT_OUT,
     OWN,
+    OWN_SOLID,
+    RADIUS,
     SWAPPED,
     Element,
     FormulaStep,
     KnownFormula,
+    MeasuredSolid,
     UnknownError,
 )
 
@@ -39,8 +46,11 @@ DEEP = 24
 UNROLLED = 6
 """Most iterations of an orbit whose steps do not recur."""
 
-OWN_DISTANCES = (3, 4, 5)
-"""Distances that are not of the last radius of an orbit: of Kleinian groups, and those of formulas."""
+TRANSFORMS = range(1000, 1600)
+"""Numbers of formulas that are no fractals: they have no distance."""
+
+PREFERRED, DISTANCES = 0, {3: KLEINIAN, 4: JOS, 5: OWN_SOLID}
+"""The formula's choice of a distance, and the distances that are not of the last radius, by their number."""
 
 LONGEST = 32
 """Most steps of a round."""
@@ -76,8 +86,29 @@ class Orbit:
     missing: list[str] = field(default_factory=list)
 
 
-Text = tuple[str, tuple[tuple[str, Any], ...], Element | None, int]
-"""A step at an iteration: statements, parameters, the element of ours that it is, and its place."""
+Values = tuple[tuple[str, Any], ...]
+"""Parameters with their values."""
+
+
+class SolidText(NamedTuple):
+    """Distance of a formula at an iteration; see `step_text.MeasuredSolid`."""
+
+    text: str
+    parameters: Values
+    first: bool
+    last: bool
+    thin: bool
+    slope: float
+
+
+class Text(NamedTuple):
+    """A step at an iteration."""
+
+    text: str  # statements
+    parameters: Values
+    element: Element | None  # the element of ours that it is
+    place: int  # of its formula
+    solid: SolidText | None = None  # what it is measured with, if that is its own
 
 
 def slot(settings: Settings, place: int, hybrid: bool) -> Slot | None:
@@ -162,7 +193,7 @@ def one(orbit: Orbit, slot: Slot, index: int, state: dict[str, float], even: boo
     foldings(step, orbit.settings.main)
     slot.known.write(step)
     if slot.weight <= 0:
-        return "return w", (), None, slot.place
+        return Text("return w", (), None, slot.place)
     animated = any(f"fractal{slot.place - 1}_" in line for _, line in orbit.settings.keyframes[:1])
     element = (
         step.element
@@ -171,6 +202,8 @@ def one(orbit: Orbit, slot: Slot, index: int, state: dict[str, float], even: boo
     )
     if step.element and element and orbit.settings.main.flag("box_folding", "false"):
         element = None
+    if slot.known.distance == FOUR:
+        return four_dimensional(step, orbit, slot)
     if slot.weight < 1:
         step.lines.insert(0, "start = w")
     if slot.adds:
@@ -179,7 +212,34 @@ def one(orbit: Orbit, slot: Slot, index: int, state: dict[str, float], even: boo
         share = step.parameter("formula_weight", slot.weight)
         step.write(f"w = {share} * w + (1 - {share}) * start")
     step.write("return w")
-    return "\n".join(step.lines), tuple(step.parameters.items()), element, slot.place
+    text, parameters = "\n".join(step.lines), tuple(step.parameters.items())
+    return Text(text, parameters, element, slot.place, solid_text(step.solid))
+
+
+def four_dimensional(step: FormulaStep, orbit: Orbit, slot: Slot) -> Text:
+    """Step from p, q, r, s to u, v, w, t, whose stretches are g, and e by the start point; it is taken while
+    the point is near.
+    """
+    if orbit.factor != (1, 1, 1) or slot.weight != 1:
+        raise UnknownError(f"{slot.line}: a weight or a factor of a formula of four dimensions")
+    if slot.adds and orbit.julia is not None:
+        step.write(
+            f"a, b, d = {step.parameter('julia_c', orbit.julia)}", "u, v, w, e = u + a, v + b, w + d, 0"
+        )
+    elif slot.adds:
+        step.write("u, v, w, e = u + x, v + y, w + z, 1")
+    moved = ", ".join(f"where(on, {new}, {old})" for new, old in zip("uvwt", "pqrs", strict=True))
+    step.write("m = where(on, g * m + e, m)", f"p, q, r, s = {moved}")
+    lines = ["n = p * p + q * q + r * r + s * s", "on = n < 1e6", *step.lines]
+    return Text("\n".join(lines), tuple(step.parameters.items()), None, slot.place)
+
+
+def solid_text(solid: MeasuredSolid | None) -> SolidText | None:
+    """Text of a formula's own distance."""
+    if solid is None:
+        return None
+    text, parameters = "\n".join(solid.step.lines), tuple(solid.step.parameters.items())
+    return SolidText(text, parameters, solid.first, solid.last, solid.thin, solid.slope)
 
 
 def constant(step: FormulaStep, orbit: Orbit, swapped: bool) -> None:
@@ -220,18 +280,31 @@ def recurring(steps: Sequence[Text]) -> int:
 
 
 def steps_of(orbit: Orbit) -> list[Text]:
-    """Step of each iteration of a file; its solid is that of escape, not of a distance of the last formula.
-
-    Raises `UnknownError` for a variant of a formula that is not known here.
-    """
-    main = orbit.settings.main
-    if main.whole("delta_DE_function", "0") in OWN_DISTANCES:
-        what = main.text("delta_DE_function", "0")
-        raise UnknownError(f"{main.place('delta_DE_function')}: delta_DE_function {what}")
+    """Step of each iteration of a file. Raises `UnknownError` for a variant that is not known here."""
     taken = order(orbit.slots, orbit.settings.main.whole("repeat_from", "1"), min(orbit.iterations, NEVER))
     if not taken:
         raise SceneError(f"{orbit.settings.path}: expected a formula that is taken at the first iteration")
-    return texts(orbit, taken)
+    made = texts(orbit, taken)
+    if distance_of(orbit) == OWN_SOLID and not any(step.solid for step in made):
+        main = orbit.settings.main
+        raise UnknownError(f"{main.place('delta_DE_function')}: a distance of the formulas that have none")
+    return made
+
+
+def distance_of(orbit: Orbit) -> str:
+    """What the points of an orbit are measured with: where formulas differ, that of the most iterations."""
+    number = orbit.settings.main.whole("delta_DE_function", "0")
+    if any(slot.known and slot.known.distance == FOUR for slot in orbit.slots):
+        return FOUR
+    if number != PREFERRED:
+        return DISTANCES.get(number, RADIUS)
+    counts = Counter[str]()
+    for slot in orbit.slots:
+        if slot.known is not None and slot.number not in TRANSFORMS:
+            counts[slot.known.distance] += slot.iterations
+    if counts[OWN_SOLID] or not counts:
+        return OWN_SOLID if counts else RADIUS
+    return counts.most_common(1)[0][0]
 
 
 def nodes(orbit: Orbit, name: str = "") -> Node:
@@ -256,7 +329,7 @@ def assembled(orbit: Orbit, round_: list[Text], iterations: Any, name: str) -> N
     made: dict[Text, tuple[str, Any]] = {}
     for step in dict.fromkeys(round_):
         made[step] = definition(orbit, step, name, len(made), len(set(round_)))
-    runs = list(_runs(round_))
+    runs = list(runs_of(round_))
     if len(runs) == 1 and (runs[0][1] == 1 or iterations != AUTO):
         step, count = runs[0]
         whole = iterations if iterations == AUTO else iterations * count
@@ -265,7 +338,7 @@ def assembled(orbit: Orbit, round_: list[Text], iterations: Any, name: str) -> N
     return get("orbit")(*children, iterations=iterations)
 
 
-def _runs(round_: Sequence[Text]) -> Iterator[tuple[Text, int]]:
+def runs_of(round_: Sequence[Text]) -> Iterator[tuple[Text, int]]:
     """Steps with the number of times that they stand in a row, up to that of `repeat`."""
     last, count = round_[0], 0
     for step in round_:
@@ -279,30 +352,38 @@ def _runs(round_: Sequence[Text]) -> Iterator[tuple[Text, int]]:
 def element(orbit: Orbit, step: Text, made: tuple[str, Any], **values: Any) -> Node:
     """Element of a step: ours, or that of its definition."""
     _, defined = made
-    if step[2] is not None:
-        given: dict[str, Any] = {**dict(step[2].values), **values}
+    if step.element is not None:
+        given: dict[str, Any] = {**dict(step.element.values), **values}
         if orbit.julia is not None:
             given["julia"] = orbit.julia
-        return get(step[2].name)(**given)
+        return get(step.element.name)(**given)
     made_of: Node = defined(**values)
     return made_of
 
 
 def definition(orbit: Orbit, step: Text, name: str, index: int, count: int) -> tuple[str, Any]:
     """Name and formula of a step."""
-    text, parameters, replaced, place = step
+    text, parameters, replaced, place, _ = step
     if replaced is not None:
         return replaced.name, None
     known = next(s.known for s in orbit.slots if s.place == place)
     assert known is not None
     own = (
-        f"{_identifier(known.name)}_{name}{index + 1}"
+        f"{identifier(known.name)}_{name}{index + 1}"
         if count > 1
-        else f"{_identifier(known.name)}_{name}".rstrip("_")
+        else f"{identifier(known.name)}_{name}".rstrip("_")
     )
-    kinds = tuple((n, _kind(value)) for n, value in parameters)
     own = own if own not in _taken() else f"{own}_m"
-    return own, formula(Definition(own, kinds, text))
+    return own, defined(own, text, parameters)
+
+
+def defined(
+    name: str, text: str, parameters: Values, kind: Literal["step", "distance"] = "step", **stated: Any
+) -> Defined:
+    """Formula of a text; `stated`: what else its definition states."""
+    return formula(
+        Definition(name, tuple((n, _kind(value)) for n, value in parameters), text, kind, **stated)
+    )
 
 
 def _taken() -> frozenset[str]:
@@ -311,7 +392,7 @@ def _taken() -> frozenset[str]:
     return frozenset(names())
 
 
-def _identifier(name: str) -> str:
+def identifier(name: str) -> str:
     """Name of an element for that of a formula."""
     letters = "".join(letter if letter.isalnum() else "_" for letter in name.lower())
     return "_".join(filter(None, letters.split("_")))[:30]

@@ -292,3 +292,52 @@ def menger_cross(s: FormulaStep) -> None:
         s.write("x, y, z = w", f"w = (absolute(x + {a}) + {b}, y, z)")
     if s.on("transf_function_enabledR_false") and s.within("R"):
         s.turn("transf_rotation2")
+
+
+@known(239, "Amazing Ifs", "Knighty 2010 and Sandercoe 2020, fractalforums.org", LEFT_OUT)
+def amazing_ifs(s: FormulaStep) -> None:
+    """A polygon's fold, folds into a box, an offset, and a scale that the radius divides."""
+    if s.on("transf_sphere_inversion_enabled_false") and s.during(
+        "transf_start_iterations_X", "transf_stop_iterations_1"
+    ):
+        s.invert("transf_offset_000", "transf_scaleG_1", "transf_addition_constant")
+        s.scale("transf_scaleA_1")
+    if s.on("transf_function_enabledA_false"):
+        absolute(s, *(f"transf_function_enabledA{axis}_false" for axis in "xyz"))
+        s.add("transf_offsetA_000")
+    if s.on("transf_function_enabledP_false") and s.during(
+        "transf_start_iterations_P", "transf_stop_iterations_P1"
+    ):
+        s.write("x, y, z = w", "w = (x, absolute(y), z)")
+        polygon(s, "xy", "transf_int_6")
+    folded = [s.on(f"transf_function_enabled{name}") for name in ("Cx", "Cy", "Cz_false")]
+    limits = zip("xyz", folded, s.vector("transf_addition_constant_0555"), strict=True)
+    sides = (s.parameter(f"limit_{axis}", abs(limit)) if on else "1e6" for axis, on, limit in limits)
+    s.write(f"w = fold_to(w, ({', '.join(sides)}))")
+    if s.on("transf_function_enabledI_false"):
+        moved_absolutes(s)
+    s.add("transf_addition_constantA_000")
+    if s.within("B"):
+        added = s.state.get("added", 0.0)
+        k = s.parameter("transf_scale_2", s.value("transf_scale_2") + added)
+        m = s.number("transf_minR2_p25")
+        s.write(
+            "x, y, z = w", "r = x * x + y * y + z * z", f"w = {k} / where(r < {m}, {m}, minimum(r, 1)) * w"
+        )
+    if s.on("transf_function_enabledK_false"):
+        added = s.state.get("added", 0.0)
+        s.state["added"] = added - s.value("transf_scale_vary_0") * (abs(added) - s.value("transf_scaleC_1"))
+    s.turn("transf_rotation2")
+    if s.on("transf_function_enabledG_false"):
+        last = s.on("analyticDE_enabled_false") or not s.within("C")
+        s.measure(last=last, thin=True).write("return sqrt(maximum(x * x + y * y + z * z, 1e-30))")
+
+
+def moved_absolutes(s: FormulaStep) -> None:
+    """Absolute values of some coordinates, and an offset of them."""
+    s.write(f"a, b, d = {s.point('transf_addition_constantP_000')}", "x, y, z = w")
+    for axis, moved in zip("xyz", "abd", strict=True):
+        if s.on(f"transf_function_enabledB{axis}_false"):
+            own = axis if s.on(f"transf_function_enabled{axis}_false") else f"absolute({axis})"
+            s.write(f"{axis} = {own} - {moved}")
+    s.write("w = (x, y, z)")

@@ -33,6 +33,12 @@ SMALL = 1e-9
 """Least radius within which the fold of a ball only scales."""
 
 
+RADIUS, OWN_SOLID, KLEINIAN, JOS, FOUR = "radius", "own", "kleinian", "jos", "four"
+"""What the last point of an orbit, or each, is measured with: its radius, a distance of its formula's own,
+those of two families of Kleinian groups, or the radius in four dimensions.
+"""
+
+
 class UnknownError(Exception):
     """A formula, or a variant of one, that is not known here; the message is what is not."""
 
@@ -57,6 +63,15 @@ class FormulaStep:
     parameters: dict[str, float | Triple] = field(default_factory=dict)
     element: Element | None = None
     constant: str = "c"  # the constant where a formula adds it itself
+    solid: MeasuredSolid | None = None  # what the formula measures the distance to
+
+    def measure(
+        self, first: bool = False, last: bool = False, thin: bool = False, slope: float = 1.0
+    ) -> FormulaStep:
+        """Begin the text of the formula's own distance, of x, y and z, and return it; see `MeasuredSolid`."""
+        inner = FormulaStep(self.values, self.index)
+        self.solid = MeasuredSolid(inner, first, last, thin, slope)
+        return inner
 
     def write(self, *lines: str) -> None:
         """Add statements."""
@@ -91,6 +106,12 @@ class FormulaStep:
         for name in names:
             if self.on(name):
                 raise UnknownError(f"{self.values.place(name)}: {name}")
+
+    def refuse_values(self, *names: str) -> None:
+        """Raise an error unless these numbers and vectors, which are not known here, are 0."""
+        for name in names:
+            if any(float(word) for word in self.values.text(name).replace(",", ".").split()):
+                raise UnknownError(f"{self.values.place(name)}: {name} {self.values.text(name)}")
 
     def known_as(self, name: str, *values: str) -> None:
         """Raise an error unless a choice has one of these values."""
@@ -266,6 +287,17 @@ class FormulaStep:
         self.write("cx, cy, cz = c", f"u, v, s = {own}", f"w = w + (u * {x}, v * {y}, s * {z})")
 
 
+@dataclass(frozen=True)
+class MeasuredSolid:
+    """Solid that points of an orbit are measured with."""
+
+    step: FormulaStep  # text of its distance
+    first: bool = False  # True if it is measured before the step
+    last: bool = False  # True if the last point alone counts, else the least of all points
+    thin: bool = False  # True if it is a surface, without an inside
+    slope: float = 1.0  # Lipschitz bound of the distance; measured where it is not 1
+
+
 MINUS_Z = "(0, 0, -1)"
 
 
@@ -283,6 +315,7 @@ class KnownFormula:
     source: str  # paper or forum, author, year
     constant: str = ADDED
     even: bool = False  # True if it begins with the absolute value of all coordinates
+    distance: str = RADIUS  # what it is measured with
 
 
 FORMULAS: dict[int, KnownFormula] = {}
@@ -292,12 +325,17 @@ Writer = Callable[[FormulaStep], None]
 
 
 def known(
-    number: int, name: str, source: str, constant: str = ADDED, even: bool = False
+    number: int,
+    name: str,
+    source: str,
+    constant: str = ADDED,
+    even: bool = False,
+    distance: str = RADIUS,
 ) -> Callable[[Writer], Writer]:
     """Register a formula."""
 
     def decorate(write: Writer) -> Writer:
-        FORMULAS[number] = KnownFormula(number, name, write, source, constant, even)
+        FORMULAS[number] = KnownFormula(number, name, write, source, constant, even, distance)
         return write
 
     return decorate

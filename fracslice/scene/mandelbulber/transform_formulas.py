@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from .box_formulas import turned_folds
-from .folds import PI, absolute, absolute_of, diagonals, differences, mandalay, polygon, symmetric
+from .folds import PI, absolute, absolute_of, bulge, diagonals, differences, mandalay, polygon, symmetric
 from .sponge_formulas import box_offset
 from .step_text import LEFT_OUT, ORDERS, FormulaStep, known
 
@@ -134,10 +134,10 @@ def abs_add_constant_2(s: FormulaStep) -> None:
 
 @known(1025, "T>Abs Add Tglad Fold", "Glad and Lowe 2010, fractalforums.com", LEFT_OUT)
 def tglad_fold(s: FormulaStep) -> None:
-    """Fold into a box."""
-    if s.within("A"):
-        s.refuse("transf_function_enabled_false")
+    """Fold into a box, and push the coordinates towards its middle."""
     s.fold("transf_addition_constant")
+    if s.on("transf_function_enabled_false") and s.within("A"):
+        bulge(s, "transf_addition_constant", "transf_offset_000")
 
 
 @known(1027, "T>R^Power", MANDELBULBER, LEFT_OUT)

@@ -14,7 +14,7 @@ from pathlib import Path
 from fracslice.scene.mandelbulber.importer import unknown
 from tests.benchmarks.runner import Row, Run
 
-OWN = {"known": "formula_1 8;", "unknown": "formula_1 1627;", "default": "N 20;"}
+OWN = {"known": "formula_1 8;", "unknown": "formula_1 1619;", "default": "N 20;"}
 """Settings of files of our own."""
 
 EXPLICIT = re.compile(r"^formula_\d ", re.MULTILINE)
