@@ -1,4 +1,4 @@
-"""A studio at 960 x 600 on the CPU, or as said: seconds until a scene is seen, milliseconds from an input to its frame.
+"""A studio at 960 x 600 on the CPU: seconds until a scene is seen, milliseconds from an input to its frame.
 
 First picture: from opening the scene to its first draft, with kernels compiled before. Moved: from a drag to
 the picture from there, as JPEG. Changed: from the value of a slider to the picture with it. Frames a second:
