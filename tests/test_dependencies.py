@@ -20,7 +20,8 @@ MODULES = {
     "pillow": "PIL",
     "scikit-image": "skimage",
     "imageio-ffmpeg": "imageio_ffmpeg",
-    "trame-rca": "trame",
+    "trame-client": "trame_client",
+    "trame-rca": "trame_rca",
     "trame-vuetify": "trame",
 }
 """Of packages, where it has another name."""

@@ -32,7 +32,8 @@ LOOKED = 4000
 TREES, TRIES = 100, 10
 LEAVES = [f for f in formulas() if f.kind == "shape" and f.name not in OF_FILES]
 """Shapes that numbers make."""
-OTHERS = [f for f in formulas() if f.kind != "shape" and f.name not in OF_FILES | {"material"}]
+OTHERS = [f for f in formulas() if f.kind != "shape" and f.name not in OF_FILES | {"material", "preimage"}]
+"""Elements with others in them, whatever those are; a preimage begins with a fractal."""
 Draw = Callable[[np.random.Generator, float], Any]
 
 

@@ -49,7 +49,8 @@ def test_every_formula_is_scaled() -> None:
     fractals = {name for name in names() if name not in LENGTHS}
     by_hand = {"mandelbulb", "julia", "menger", "flake", "cells", "jerusalem", "tetrabrot", "hilbert", "tree"}
     of_files = {EXAMPLES[name].formula.name for name in OF_FILES if not EXAMPLES[name].fields}
-    assert fractals == by_hand | {"apollonian", "honeycomb", "pseudo_kleinian", "orbit", *of_files, *ORBITS}
+    by_hand |= {"apollonian", "honeycomb", "pseudo_kleinian", "orbit", "preimage"}
+    assert fractals == by_hand | of_files | {*ORBITS}
     assert scaled(sphere(radius=2), 3.0) == sphere(radius=6)
     assert scaled(transform(sphere(), translate=(1, 0, 0)), 2.0).values["translate"] == (2, 0, 0)
 
