@@ -100,11 +100,12 @@ def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
     `a`: matrix; `b`: matrix or vector.
     """
-    terms = [np.multiply.outer(a[:, k], b[k]) for k in range(a.shape[1])]
+    # transposed, as most are tall: NumPy's inner loop is along the last axis
+    terms = [np.multiply.outer(b[k], np.ascontiguousarray(a[:, k])) for k in range(a.shape[1])]
     total: np.ndarray = terms[0]
     for term in terms[1:]:
-        total = total + term
-    return total
+        total += term
+    return np.ascontiguousarray(total.T)
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> float:

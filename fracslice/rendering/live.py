@@ -207,6 +207,7 @@ class Live:
         self._stepped = time.monotonic()
         self.making: float | None = None
         self._drawing: Drawing | None = None
+        self._moving: Drawing | None = None
         self._drawn_by: Drawing | None = None
         self._aim: Camera
         self._drawn: tuple[int, int]
@@ -276,9 +277,12 @@ class Live:
             self._size = size
             self._refining.cancel.set()
 
-    def draw(self, drawing: Drawing | None) -> None:
-        """Show the scene as a drawing has it from now on; None: by rays. It must not raise."""
-        self._drawing = drawing
+    def draw(self, drawing: Drawing | None, moving: Drawing | None = None) -> None:
+        """Show the scene as a drawing has it from now on; None: by rays. It must not raise.
+
+        `moving`: quicker, while the camera moves; by default the same.
+        """
+        self._drawing, self._moving = drawing, moving
         self._refining.cancel.set()
 
     def wake(self) -> None:
@@ -336,12 +340,18 @@ class Live:
 
     def _draw(self, drawing: Drawing, camera: Camera, size: tuple[int, int]) -> None:
         """Show a drawing, unless it is shown; it may be seen from inside the solid, too."""
-        if drawing is self._drawn_by and camera == self.camera and size == self._drawn:
+        still = camera == self.camera and size == self._drawn
+        if still and drawing is self._drawn_by:
             self._refining.cancel.wait(POLL)
+            return
+        moving, samples = self._moving, 1.0
+        if moving is not None and not still:
+            drawing, samples = moving, 0.0
+        elif moving is not None and self._drawn_by == moving and self._refining.cancel.wait(REST):
             return
         value = float(self.root.kernel("cpu", "float64").points(*(np.array([c]) for c in camera.eye))[0])
         distance = abs(value) / self.root.bounds.lipschitz
-        self.shown = Shown(drawing(camera, size), 1.0, camera, distance, self._problem)
+        self.shown = Shown(drawing(camera, size), samples, camera, distance, self._problem)
         self._drawn, self._drawn_by = size, drawing
 
     def _draft(self, drafts: Follower, camera: Camera | None, size: tuple[int, int]) -> None:

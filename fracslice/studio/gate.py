@@ -55,13 +55,14 @@ class Gate:
         if request.path == INDEX:
             return self._index(request)
         is_tab = request.headers.get("Upgrade", "").lower() == "websocket"
-        self._count(is_tab)
+        self.count(is_tab)
         try:
             return await handler(request)
         finally:
-            self._count(-is_tab)
+            self.count(-is_tab)
 
-    def _count(self, more: int) -> None:
+    def count(self, more: int) -> None:
+        """Note that a tab was opened (1) or closed (-1)."""
         self.tabs, self._since = self.tabs + more, time.monotonic()
 
     def _index(self, request: web.Request) -> web.Response:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -26,6 +26,7 @@ from ..export.layers import PRINTS, printers_file, slice_format, write_slices
 from ..fields.box import Box, Triple
 from ..jobs.mesh import make_mesh
 from ..jobs.slices import SliceRecipe
+from ..mesh.clusters import Clusters
 from ..mesh.drawing import BEHIND, MeshDrawing, MeshView, Plane, Size
 from ..records import SAME, MeshJob, Print, SliceJob
 from ..rendering.live import Live, Shown
@@ -103,16 +104,24 @@ class Footing(NamedTuple):
 
 
 class MeshPicture:
-    """Draws a mesh for the page."""
+    """Draws a mesh for the page, and a coarse copy of a large one while the camera moves."""
 
-    def __init__(self, view: MeshView) -> None:
+    def __init__(self, view: MeshView, clusters: Clusters | None) -> None:
         self.view = view
+        self._coarse = replace(view, mesh=clusters.mesh(view.mesh)) if clusters else view
         self._last: MeshDrawing | None = None
 
     def __call__(self, camera: Camera, size: Size) -> NDArray[np.uint8]:
         """See `rendering.live.Drawing`."""
         self._last = self.view.draw(camera, size)
         return self._last.pixels
+
+    def moving(self, camera: Camera, size: Size) -> NDArray[np.uint8]:
+        """Draw it while the camera moves; see `rendering.live.Drawing`."""
+        if self._coarse is self.view:
+            return self(camera, size)
+        self._last = None
+        return self._coarse.draw(camera, size).pixels
 
     def drawn(self, live: Live) -> MeshDrawing:
         """The picture that is seen, or will be in a moment."""
@@ -194,7 +203,8 @@ class Inside:
     def draw(self) -> None:
         """Have the picture show what stands now."""
         self._picture = self._drawing()
-        self._host.live.draw(self._picture)
+        picture = self._picture
+        self._host.live.draw(picture, picture.moving if isinstance(picture, MeshPicture) else None)
         self._mark()
 
     def _drawing(self) -> MeshPicture | LayerPicture | None:
@@ -204,7 +214,7 @@ class Inside:
             if self._drawn_as != key or not isinstance(self._picture, MeshPicture):
                 self._drawn_as = key
                 mesh = solid.coloured(measure) if measure else solid.mesh
-                return MeshPicture(MeshView(mesh, *key[2:]))
+                return MeshPicture(MeshView(mesh, *key[2:]), solid.clusters)
             return self._picture
         if self.mode == "layers" and self.layers:
             problem = self.problem
@@ -285,6 +295,7 @@ class Inside:
 
         def make(work: Work) -> str:
             solid = SceneSolid(make_mesh(scene, what, work))
+            _ = solid.clusters  # here, and not at the first move
             if measure:
                 solid.measure(measure, work)
             self.solids[designed] = scene, solid

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -14,6 +15,7 @@ from ..common.messages import format_count, significant
 from ..formulas.material import PALETTES
 from ..jobs.report import Result
 from ..mesh import Mesh
+from ..mesh.clusters import Clusters
 from ..mesh.drawing import MeshDrawing
 from ..mesh.fit import surface_error
 from ..printing.walls import Samples
@@ -22,6 +24,9 @@ from ..work import Work
 
 PALETTE = np.reshape(PALETTES["viridis"], (-1, 3))[:5]
 """Colours from the least to the greatest value, sRGB."""
+
+QUICK = 150_000
+"""About the triangles that are drawn while the camera moves."""
 
 FARTHEST = 0.25
 """Greatest width of walls and gaps that are measured, longest sides."""
@@ -48,6 +53,14 @@ class SceneSolid:
     def mesh(self) -> Mesh:
         """The mesh in scene units."""
         return Mesh(self.result.place.units(self.result.vertices), self.result.triangles)
+
+    @cached_property
+    def clusters(self) -> Clusters | None:
+        """Clusters of its vertices for pictures that move; none of a mesh that is drawn quickly enough."""
+        if len(self.mesh.triangles) <= QUICK:
+            return None
+        area = np.linalg.norm(self.mesh.normals, axis=1).sum() / 2
+        return Clusters.within(self.mesh, math.sqrt(2 * area / QUICK))
 
     @cached_property
     def normals(self) -> NDArray[np.float64]:

@@ -10,6 +10,7 @@ import trimesh
 
 from fracslice import Mesh
 from fracslice._native import foremost
+from fracslice.mesh.clusters import Clusters
 from fracslice.mesh.drawing import BEHIND, SECTION, MeshView, Plane, Projection, clip
 from fracslice.scene.view import Camera
 
@@ -41,6 +42,23 @@ def test_a_box_covers_the_pixels_of_its_front(kind: str) -> None:
     np.testing.assert_allclose(spot.point, start + (-1 - start[1]) / along[1] * along, atol=1e-9)
     assert min(spot.weights) >= -1e-9 and sum(spot.weights) == pytest.approx(1)
     assert drawn.at(0, 0) is None and drawn.at(-1, 900) is None
+
+
+def test_a_coarse_copy_is_near_its_mesh_in_its_colours() -> None:
+    ball = trimesh.creation.icosphere(5)
+    shade = (255 * (ball.vertices[:, 2] > 0)).astype(np.uint8)
+    fine = Mesh(np.array(ball.vertices), np.array(ball.faces, np.int32), np.stack([shade] * 3, 1))
+    clusters = Clusters.within(fine, 0.1)
+    coarse = clusters.mesh(fine)
+    assert len(coarse.triangles) < len(fine.triangles) / 5
+    distances = np.linalg.norm(coarse.vertices, axis=1)
+    assert distances.min() > 1 - 0.1**2 and distances.max() <= 1
+    assert coarse.volume == pytest.approx(fine.volume, rel=0.01)
+    assert coarse.colours is not None
+    assert (coarse.colours[coarse.vertices[:, 2] > 0.1] == 255).all()
+    assert (coarse.colours[coarse.vertices[:, 2] < -0.1] == 0).all()
+    (together,) = Clusters.within(fine, 10.0).means(fine.vertices)
+    np.testing.assert_allclose(together, 0, atol=1e-9)
 
 
 def test_what_is_seen_through_a_cut_is_the_section() -> None:

@@ -13,7 +13,7 @@ import pytest
 
 from fracslice.errors import SceneError
 from fracslice.rendering import live as module
-from fracslice.rendering.live import CameraInput, Live, SceneFile, Shown
+from fracslice.rendering.live import CameraInput, Drawing, Live, SceneFile, Shown
 from fracslice.scene.view import Camera
 from fracslice.viewer.viewer import Controls
 from fracslice.work import Work
@@ -143,6 +143,23 @@ def test_a_slow_picture_gets_finer_in_steps(path: Path, monkeypatch: pytest.Monk
         assert widths[:3] == [120, 240, 480]
     finally:
         live.close()
+
+
+def test_a_drawing_is_a_quicker_one_while_the_camera_moves(live: Live) -> None:
+    def drawing(shade: int) -> Drawing:
+        return lambda _, size: np.full((size[1], size[0], 3), shade, np.uint8)
+
+    def shades() -> tuple[int, float]:
+        return int(live.shown.pixels[0, 0, 0]), live.shown.samples
+
+    live.draw(drawing(7), drawing(9))
+    wait_until(lambda: shades() == (7, 1.0))
+    seen = set[tuple[int, float]]()
+    live.turn(5, 0)
+    wait_until(lambda: seen.add(shades()) or (9, 0.0) in seen)
+    wait_until(lambda: shades() == (7, 1.0))
+    live.draw(None)
+    sharp(live, live.aim)
 
 
 def test_a_tap_on_a_key_is_never_lost(live: Live) -> None:

@@ -287,7 +287,7 @@ def test_what_was_made_is_freed_after_the_last_tab(
     done(studio)
     monkeypatch.setattr(pages, "AWAY", 0.0)
     for tabs, kept in ((2, True), (-1, True), (-1, False)):
-        page._count_tabs(tabs)
+        page.gate.count(tabs)
         time.sleep(0.001)
         page._forget()
         assert inside.has_made == kept
