@@ -17,6 +17,7 @@ import mmap
 import os
 import struct
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -266,13 +267,13 @@ class CompiledFunction:
         self._call(*arguments)
 
 
+@dataclass(frozen=True)
 class _Pointer:
     """Argument type for ctypes, which calls `from_param` and keeps the array alive until the function
-    returns.
+    returns. Those of one dtype are equal: ctypes keeps the type of each other signature for ever.
     """
 
-    def __init__(self, dtype: np.dtype) -> None:
-        self.dtype = dtype
+    dtype: np.dtype
 
     def from_param(self, array: np.ndarray) -> Any:
         if array.dtype != self.dtype or not array.flags.c_contiguous:

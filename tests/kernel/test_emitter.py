@@ -150,3 +150,11 @@ def test_what_cannot_be_compiled_is_one_line_with_its_place(body: str, tmp_path:
     with pytest.raises(KernelError, match=rf"written.py:{wrong}: loop run: .*{WRONG[body]}") as caught:
         object_code(NOTHING, 64, lane_count(64), [loop])
     assert "\n" not in str(caught.value)
+
+
+def test_functions_of_one_signature_are_of_one_type(tmp_path: Path) -> None:
+    """Types of functions are kept for ever: a studio would need more memory after each change."""
+    loop = made(tmp_path, "F[0] = A[0]")
+    code = object_code(NOTHING, 64, lane_count(64), [loop])
+    first, second = (load_object(code, [loop], np.dtype(np.float64))["run"] for _ in range(2))
+    assert first is not second and type(first._call) is type(second._call)
