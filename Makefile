@@ -38,7 +38,7 @@ suite: setup
 	$(BIN)/python -m pytest -n 2 $(SELECT)
 
 native-tests: packages
-	cmake -S tests/native -B build/native-tests -G Ninja
+	CMAKE_CXX_COMPILER_LAUNCHER=$$(command -v ccache) cmake -S tests/native -B build/native-tests -G Ninja
 	cmake --build build/native-tests
 	cd build/native-tests && ctest --output-on-failure
 
