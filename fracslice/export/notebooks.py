@@ -12,7 +12,7 @@ NOTEBOOK = ".ipynb"
 """Ending of a notebook."""
 
 CELLS = (
-    "from fracslice import Studio, make_mesh, reads, slice_layers\n\nscene = reads({text!r}, {name!r})",
+    "from fracslice import Studio, make_mesh, reads\n\nscene = reads({text!r}, {name!r})",
     "studio = Studio(scene)  # a page: studio.scene is the scene as it is there now\nstudio",
     "mesh = make_mesh(scene, resolution={resolution:g})\nmesh.export({mesh!r})\nmesh.report",
 )

@@ -54,11 +54,11 @@ def graph_of(film: Timeline, of: str, limits: tuple[float, float] | None = None)
         )
         for column in values.T
     ]
-    dots = []
+    sides, dots = (-1, 1) if film.curve_of(of) == "smooth" else (), []
     for time in (time for time, _ in track.keys if time <= length):
         slopes = _slopes(film, of, time)
         for part, (value, slope) in enumerate(zip(film.numbers(of, time), slopes, strict=True)):
-            arms = (side * ARM * length for side in (-1, 1)) if film.curve_of(of) == "smooth" else ()
+            arms = [side * ARM * length for side in sides]
             handles = [place(time + arm, value + slope * arm) for arm in arms]
             dots.append({"time": time, "part": part, "at": place(time, value), "handles": handles})
             dots[-1] |= {"value": float(f"{value:.6g}"), "slope": float(f"{slope:.4g}")}
@@ -91,13 +91,14 @@ class CurvePanel:
         page.server.trigger("drop_curve")(self.drop)
 
     def refresh(self) -> None:
-        """Draw it as it is now, between the same limits while it is dragged."""
+        """Draw it as it is now, between the same limits during a drag; not while the panel is closed."""
         of = self._state.graph.get("of")
-        if of is None:
+        if of is None or self._studio.player.seconds is None:
             return
         with self._state as state:
             try:
-                state.graph = graph_of(Timeline(self._studio.document.scene), of, self._held)
+                film = self._studio.film
+                state.graph = graph_of(film, of, self._held) if film else {}
             except (SceneError, StopIteration):
                 state.graph = {}
             dots = state.graph.get("dots", [])

@@ -29,7 +29,7 @@ from ..jobs.slices import SliceRecipe
 from ..mesh.clusters import Clusters
 from ..mesh.drawing import BEHIND, MeshDrawing, MeshView, Plane, Size
 from ..records import SAME, MeshJob, Print, SliceJob
-from ..rendering.live import Live, Shown
+from ..rendering.live import Drawing, Live, Shown
 from ..rendering.setup import footprint
 from ..scene import Scene
 from ..scene.layout import SOLID
@@ -108,7 +108,7 @@ class MeshPicture:
 
     def __init__(self, view: MeshView, clusters: Clusters | None) -> None:
         self.view = view
-        self._coarse = replace(view, mesh=clusters.mesh(view.mesh)) if clusters else view
+        self._coarse = replace(view, mesh=clusters.mesh(view.mesh)) if clusters else None
         self._last: MeshDrawing | None = None
 
     def __call__(self, camera: Camera, size: Size) -> NDArray[np.uint8]:
@@ -116,10 +116,13 @@ class MeshPicture:
         self._last = self.view.draw(camera, size)
         return self._last.pixels
 
-    def moving(self, camera: Camera, size: Size) -> NDArray[np.uint8]:
-        """Draw it while the camera moves; see `rendering.live.Drawing`."""
-        if self._coarse is self.view:
-            return self(camera, size)
+    @property
+    def moving(self) -> Drawing | None:
+        """What draws the copy, if there is one."""
+        return self._draw_coarse if self._coarse else None
+
+    def _draw_coarse(self, camera: Camera, size: Size) -> NDArray[np.uint8]:
+        assert self._coarse
         self._last = None
         return self._coarse.draw(camera, size).pixels
 

@@ -13,26 +13,20 @@ from trame_rca import module as rca
 NARROW = 900
 """Width of a page below which panels at the right cover the picture, pixels."""
 
-
 PENDING = 2
 """Frames that a page may have to fetch still before others are left out."""
 
 
-AREA = "remote-controlled-area"
-"""Element of trame-rca that shows frames and tells of mouse and keys."""
-
-
 def picture_area(server: Any, frames: Any) -> None:
-    """Area of a picture; `frames` is what trame-rca calls its adapter.
+    """Area that shows frames and tells of mouse and keys; `frames` is what trame-rca calls its adapter.
 
     The widget of trame-rca itself loads VTK, a third of what the studio imports.
     """
     server.enable_module(rca)
-    sizes = "{width: '100%', height: '100%', objectFit: 'contain'}"
+    style = "{width: '100%', height: '100%', objectFit: 'contain'}"
+    shown = f'name="{frames.area_name}"', 'display="image"', f':image-style="{style}"'
     events = ':send-mouse-move="true"', ':event-throttle-ms="15"'
-    AbstractElement(
-        AREA, raw_attrs=[f'name="{frames.area_name}"', 'display="image"', f':image-style="{sizes}"', *events]
-    )
+    AbstractElement("remote-controlled-area", raw_attrs=[*shown, *events])
 
     def register(**_: Any) -> None:
         server.protocol_call("trame.rca.drop", frames.area_name, PENDING)

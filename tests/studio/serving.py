@@ -35,19 +35,26 @@ def chromium() -> Iterator[Browser]:
 
 
 @contextmanager
-def served(
-    browser: Browser, source: str, folder: Path, size: tuple[int, int], *options: str
-) -> Iterator[Served]:
-    """Serve a scene, seen in a window of a size, pixels; it must end as Ctrl-C ends it."""
+def running(source: str, folder: Path, *options: str) -> Iterator[tuple[str, int]]:
+    """Serve a scene; its address, and the number of the process, which must end as Ctrl-C ends it."""
     command = [sys.executable, "-m", "cli", "studio", source, "--no-browser", "--device", "cpu", *options]
     with subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout
         address = process.stdout.readline().strip()
-        page = browser.new_page(viewport={"width": size[0], "height": size[1]})
         try:
-            page.goto(address)
-            page.get_by_role("list", name="Elements").wait_for()
-            yield Served(page, address, folder, process.pid)
+            yield address, process.pid
         finally:
             process.send_signal(2)
         assert process.wait(60) in (0, 130)
+
+
+@contextmanager
+def served(
+    browser: Browser, source: str, folder: Path, size: tuple[int, int], *options: str
+) -> Iterator[Served]:
+    """Serve a scene, seen in a window of a size, pixels."""
+    with running(source, folder, *options) as (address, process):
+        page = browser.new_page(viewport={"width": size[0], "height": size[1]})
+        page.goto(address)
+        page.get_by_role("list", name="Elements").wait_for()
+        yield Served(page, address, folder, process)

@@ -7,7 +7,6 @@ import json
 import re
 import shutil
 import subprocess
-import sys
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -16,6 +15,8 @@ from typing import Any
 import pytest
 
 from tests.waiting import wait_until
+
+from .serving import running
 
 aiohttp = pytest.importorskip("aiohttp")
 
@@ -137,16 +138,10 @@ def test_a_person_looks_changes_and_returns(tmp_path: Path) -> None:
     (tmp_path / "ball.xml").write_text(SCENE)
     profile = tmp_path / "profile"
     profile.mkdir()
-    command = [sys.executable, "-m", "cli", "studio", "ball.xml", "--no-browser", "--device", "cpu"]
-    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout
-        address = process.stdout.readline().strip()
 
-        async def run() -> None:
-            async with firefox(profile) as tab:
-                await asyncio.wait_for(first_steps(tab, address), 120)
+    async def run(address: str) -> None:
+        async with firefox(profile) as tab:
+            await asyncio.wait_for(first_steps(tab, address), 120)
 
-        try:
-            asyncio.run(run())
-        finally:
-            process.send_signal(2)
+    with running("ball.xml", tmp_path) as (address, _):
+        asyncio.run(run(address))
