@@ -146,7 +146,7 @@ def own_formula(function: Callable[..., Any], fixed: Fixed) -> Function:
 
 def loop_function(loop: Loop) -> Function:
     """Return the function of a loop."""
-    return _function(Reader, loop.function, loop.fixed, loop.name, _mark(loop.function, loop.fixed))
+    return _loop(Reader, loop.function, loop.fixed, loop.name, _mark(loop.function, loop.fixed))
 
 
 def kernel_function(function: Callable[..., Any], fixed: Fixed = ()) -> Function:
@@ -161,13 +161,16 @@ def _mark(function: Callable[..., Any], fixed: Fixed) -> object:
     return fingerprint(function), tuple(repr(value) for _, value in fixed if is_number(value))
 
 
-@lru_cache(maxsize=2048)
-def _function(
-    kind: type[Reader], function: Callable[..., Any], fixed: Fixed, name: str, _: object
-) -> Function:
-    """Function that a reader reads, cached."""
+def _read(kind: type[Reader], function: Callable[..., Any], fixed: Fixed, name: str, _: object) -> Function:
+    """Function that a reader reads."""
     source = Source.of(function, kind.kind, *(value for _, value in fixed))
     return source_function(kind, replace(source, name=name), fixed)
+
+
+_function = lru_cache(maxsize=2048)(_read)
+_loop = lru_cache(maxsize=32)(
+    _read
+)  # few: what is fixed in a loop holds its scene, another one after each edit
 
 
 @lru_cache(maxsize=256)
