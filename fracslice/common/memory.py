@@ -40,6 +40,16 @@ def keep_memory_of_tasks() -> None:
     _tell_glibc({M_TRIM_THRESHOLD: KEPT_BY_TASKS, M_MMAP_THRESHOLD: LARGEST_OF_TASKS})
 
 
+def return_freed_memory() -> None:
+    """Let glibc return freed memory of all threads to the system."""
+    if sys.platform != "linux":
+        return
+    import ctypes
+
+    if hasattr(library := ctypes.CDLL(None), "malloc_trim"):
+        library.malloc_trim(0)
+
+
 def _tell_glibc(values: dict[int, int]) -> None:
     if sys.platform != "linux":
         return

@@ -17,6 +17,7 @@ from trame.ui.vuetify3 import VAppLayout
 from trame.widgets import client, html
 from trame.widgets import vuetify3 as v
 
+from ..common.memory import return_freed_memory
 from ..common.messages import format_count
 from ..errors import FracsliceError, SceneError
 from ..export.images import IMAGES
@@ -71,6 +72,9 @@ HELP = (
     ("?", "this help"),
 )
 
+TIDYING = 10.0
+"""Time between two times that memory is given back, seconds."""
+
 AWAY = 30.0
 """Time after the last tab was closed in which another one finds the same, seconds."""
 
@@ -117,7 +121,7 @@ class Page:
         self.refresh()
         self.state.change("xml")(self.write)
         self.server.trigger("pad")(self.frames.bend)
-        self.ctrl.on_server_ready.add(lambda **_: asyncio.get_running_loop().create_task(self.follow()))
+        self.ctrl.on_server_ready.add(self.begin)
         self.build()
 
     def refresh(self) -> None:
@@ -221,6 +225,10 @@ class Page:
         if self.studio.job:
             self.studio.job.cancel.set()
 
+    def begin(self, **_: Any) -> None:
+        """Begin what lasts until the server ends."""
+        self._tasks = [asyncio.get_running_loop().create_task(of()) for of in (self.follow, self.tidy)]
+
     async def follow(self) -> None:
         """Steer by the keys that are held, send frames, and say how far things are, until the server ends."""
         told = -math.inf
@@ -233,8 +241,17 @@ class Page:
                 told = now
                 self._say()
                 self.inside.follow()
-                self._forget()
             await asyncio.sleep(TICK)
+
+    async def tidy(self) -> None:
+        """Give memory back, until the server ends.
+
+        A change of the scene compiles in threads, and glibc keeps up to 32 MiB that each has freed.
+        """
+        while True:
+            await asyncio.sleep(TIDYING)
+            self._forget()
+            await asyncio.to_thread(return_freed_memory)
 
     def _forget(self) -> None:
         """Free what was made to look at, some time after the last tab was closed."""
