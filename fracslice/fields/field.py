@@ -129,6 +129,11 @@ class Cells(Protocol):
         ...
 
 
+def outermost(points: np.ndarray) -> np.ndarray:
+    """Outermost of points [n, 3] along -x, -y, -z, x, y and z, float64 [3, 6]."""
+    return np.ascontiguousarray(points[np.concatenate([points.argmin(0), points.argmax(0)])].T)
+
+
 class Field(Protocol):
     """A signed distance field: negative inside, zero on the surface."""
 

@@ -25,9 +25,10 @@ from ..common.parameters import (
 from ..errors import SceneError
 from ..expr.language import InMemory
 from .box import Axis, Box, direction, three
-from .field import Bounds, Cells, Device, Field, Kernel, Loops, Precision
+from .field import Bounds, Cells, Device, Field, Kernel, Loops, Precision, outermost
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
     from ..common.arrays import Triangles
@@ -687,6 +688,15 @@ class Node(Operators, Field):
     @property
     def tree(self) -> Node:
         return self
+
+    @property
+    def tips(self) -> NDArray[np.float64] | None:
+        known: NDArray[np.float64] | None = self._hooked("tips", None)
+        if known is None and (own := self.triangles()) is not None:
+            known = outermost(own.vertices)
+        if known is None and self.is_identity and len(self.children) == 1:
+            known = self.children[0].tips
+        return known
 
     @property
     def escape_time_only(self) -> bool:

@@ -21,6 +21,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..common.arrays import Triangles
 from ..common.parameters import REQUIRED, Parameter, python_name, validate_value
 from ..errors import FracsliceError, FracsliceWarning, SceneError
@@ -124,6 +127,10 @@ class Hooks:
     def triangles(self, hook: Callable[[Node], Triangles | None]) -> Callable[[Node], Triangles | None]:
         """Set the hook that returns the triangles that are the whole surface, in scene units, or None."""
         return self._hook("triangles", hook)
+
+    def tips(self, hook: Callable[[Node], NDArray[np.float64] | None]) -> Hook:
+        """Set the hook that returns the outermost points of a shape, as `Field.tips`, or None."""
+        return self._hook("tips", hook)
 
     def completed(self, hook: Callable[[dict[str, Any]], dict[str, Any]]) -> Hook:
         """Set the hook that returns the values with those that they imply."""

@@ -7,9 +7,13 @@ from collections.abc import Callable
 from functools import reduce
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..common.parameters import REQUIRED, SMALLEST, Number
 from ..expr.vocabulary import absolute, floor, maximum, minimum
 from ..fields.box import Box
+from ..fields.field import outermost
 from ..fields.registry import Node, csg_operator
 from ..fields.varying import Variable, Varying, as_argument, slope_of
 
@@ -158,6 +162,12 @@ def union_bounds(node: Node) -> Box:
     # Where seams reach beyond the box, they are wider by the slope times the way to a corner.
     width, wider = max(smooth.most(sharp), 0.0), seams * math.sqrt(3) * smooth.slope / 4
     return sharp.grown(seams * width / 4 / (1 - wider) if wider < 1 else math.inf)
+
+
+@union.tips
+def union_tips(node: Node) -> NDArray[np.float64] | None:
+    tips = [child.tips for child in node.children if child.tips is not None] if node["smooth"] == 0 else []
+    return outermost(np.hstack(tips).T) if len(tips) == len(node.children) else None
 
 
 @intersection.bounds

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..common.arrays import Triangles, affine, inverse, product, stretches
 from ..common.parameters import REQUIRED, SMALLEST, Axis, Vector
 from ..expr.vocabulary import absolute
 from ..fields.box import Box
+from ..fields.field import outermost
 from ..fields.registry import Fixed, Node, always_keeps_sign, domain_operator
 
 
@@ -98,6 +100,18 @@ def transform_triangles(node: Node) -> Triangles | None:
     linear, offset = affine(node.values)
     turned = own.triangles if np.linalg.det(linear) > 0 else own.triangles[:, ::-1]
     return Triangles(product(own.vertices, linear.T) + offset, turned)
+
+
+ALONG = 1e-12
+"""Part of an axis across the others that is rounding: of a quarter turn, 1e-16."""
+
+
+@transform.tips
+def transform_tips(node: Node) -> NDArray[np.float64] | None:
+    linear, offset = affine(node.values)
+    along = abs(linear) > ALONG * abs(linear).max(0)
+    own = node.children[0].tips if (np.count_nonzero(along, axis=0) == 1).all() else None
+    return None if own is None else outermost(product(own.T, linear.T) + offset)
 
 
 @domain_operator(

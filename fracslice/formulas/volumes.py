@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..common.parameters import MILLIMETRES, REQUIRED, Choice, File, Label, Number
 from ..expr.vocabulary import solid_distance
 from ..fields.box import Box
@@ -55,6 +58,16 @@ def volume_slope(node: Node) -> float:
 @volume.bounds
 def volume_bounds(node: Node) -> Box:
     return placed_box(node, _level_set(node).box)
+
+
+@volume.tips
+def volume_tips(node: Node) -> NDArray[np.float64] | None:
+    found = _level_set(node)
+    if found.tips is None:
+        return None
+    place = placement(node, found.box)
+    tips: NDArray[np.float64] = found.tips * place["scale"] + np.array(place["origin"])[:, None]
+    return tips
 
 
 def _level_set(node: Node) -> LevelSet:

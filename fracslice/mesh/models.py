@@ -22,7 +22,7 @@ from ..errors import MeshError, SceneError
 from ..expr.language import InMemory
 from ..fields.box import Box
 from ..fields.devices import ArrayField
-from ..fields.field import Bounds, Device, Kernel, Precision
+from ..fields.field import Bounds, Device, Kernel, Precision, outermost
 from ..fields.node import TriangleMesh
 from ..fields.registry import Node, get
 from ..formats import ENDINGS, MeshFormat, mesh_format
@@ -251,8 +251,7 @@ class MeshField(ArrayField):
     @property
     def tips(self) -> np.ndarray:
         """`Field.tips`."""
-        vertices = self.mesh.vertices
-        return np.ascontiguousarray(vertices[np.concatenate([vertices.argmin(0), vertices.argmax(0)])].T)
+        return outermost(self.mesh.vertices)
 
     @cached_property
     def key(self) -> str:

@@ -47,6 +47,7 @@ class LevelSet(InMemory):
     """Grid whose signed distances machine code asks for; see `native/volume/level_set.h`."""
 
     box: Box  # bounds of the inside
+    tips: NDArray[np.float64] | None  # outermost points, as `Field.tips`, of a grid that is not turned
     slope: float  # by which the distances of `native` are divided, so that their L is 1
 
 
@@ -67,7 +68,8 @@ def level_set(
         raise VolumeError(f"its grid {found.name!r} {error}") from None
     (x, y, z), (u, v, w) = native.box
     digest = int(key("level set", sha256, found.name, what, level)[:16], 16)
-    return LevelSet(digest, native, Box((x, y, z), (u, v, w)), native.steepness)
+    tips = None if native.tips is None else np.array(native.tips).T
+    return LevelSet(digest, native, Box((x, y, z), (u, v, w)), tips, native.steepness)
 
 
 def _around_zero(grid: Grid, kind: Kind, level: float) -> Grid:

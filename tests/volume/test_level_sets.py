@@ -91,6 +91,31 @@ def test_the_stated_lipschitz_constant_holds(solid: tuple[Node, Distance, float]
     assert 0.5 < steepest <= root.bounds.lipschitz <= 6
 
 
+@pytest.mark.parametrize(
+    "placed",
+    [
+        lambda root: root,
+        lambda root: (
+            root.rotate(90, "z").scale((2, 1, -1)).translate((3, 0, 0)) | root.material(colour=(1, 0, 0))
+        ),
+    ],
+    ids=["alone", "placed twice"],
+)
+def test_outermost_points_are_those_of_the_grid(placed: Callable[[Node], Node]) -> None:
+    """The field is zero there, and nothing is inside beyond."""
+    root = placed(array(ball(POINTS) + 0.1 * np.sin(9 * POINTS).prod(-1)))
+    tips = root.tips
+    assert tips is not None and abs(root.distance(tips.T)).max() < 1e-12
+    ends = np.stack([tips[[0, 1, 2], [0, 1, 2]], tips[[0, 1, 2], [3, 4, 5]]])
+    points = RNG.uniform(ends[0] - STEP, ends[1] + STEP, (200_000, 3))
+    for axis in range(3):
+        for side, sign in ((0, -1), (1, 1)):
+            beyond = points.copy()
+            beyond[:, axis] = ends[side, axis] + sign * RNG.uniform(1e-9, STEP, len(points))
+            assert (root.distance(beyond) > 0).all()
+    assert root.rotate(10, "z").tips is None and (root - root.translate((1, 0, 0))).tips is None
+
+
 def test_the_box_holds_the_solid_and_touches_it(solid: tuple[Node, Distance, float]) -> None:
     root, *_ = solid
     points = RNG.uniform(-1.4, 1.4, (200_000, 3))
@@ -118,10 +143,10 @@ def test_far_offsets_and_walls_are_as_exact_as_near_ones() -> None:
     """A narrow band alone ends three voxels from the surface."""
     root = array(ball(POINTS))
     for distance in (-0.6, 0.9):
-        mesh = make_mesh(root.offset(distance), resolution=64)
+        mesh = make_mesh(root.offset(distance), resolution=40)
         assert mesh.volume == pytest.approx(4 / 3 * np.pi * (1 + distance) ** 3, rel=0.01)
         assert not mesh.report.problems
-    wall = make_mesh(root.shell(0.5), resolution=64)
+    wall = make_mesh(root.shell(0.5), resolution=40)
     assert wall.volume == pytest.approx(4 / 3 * np.pi * (1 - 0.125), rel=0.01)
 
 
@@ -324,6 +349,7 @@ def test_wrong_arrays_and_options_are_one_line(make: Callable[[], object], messa
     assert isinstance(error.value, VolumeError | ExportError | SceneError) and "\n" not in str(error.value)
 
 
+@pytest.mark.nightly
 def test_meshes_of_grids_have_no_faults() -> None:
     made = make_mesh(array(hollow(POINTS)) | (array(cube(POINTS)) & gyroid(period=0.5)), resolution=32)
     assert not made.report.problems and isinstance(made, Mesh)

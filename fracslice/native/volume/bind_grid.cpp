@@ -3,6 +3,7 @@
 #include "level_set.h"
 
 #include <nanobind/stl/map.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
@@ -56,6 +57,7 @@ class BoundLevelSet {
         return to_numpy(std::move(values), {points.shape(0)});
     }
     std::array<std::array<double, 3>, 2> box() const { return level_set_.box(); }
+    std::optional<std::array<std::array<double, 3>, 6>> tips() const { return level_set_.tips(); }
     double steepness() const { return level_set_.steepness(); }
 
   private:
@@ -101,5 +103,6 @@ NB_MODULE(_vdb, module) {
         .def("distances", &BoundLevelSet::distances, "points"_a)
         .def_prop_ro("address", &BoundLevelSet::address)
         .def_prop_ro("box", &BoundLevelSet::box)
+        .def_prop_ro("tips", &BoundLevelSet::tips)
         .def_prop_ro("steepness", &BoundLevelSet::steepness);
 }

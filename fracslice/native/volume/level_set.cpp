@@ -392,18 +392,32 @@ double LevelSet::operator()(const double* p, size_t& found) const {
     return value / steepness_;
 }
 
-std::array<std::array<double, 3>, 2> LevelSet::box() const {
-    constexpr double far = std::numeric_limits<double>::infinity();
-    std::array<std::array<double, 3>, 2> corners{{{far, far, far}, {-far, -far, -far}}};
+// The first of several, along each axis.
+std::array<std::array<double, 3>, 6> LevelSet::outermost() const {
+    std::array<std::array<double, 3>, 6> result;
+    const Vec3d first = grid_->transform().indexToWorld(points_.all()[0].at);
+    result.fill({first[0], first[1], first[2]});
     for (const SurfacePoint& point : points_.all()) {
         const Vec3d at = grid_->transform().indexToWorld(point.at);
         for (size_t k = 0; k < 3; ++k) {
-            corners[0][k] = std::min(corners[0][k], at[int(k)]), corners[1][k] = std::max(corners[1][k], at[int(k)]);
+            if (at[int(k)] < result[k][k]) result[k] = {at[0], at[1], at[2]};
+            if (at[int(k)] > result[k + 3][k]) result[k + 3] = {at[0], at[1], at[2]};
         }
     }
+    return result;
+}
+
+std::optional<std::array<std::array<double, 3>, 6>> LevelSet::tips() const {
+    if (!along_axes(*grid_)) return std::nullopt;
+    return outermost();
+}
+
+std::array<std::array<double, 3>, 2> LevelSet::box() const {
+    const auto ends = outermost();
     // Along the axes of the grid the solid ends at edges; along others, within a cell of them.
     const double aside = along_axes(*grid_) ? 0 : voxel_;
-    for (size_t k = 0; k < 3; ++k) corners[0][k] -= aside, corners[1][k] += aside;
+    std::array<std::array<double, 3>, 2> corners;
+    for (size_t k = 0; k < 3; ++k) corners[0][k] = ends[k][k] - aside, corners[1][k] = ends[k + 3][k] + aside;
     return corners;
 }
 

@@ -1,5 +1,6 @@
 // A grid around a surface as machine code asks for it: signed distances of the points of a packet.
 #pragma once
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -62,12 +63,16 @@ class LevelSet {
     const mesh::Distances* entry() const { return &entry_; }
     double operator()(const double* p, size_t& found) const;
     double steepness() const { return steepness_; }
+    // Outermost points of the inside along -x, -y, -z, x, y and z. A cell of samples reaches farthest at one of its edges, so they
+    // are exact; none if the grid is turned.
+    std::optional<std::array<std::array<double, 3>, 6>> tips() const;
     // Corners of the box of the inside.
     std::array<std::array<double, 3>, 2> box() const;
 
   private:
     double linear(const openvdb::Vec3d& q) const;
     double disagreement() const;
+    std::array<std::array<double, 3>, 6> outermost() const;
 
     FloatGrid::Ptr grid_;
     double voxel_, end_, begin_;  // from value `begin_` to `end_`, linear ones become distances to points
