@@ -264,7 +264,14 @@ def act_at_random(page: playwright.Page, chance: random.Random) -> None:
         page.get_by_label(chance.choice(("First view", "View before", "View after"))).click()
 
 
+@pytest.fixture
+def nothing_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No kernel of earlier processes: the compiler, which is large, is loaded at the beginning."""
+    monkeypatch.setenv("FRACSLICE_CACHE", str(tmp_path / "cache"))
+
+
 @pytest.mark.nightly
+@pytest.mark.usefixtures("nothing_compiled")
 def test_half_an_hour_of_random_input_takes_no_memory(served: Served) -> None:
     page, chance, memory = served.page, random.Random(1), Path(f"/proc/{served.process}/statm")
     session = page.context.new_cdp_session(page)
