@@ -18,7 +18,7 @@ PACKAGES := g++ ccache cmake ninja-build python3-dev python3-venv libopenvdb-dev
 MISSING = $(shell for p in $(PACKAGES); do dpkg -s $$p >/dev/null 2>&1 || echo $$p; done)
 NATIVE := CMakeLists.txt $(wildcard cmake/* fracslice/native/* fracslice/native/*/*)
 
-# Compiled modules are kept: tests start hundreds of processes.
+# Compiled modules are kept: tests start hundreds of processes. pip compiles none; few are needed.
 unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo test suite native-tests docs nightly sanitize lint wheel peers setup packages clean
@@ -88,7 +88,7 @@ packages:
 $(VENV)/.locked: requirements.lock | packages
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet -r requirements.lock
+	$(BIN)/python -m pip install --quiet --no-compile -r requirements.lock
 	touch $@
 
 $(VENV)/.installed: $(VENV)/.locked pyproject.toml $(NATIVE)
