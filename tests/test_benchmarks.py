@@ -25,8 +25,12 @@ HERE = [name for name in NAMES if not name.startswith("gpu.")]
 LONG = {
     "jobs.cluster",
     "jobs.workers",
+    "libraries.error",
+    "mesh.thin",
     "printing.islands",
+    "printing.models",
     "printing.orientations",
+    "printing.supports",
     "stability.random_hybrids",
     "stability.random_scenes",
     "frame.convergence",

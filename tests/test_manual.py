@@ -20,6 +20,8 @@ from .mesh import shapes
 for name in ("animation.film", "jobs.slices", "scene.calibration"):
     import_module(f"fracslice.{name}")  # before a test replaces what they import
 
+pytestmark = pytest.mark.once
+
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 MADE = {"_build", "examples"}

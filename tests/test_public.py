@@ -55,6 +55,7 @@ def test_the_example_that_builds_and_meshes(tmp_path):
     assert (tmp_path / "bauble.3mf").exists()
 
 
+@pytest.mark.nightly
 def test_the_example_of_a_grid(tmp_path):
     arguments = [EXAMPLES / "from_numpy.py", tmp_path / "implant.3mf", "64"]
     done = subprocess.run([sys.executable, *map(str, arguments)], capture_output=True, text=True, check=True)
@@ -62,6 +63,7 @@ def test_the_example_of_a_grid(tmp_path):
     assert (tmp_path / "implant.3mf").exists()
 
 
+@pytest.mark.nightly
 def test_the_example_of_a_family(tmp_path):
     arguments = [EXAMPLES / "a_family.py", tmp_path, "24", "3"]
     subprocess.run([sys.executable, *map(str, arguments)], capture_output=True, check=True)

@@ -20,9 +20,11 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 BLOCK = re.compile(r"^(?:<!-- not run: (?P<reason>[^\n]+) -->\n+)?```python\n(?P<code>.*?)^```$", re.M | re.S)
 REASONS = {"needs a GPU", "needs a window", "needs a cluster", "needs SLURM", "needs Kubernetes"}
 SMALL = [
-    (r"\bresolution=\d+", "resolution=16"),
+    (r"\bresolution=\d+", "resolution=32"),
     (r"\bsamples=\d+", "samples=1"),
     (r"\bsize=\(\d+, \d+\)", "size=(32, 24)"),
+    (r"\bperiod=\d+", "period=20"),
+    (r"\bshell(=|\()[\d.]+", r"shell\g<1>6"),
 ]
 
 

@@ -48,6 +48,7 @@ def test_a_given_depth_is_kept() -> None:
     assert {int(scene.root["iterations"]) for scene in film(5).moments(0)} == {5}
 
 
+@pytest.mark.nightly
 def test_a_zoom_by_a_million_keeps_its_detail() -> None:
     """The last frames need float64; at every distance the surface fills the picture, and is no plain."""
     towards, far, near = np.array([2.0, -2.0, 1.0]) / 3, 2.0406517501933905, 2.0406517501933905e-6

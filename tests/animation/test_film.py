@@ -102,6 +102,7 @@ def test_frames_are_made_at_once(path: Path, tmp_path: Path, monkeypatch: pytest
         assert frame.read_bytes() == (tmp_path / "two" / frame.name).read_bytes()
 
 
+@pytest.mark.nightly
 def test_shards_make_the_frames_of_one_film(path: Path, tmp_path: Path) -> None:
     alone, shared = tmp_path / "alone", tmp_path / "shared"
     exr = ["--frames", "0..1", "--exr", "--layers"]

@@ -87,6 +87,7 @@ def test_the_command_writes_page_numbers_and_plots(tmp_path, peer, capfd):
     assert "report.md: 5 measurements" in capfd.readouterr().out
 
 
+@pytest.mark.nightly
 def test_a_peer_that_fails_is_reported_and_the_rest_goes_on():
     broken = Peer.read(f"broken={sys.executable} -c 1/0 {{workload}} {{resolution}} {{output}}")
     missing = Peer.read("missing=/no/such/program {workload} {resolution} {output}")
@@ -136,6 +137,7 @@ def test_a_peer_needs_all_its_places():
         Peer.read("a=b {workload} {output}")
 
 
+@pytest.mark.nightly
 def test_shards_share_the_measurements(tmp_path: Path, peer: str) -> None:
     task = BenchmarkTask(("sphere",), (16,), (Peer.read(peer),), repeats=1)
     pieces = ResultFolder(str(tmp_path / "pieces"))

@@ -222,6 +222,7 @@ def test_a_mesh_does_without_numba(ball, tmp_path, monkeypatch):
     assert sum(name.startswith("fracslice") for name in loaded) < 195, "each takes a millisecond"
 
 
+@pytest.mark.nightly
 def test_a_slice_does_without_numba(ball, tmp_path, monkeypatch):
     """Nor LLVM, once the scene is compiled."""
     monkeypatch.setenv("FRACSLICE_CACHE", str(tmp_path / "cache"))

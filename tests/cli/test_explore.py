@@ -102,6 +102,7 @@ def test_numbers_stay_within_their_ranges_and_the_look_stays() -> None:
         assert 0 <= sponge["level"] <= 20 and new != root
 
 
+@pytest.mark.nightly
 def test_steps_of_a_hybrid_are_varied() -> None:
     """Their bailout and iterations are those of the hybrid; only they repeat."""
     root = orbit(mandelbulb(8), transform(mandelbulb(3, repeat=2), scale=1.1), iterations=1)

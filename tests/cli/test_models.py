@@ -104,6 +104,7 @@ def test_a_good_model_would_print_and_an_open_one_has_no_layers(
     assert "layers" not in capfd.readouterr().out
 
 
+@pytest.mark.nightly
 def test_a_problem_has_its_place_and_fix_mends_it(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     trimesh.util.concatenate([box((8, 8, 2)), ball(2, 4)]).export(tmp_path / "loose.stl")
     assert run(["check", str(tmp_path / "loose.stl"), *COARSE, "--fix", "--json"]) in (0, 1)
@@ -157,6 +158,7 @@ def test_a_model_with_faults_and_good_layers_has_one_verdict(
     assert out.count("would") == 1 and "would not print:" in out and "that cut or touch others" in out
 
 
+@pytest.mark.nightly
 def test_fix_writes_what_it_made(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     scene, made = tmp_path / "step.xml", tmp_path / "made.stl"
     scene.write_text(STEP)
@@ -187,6 +189,7 @@ def test_fix_turns_a_model_and_writes_it(tmp_path: Path, capfd: pytest.CaptureFi
     assert solid.volume == pytest.approx(bowl().volume * 1.5**3, rel=1e-4)
 
 
+@pytest.mark.nightly
 def test_fix_keeps_a_direction_that_was_asked_for(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     bowl().export(tmp_path / "bowl.stl")
     source, made = tmp_path / "bowl.stl", tmp_path / "made.stl"

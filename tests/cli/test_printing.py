@@ -172,6 +172,7 @@ def write_bored(path: Path, sides: int = 64) -> None:
     path.write_bytes(bytes(80) + np.uint32(8 * sides).tobytes() + facets.tobytes())
 
 
+@pytest.mark.nightly
 def test_a_bore_that_may_close_is_a_note(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     """It is named for a scene and a model of it, and leaves the verdict as it is."""
     scene, model = tmp_path / "bore.xml", tmp_path / "bore.stl"

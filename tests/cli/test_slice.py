@@ -31,6 +31,7 @@ def test_layers_of_a_range_of_heights(ball: Path, tmp_path: Path) -> None:
     assert layers[-1]["top"] == 20
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(sys.platform != "linux", reason="Linux limits addresses")
 def test_layers_are_made_in_few_addresses(ball: Path, tmp_path: Path) -> None:
     """Threads for which there is no room are not started."""

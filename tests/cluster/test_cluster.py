@@ -9,6 +9,7 @@ import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,7 @@ from fracslice.slicing import SliceJob
 from fracslice.volume import sampler
 from fracslice.work import Work
 
+from ..examples import stamped
 from .processes import SECONDS, Cluster, wait_until
 
 pytestmark = pytest.mark.once
@@ -80,6 +82,7 @@ def filmed(work: Work, folder: Path) -> bytes:
     return b"".join(path.read_bytes() for path in paths)
 
 
+Expected = Callable[[str], bytes]
 JOBS: dict[str, Job] = {"slice": sliced, "render": rendered, "mesh": meshed, "film": filmed}
 
 
@@ -91,10 +94,10 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
 
 
 @pytest.fixture(scope="module")
-def expected(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+def expected(tmp_path_factory: pytest.TempPathFactory) -> Expected:
     """Results of one machine."""
     folder = tmp_path_factory.mktemp("expected")
-    return {name: job(Work(2), folder) for name, job in JOBS.items()}
+    return cache(lambda name: JOBS[name](Work(2), folder))
 
 
 @pytest.fixture(autouse=True)
@@ -114,37 +117,35 @@ def small_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(workers, "CONNECT", SECONDS)  # the machine may be busy
 
 
-def test_a_killed_worker_and_a_late_one(cluster: Cluster, expected: dict[str, bytes], tmp_path: Path) -> None:
-    """SIGKILL in the middle of each kind of job, with nobody left; then another worker comes."""
-    worker = cluster.worker()
-    for name, job in JOBS.items():
-        folder, late, made = tmp_path / name, list[subprocess.Popen[bytes]](), []
-        pieces, shares = folder / "pieces", dict[str, list[float]]()
-        folder.mkdir()
+@pytest.mark.parametrize("name", stamped(JOBS, ["mesh"]))
+def test_a_killed_worker_and_a_late_one(
+    name: str, cluster: Cluster, expected: Expected, tmp_path: Path
+) -> None:
+    """SIGKILL in the middle of a job, with nobody left; then another worker comes."""
+    first, late, made = cluster.worker(), list[subprocess.Popen[bytes]](), list[int]()
+    pieces, shares = tmp_path / "pieces", dict[str, list[float]]()
 
-        def progress(
-            stage: str, share: float, first=worker, late=late, made=made, pieces=pieces, shares=shares
-        ) -> None:
-            shares.setdefault(stage, []).append(share)
-            shared = stage in ("slicing", "rendering", "meshing", "frames", "checking layers")
-            if shared and 0 < share < 1 and not late:
-                first.send_signal(signal.SIGKILL)
-                first.wait()
-                made.append(len(list(pieces.glob("*/*-*"))))
-                late.append(cluster.worker())
+    def progress(stage: str, share: float) -> None:
+        shares.setdefault(stage, []).append(share)
+        shared = stage in ("slicing", "rendering", "meshing", "frames", "checking layers")
+        if shared and 0 < share < 1 and not late:
+            first.send_signal(signal.SIGKILL)
+            first.wait()
+            made.append(len(list(pieces.glob("*/*-*"))))
+            late.append(cluster.worker())
 
-        with connect(cluster.address, str(pieces)) as pool:
-            result = job(Work(1, progress=progress, cluster=pool), folder)
-        (worker,) = late
-        assert made[0] < 25, name
-        ordered = {stage: of == sorted(of) for stage, of in shares.items() if stage != "meshing"}
-        assert name == "mesh" or all(ordered.values()), name
-        assert result == expected[name], name
-        assert not any(pieces.iterdir()), name
+    with connect(cluster.address, str(pieces)) as pool:
+        result = JOBS[name](Work(1, progress=progress, cluster=pool), tmp_path)
+    assert late and made[0] < 25
+    ordered = {stage: of == sorted(of) for stage, of in shares.items() if stage != "meshing"}
+    assert name == "mesh" or all(ordered.values())
+    assert result == expected(name)
+    assert not any(pieces.iterdir())
 
 
+@pytest.mark.nightly
 def test_a_worker_that_hangs(
-    cluster: Cluster, expected: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    cluster: Cluster, expected: Expected, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its tasks are given to another one after a while without a result; nothing is fetched from it."""
     monkeypatch.delattr("distributed.Future.result")
@@ -157,7 +158,7 @@ def test_a_worker_that_hangs(
     with connect(cluster.address, str(tmp_path / "pieces")) as pool:
         pool.client.wait_for_workers(2, timeout=SECONDS)
         quick = Workers(pool.client, pool.pieces, patience=0.5)
-        assert sliced(Work(1, progress=progress, cluster=quick), tmp_path) == expected["slice"]
+        assert sliced(Work(1, progress=progress, cluster=quick), tmp_path) == expected("slice")
 
 
 SHARED = {
@@ -176,8 +177,9 @@ progressive.PIXELS = 1024
 from fracslice.cli.main import main; main()"""
 
 
+@pytest.mark.parametrize("name", stamped(SHARED, ["slice"]))
 def test_the_client_dies_and_the_same_command_goes_on(
-    cluster: Cluster, expected: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    name: str, cluster: Cluster, expected: Expected, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     cluster.worker()
     made: list[str] = []
@@ -191,35 +193,33 @@ def test_the_client_dies_and_the_same_command_goes_on(
         ),
     )
     scenes = {"slice": RECIPE.scene, "mesh": to_xml(MESHED), "render": PICTURED, "animate": FILM}
-    for name, (options, piece, file) in SHARED.items():
-        folder = tmp_path / name
-        folder.mkdir()
-        (folder / "bulb.xml").write_text(scenes[name])
-        output, pieces = folder / file, folder / ".fracslice-pieces"
-        given = [name, str(folder / "bulb.xml"), "-o", str(output), *options, "--quiet"]
-        shared = [*given, "--cluster", cluster.address]
-        client = subprocess.Popen([sys.executable, "-c", STARTED, *shared])
+    options, piece, file = SHARED[name]
+    (tmp_path / "bulb.xml").write_text(scenes[name])
+    output, pieces = tmp_path / file, tmp_path / ".fracslice-pieces"
+    given = [name, str(tmp_path / "bulb.xml"), "-o", str(output), *options, "--quiet"]
+    shared = [*given, "--cluster", cluster.address]
+    client = subprocess.Popen([sys.executable, "-c", STARTED, *shared])
 
-        def begun(client=client, pieces=pieces, piece=piece) -> bool:
-            return client.poll() is not None or len(list(pieces.glob(f"*/{piece}"))) > (piece[0] != ".") * 2
+    def begun() -> bool:
+        return client.poll() is not None or len(list(pieces.glob(f"*/{piece}"))) > (piece[0] != ".") * 2
 
-        wait_until(begun)
-        assert client.poll() is None, "it ended before its pieces were seen"
-        client.kill()
-        client.wait()
-        assert name == "animate" or not output.exists()
-        there = {f"{path.parent.name}/{path.name}" for path in pieces.glob("*/*-*")}
-        made.clear()
-        assert command(shared) == 0
-        assert made and not there & set(made), name
-        assert name != "render" or len({task.split("/")[0] for task in made}) < PASSES
-        assert not pieces.exists()
-        if name in ("slice", "mesh"):
-            assert output.read_bytes() == expected[name]
-        else:
-            alone = folder / f"alone{output.suffix}"
-            assert command([*given[:3], str(alone), *options, "--quiet"]) == 0
-            assert contents(output) == contents(alone)
+    wait_until(begun)
+    assert client.poll() is None, "it ended before its pieces were seen"
+    client.kill()
+    client.wait()
+    assert name == "animate" or not output.exists()
+    there = {f"{path.parent.name}/{path.name}" for path in pieces.glob("*/*-*")}
+    made.clear()
+    assert command(shared) == 0
+    assert made and not there & set(made)
+    assert name != "render" or len({task.split("/")[0] for task in made}) < PASSES
+    assert not pieces.exists()
+    if name in ("slice", "mesh"):
+        assert output.read_bytes() == expected(name)
+    else:
+        alone = tmp_path / f"alone{output.suffix}"
+        assert command([*given[:3], str(alone), *options, "--quiet"]) == 0
+        assert contents(output) == contents(alone)
 
 
 def contents(path: Path) -> list[bytes]:
@@ -232,7 +232,7 @@ LACKING = "No module named 'fracslice.cluster'; 'fracslice' is not a package"
 
 
 def test_a_worker_of_another_version_is_not_used(
-    cluster: Cluster, expected: dict[str, bytes], tmp_path: Path
+    cluster: Cluster, expected: Expected, tmp_path: Path
 ) -> None:
     old = tmp_path / "old.py"
     lacking = "import sys\nsys.modules['fracslice.jobs.slices'] = None\n"
@@ -246,7 +246,7 @@ def test_a_worker_of_another_version_is_not_used(
         warnings.simplefilter("always")
         with connect(cluster.address, str(tmp_path / "pieces")) as pool:
             pool.client.wait_for_workers(3, timeout=SECONDS)
-            assert sliced(Work(1, cluster=pool), tmp_path) == expected["slice"]
+            assert sliced(Work(1, cluster=pool), tmp_path) == expected("slice")
         good.kill()
         good.wait()
         with connect(cluster.address, str(tmp_path / "pieces")) as pool:
@@ -320,6 +320,7 @@ def own(tmp_path: Path) -> Iterator[Cluster]:
     started.end()
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("number", [signal.SIGSTOP, signal.SIGKILL])
 def test_a_scheduler_that_hangs_or_ends(
     number: int, own: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -341,8 +342,9 @@ def test_a_scheduler_that_hangs_or_ends(
             sliced(Work(1, cluster=quick), tmp_path)
 
 
+@pytest.mark.nightly
 def test_a_task_whose_workers_end(
-    expected: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: Any
+    expected: Expected, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: Any
 ) -> None:
     """As one whose memory is too small, after as many as Dask allows; then another worker comes."""
     monkeypatch.setenv("DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES", "0")
@@ -358,17 +360,17 @@ def test_a_task_whose_workers_end(
     with connect(own.address, str(tmp_path / "pieces")) as pool:
         pool.client.wait_for_workers(1, timeout=SECONDS)
         with pytest.warns(FracsliceWarning, match="layers-.*: its workers ended, one by one"):
-            assert sliced(Work(1, progress=progress, cluster=pool), tmp_path) == expected["slice"]
+            assert sliced(Work(1, progress=progress, cluster=pool), tmp_path) == expected("slice")
 
 
 @pytest.mark.parametrize("name", JOBS)
-def test_a_memory_file_system(name: str, expected: dict[str, bytes], tmp_path: Path) -> None:
+def test_a_memory_file_system(name: str, expected: Expected, tmp_path: Path) -> None:
     """Threads of this process as workers; results in fsspec's memory."""
     from distributed import Client
 
     with Client(processes=False, n_workers=1, threads_per_worker=2, dashboard_address=":0") as client:
         pool = Workers(client, ResultFolder(f"memory://{tmp_path.name}"))
-        assert JOBS[name](Work(1, cluster=pool), tmp_path) == expected[name]
+        assert JOBS[name](Work(1, cluster=pool), tmp_path) == expected(name)
 
 
 def test_an_object_store_keeps_the_first_of_two_results(tmp_path: Path) -> None:
@@ -379,11 +381,12 @@ def test_an_object_store_keeps_the_first_of_two_results(tmp_path: Path) -> None:
     assert pieces.read("job", "piece", 1, 3) == b"ir"
 
 
+@pytest.mark.nightly
 def test_a_client_of_dask_is_a_cluster(
-    expected: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    expected: Expected, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from distributed import Client
 
     monkeypatch.chdir(tmp_path)
     with Client(processes=False, n_workers=1, dashboard_address=":0") as client:
-        assert sliced(Work(1, cluster=client), tmp_path) == expected["slice"]
+        assert sliced(Work(1, cluster=client), tmp_path) == expected("slice")

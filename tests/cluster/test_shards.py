@@ -229,6 +229,7 @@ def test_options_that_exclude_each_other(line: list[str], capsys: pytest.Capture
     assert "expected local, local:N" in capsys.readouterr().err
 
 
+@pytest.mark.nightly
 def test_a_shared_has_the_note_on_near_bodies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In a file of pieces, whose bodies meet in pieces and over seams."""
     monkeypatch.setattr(shared, "LEAST", 1)

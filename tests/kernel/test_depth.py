@@ -40,7 +40,6 @@ from fracslice.formulas import (
 from fracslice.scene import scene
 from fracslice.slicing import SliceJob, plan_stack
 from fracslice.volume import plan, sample_scene_signs, with_depths
-from tests.examples import stamped
 
 pytestmark = pytest.mark.once
 
@@ -166,9 +165,8 @@ def test_an_automatic_depth_may_have_any_name() -> None:
     assert shallower(shrinking(folds=30), 0.02) == ("shrinking.folds=3",)
 
 
-@pytest.mark.parametrize(
-    ("deep", "whole"), stamped([(kifs_tetrahedron, 3), (kifs_octahedron, 2)], [(kifs_octahedron, 2)])
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize(("deep", "whole"), [(kifs_tetrahedron, 3), (kifs_octahedron, 2)])
 def test_notes_advise_the_iterations_that_the_voxels_show(deep: Formula, whole: int) -> None:
     """At 64 voxels, 12 iterations leave nothing."""
     job, advice = MeshJob(resolution=64), f"{deep.name}.iterations={whole}"

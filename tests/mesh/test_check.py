@@ -153,14 +153,14 @@ def meet(points: np.ndarray, shared: int) -> bool:
 def test_pairs_of_triangles_meet_as_integers_say(shared: int) -> None:
     """On a small grid, where most pairs touch, lie in one plane or miss each other narrowly."""
     random, result = np.random.default_rng(shared), []
-    for _ in range(1000):
+    for _ in range(300):
         points = random.integers(-2, 3, (6 - shared, 3))
         triangles = np.array([[0, 1, 2], random.permutation(np.arange(3 - shared, 6 - shared))], np.int32)
         mesh = Mesh(points * 0.5, triangles)
         if len(np.unique(points, axis=0)) == len(points) and np.linalg.norm(mesh.normals, axis=1).all():
             result.append(meet(points, shared))
             assert self_intersecting_triangles(mesh).tolist() == [result[-1]] * 2, points.tolist()
-    assert 10 < sum(result) < len(result) - 10
+    assert 3 < sum(result) < len(result) - 3
 
 
 def test_self_intersections_agree_with_meshlab() -> None:

@@ -121,7 +121,7 @@ def around(mesh: Mesh, count: int) -> np.ndarray:
 
 def test_distances_and_sides_are_those_of_all_triangles(solid: tuple[Node, Mesh]) -> None:
     root, mesh = solid
-    points = around(mesh, 2000)
+    points = around(mesh, 800)
     found, known = root.distance(points), distances(mesh, points)
     assert np.allclose(abs(found), known, rtol=0, atol=1e-12 * abs(mesh.bounds).max())
     clear = known > 1e-9

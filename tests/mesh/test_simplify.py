@@ -83,6 +83,7 @@ def test_a_menger_sponge_keeps_its_edges_and_its_closed_forms():
     assert check_mesh(few).printable and check_mesh(few).genus == check_mesh(sponge).genus
 
 
+@pytest.mark.nightly
 def test_a_rough_fractal_stays_a_solid_without_crossings():
     bulb = fine(mandelbulb(iterations=5), 48)
     few, done = simplify(bulb, 0.1)

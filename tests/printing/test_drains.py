@@ -108,6 +108,7 @@ def test_what_cannot_drain_is_noted() -> None:
     assert not planned(box(size=(SIDE,) * 3), hollow=2).notes
 
 
+@pytest.mark.nightly
 def test_a_plug_is_what_a_hole_removed_less_the_clearance(tmp_path: Path) -> None:
     """Of a shell, a pin between two spheres, upright, whichever way the hole leads; each in its file."""
     shell = '<difference><sphere radius="12"/><sphere radius="9"/></difference>'

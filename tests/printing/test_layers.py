@@ -19,7 +19,7 @@ pytestmark = pytest.mark.once
 def checked(root: Node, **printing: float | str) -> PrintReport:
     how = Print(**printing)  # type: ignore[arg-type]
     coarse = Limits(wall=1, floor=1)  # the solid is sampled as finely as its limits ask
-    job = SliceJob(size=20, layer=0.2, pixel=(0.1, 0.1), printing=how)
+    job = SliceJob(size=20, layer=0.2, pixel=(0.2, 0.2), printing=how)
     return check_layers(plan_stack(root, job), coarse)
 
 
@@ -35,6 +35,7 @@ def test_hollow(root: Node, full: float, left: float) -> None:
     assert report.cavities[0].volume == pytest.approx(left, rel=0.01)
 
 
+@pytest.mark.nightly
 def test_a_formula_that_is_no_distance_is_hollowed_in_mm() -> None:
     """A box squeezed to a third in x: its field grows three times as slowly there."""
     squeezed = transform(box(size=(3, 1, 1)), scale=(1 / 3, 1, 1))
@@ -49,6 +50,7 @@ def test_drains_let_the_resin_out() -> None:
     assert not report.cups or report.cups[0].volume < 0.01 * 16**3
 
 
+@pytest.mark.nightly
 def test_walls_too_thick_to_leave_a_hollow() -> None:
     with pytest.raises(VolumeError, match="leave nothing"):
         checked(box(), hollow=11.0)

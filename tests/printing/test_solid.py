@@ -169,11 +169,11 @@ def test_lengths_that_cannot_be_measured() -> None:
 def test_mesh_and_slices_agree() -> None:
     how = Print(bridge=2, thickness=1.2, hollow=1.5, drain=2, base=0.5, raft=1)
     thing = scene(union(PLATE, at(sphere(radius=0.2), 1.5, 0, 0)), size="20mm", printing=how)
-    mesh = make_mesh(thing, MeshJob(resolution=128))
+    mesh = make_mesh(thing, MeshJob(resolution=64))
     assert mesh.report.problems == ()
-    stack = plan_stack(thing.root, SliceJob(size=20, layer=0.1, pixel=(0.1, 0.1), printing=how))
+    stack = plan_stack(thing.root, SliceJob(size=20, layer=0.2, pixel=(0.2, 0.2), printing=how))
     volume = sum(Slicer(stack).map(lambda layer: layer.area * layer.height))
-    assert volume == pytest.approx(mesh.report.mesh.volume_mm3, rel=0.01)
+    assert volume == pytest.approx(mesh.report.mesh.volume_mm3, rel=0.02)
     assert mesh.mesh.size == pytest.approx(stack.size, abs=0.3)
 
 
@@ -271,6 +271,7 @@ def test_walls_thinner_than_the_samples_are_thickened() -> None:
     assert len(after) > 1000
 
 
+@pytest.mark.nightly
 def test_walls_of_many_samples_are_thickened_alike() -> None:
     """A fin of 1.4 mm, nine samples thick."""
     thin = union(box(size=(2, 2, 0.5)), at(box(size=(1.4, 0.14, 1.5)), 0, 0.003, 0.75))
@@ -298,6 +299,7 @@ def test_fractals_are_thickened() -> None:
     assert volumes[1] > 1.005 * volumes[0]
 
 
+@pytest.mark.nightly
 def test_gaps_of_fractals_are_closed() -> None:
     """Also between walls that their samples miss."""
     planned = plan(mandelbulb(iterations=6), 64)
@@ -379,13 +381,14 @@ def test_each_large_part_of_a_hollow_is_drained() -> None:
 
 
 def test_a_ball_is_drained_along_its_axis() -> None:
-    for resolution in (40, 41, 64):
+    for resolution in (24, 25):
         drains = printable(plan(sphere(), resolution), Sizing(SIZE), Print(hollow=2, drain=3))[0].drains
         assert len(drains) == 2
         for drain in drains:
             assert np.hypot(*drain.start[:2]) < 0.1 * 2 / resolution
 
 
+@pytest.mark.nightly
 def test_a_flat_floor_is_drained_in_its_middle() -> None:
     solid, mm = holes(box(size=(2, 2, 2)))
     assert not solid(0, 0, 1 - mm) and not (solid(1 - mm, 0, 3.5 * mm - 1) and solid(mm - 1, 0, 3.5 * mm - 1))
@@ -405,6 +408,7 @@ def test_layers_are_as_large_as_asked() -> None:
     assert max(stack.size) == pytest.approx(40, abs=1e-3)
 
 
+@pytest.mark.nightly
 def test_a_base_loads_no_numba() -> None:
     code = """
 import sys

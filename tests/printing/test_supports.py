@@ -125,7 +125,7 @@ def test_a_cone_on_its_tip_is_held_beside_it() -> None:
 
 
 def test_a_mesh_has_the_size_of_object_and_supports() -> None:
-    made = make_mesh(MUSHROOM, resolution=96, supports="medium", threads=1)
+    made = make_mesh(MUSHROOM, resolution=64, supports="medium", threads=1)
     report, high = made.report, made.vertices[:, 2] > 10.0
     assert not [note for note in report.notes if "finer than the samples" in note] and report.problems == ()
     colours = made.shown.colours

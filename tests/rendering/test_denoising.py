@@ -49,6 +49,7 @@ def error(shown: np.ndarray) -> float:
     return float(np.sqrt(((shown - truth()) ** 2).mean()))
 
 
+@pytest.mark.nightly
 def test_the_error_falls_without_the_library(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pictures, "advice", lambda: "missing")
     noisy = rendered(4)

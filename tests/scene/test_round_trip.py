@@ -53,7 +53,7 @@ def test_the_python_expression_is_the_xml():
 
 
 @given(root=trees(), size=st.floats(1e-6, 1e6))
-@settings(max_examples=60, suppress_health_check=list(HealthCheck), deadline=None)
+@settings(max_examples=25, suppress_health_check=list(HealthCheck), deadline=None)
 def test_written_scenes_read_back_equal_and_fit_the_schema(root, size):
     scene = Scene(root, size)
     text = to_xml(scene)

@@ -42,6 +42,7 @@ def test_walls_take_the_highest_layers(root: Node) -> None:
     assert stack.tops[-1] == pytest.approx(fine.tops[-1])
 
 
+@pytest.mark.nightly
 def test_layers_are_cut_in_their_middle_and_fill_the_object() -> None:
     stack = adapted(planned(sphere()), MOST)
     np.testing.assert_allclose((stack.z + 1) * 10, stack.tops - stack.heights / 2, atol=2e-5)

@@ -13,6 +13,7 @@ pytestmark = pytest.mark.once
 SOURCES = Path(__file__).parents[2] / "fracslice" / "native" / "slices"
 
 
+@pytest.mark.nightly
 def test_tiles_are_given_back_without_memory(tmp_path) -> None:  # type: ignore[no-untyped-def]
     """A slab's destructor does so: what it threw would end the process."""
     program = tmp_path / "memory"

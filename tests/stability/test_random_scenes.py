@@ -14,8 +14,8 @@ from .volumes import volumes
 
 pytestmark = pytest.mark.once
 
-TREES, EACH = (2, 10, 18, 25, 32, 52), 4
-"""Trees with every kind of element that need little to be compiled, and four times other numbers."""
+TREES, EACH = (2, 10, 18, 25, 32, 52), 2
+"""Trees with every kind of element that need little to be compiled, and twice other numbers."""
 
 RESOLUTION = 32
 
