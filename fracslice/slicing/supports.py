@@ -309,16 +309,16 @@ class _Survey:
 
 
 def _places(components: LayerComponents, chosen: NDArray[np.int64]) -> list[tuple[int, int]]:
-    """A pixel (x, y) of each chosen component, near its middle."""
-    runs, result = components.runs, []
-    rows = np.repeat(np.arange(runs.height), np.diff(runs.rows)) if len(chosen) else np.empty(0, np.int64)
-    for node in chosen.tolist():
-        own = np.flatnonzero(components.label == node)
-        x, y = components.nodes.middle[node] - 0.5
-        nearest = np.clip(round(float(x)), runs.begin[own], runs.end[own] - 1)
-        first = np.argmin(np.hypot(nearest - x, rows[own] - y))
-        result.append((int(nearest[first]), int(rows[own[first]])))
-    return result
+    """A pixel (x, y) of each chosen component, near its middle; `chosen`: ascending."""
+    runs, is_chosen = components.runs, np.zeros(len(components), bool)
+    is_chosen[chosen] = True
+    at = np.flatnonzero(is_chosen[components.label])
+    node, row = components.label[at], np.searchsorted(runs.rows, at, "right") - 1
+    x, y = components.nodes.middle[node].T - 0.5
+    nearest = np.clip(np.rint(x), runs.begin[at], runs.end[at] - 1)
+    order = np.lexsort([np.hypot(nearest - x, row - y), node])
+    best = order[np.diff(node[order], prepend=-1) > 0]
+    return list(zip(nearest[best].astype(int).tolist(), row[best].tolist(), strict=True))
 
 
 @dataclass(eq=False)

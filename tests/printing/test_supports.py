@@ -31,7 +31,7 @@ from fracslice.formulas import (
 )
 from fracslice.jobs.mesh import make_apart, make_implicit
 from fracslice.jobs.plates import write_bodies
-from fracslice.printing.pillars import Exits, Object, Room, steps_from
+from fracslice.printing.pillars import STRENGTHS, Exits, Forest, Object, Room, steps_from
 from fracslice.scene import Print, scene
 from fracslice.slicing import SliceJob, Slicer, Stack, plan_stack
 from fracslice.slicing.layers import Layer, ScreenView
@@ -298,13 +298,14 @@ def test_ways_go_around() -> None:
     start = np.array([20.5, 20.5, 36.5])
     assert math.isinf(room.cost[room.at(start - [0, 0, 15])])  # inside the plate's surroundings
     assert room.cost[room.at(np.array([2.5, 2.5, 36.5]))] == pytest.approx(36)
-    way = [np.array([11.5, 20.5, 39.5])]
-    while way[-1][2] > 0:
-        way.append(room.corner(way[-1]))
+    tips = np.array([[11.5, 20.5, 39.5]])
+    forest = Forest(room, STRENGTHS["medium"], tips, np.array([0.2]))
+    assert forest.down == [*range(1, len(forest.place)), -1] and forest.trunks == [len(forest.place) - 1]
+    way = [*forest.place, forest.place[-1] * (1, 1, 0)]
+    assert len(way) > 2
     for one, other in pairwise(way):
         assert room.is_free(one, other, room.wide)
         assert math.dist(one[:2], other[:2]) <= 1.001 * (one[2] - other[2])
-    assert way[-1][2] == 0
     assert way[-1][0] < 8
 
 
