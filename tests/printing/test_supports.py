@@ -37,7 +37,7 @@ from fracslice.slicing import SliceJob, Slicer, Stack, plan_stack
 from fracslice.slicing.layers import Layer, ScreenView
 from fracslice.slicing.orientation import _runs, orientations
 from fracslice.slicing.stack import plan_object
-from fracslice.slicing.supports import layers_with_room
+from fracslice.slicing.supports import _Growth, layers_with_room
 from fracslice.volume.amount import Sizing
 from fracslice.work import Work
 
@@ -289,6 +289,19 @@ def test_steps_are_at_most_distances() -> None:
     for steps in range(1, 6):
         assert (distance[away > steps] > steps).all()
         assert (away[distance > 2 * steps] > steps).all()
+
+
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.1])
+def test_what_bare_cells_use_is_the_way_to_the_nearest_one_that_is_carried(share: float) -> None:
+    """Cells are no squares; a step of 0.3 mm is free. Without any that is carried, all is beyond reach."""
+    rng = np.random.default_rng(2)
+    carried = rng.random((60, 70)) < share
+    growth = _Growth(carried[None], carried[None], np.array([0.2, 0.25, 0.3]), 3.0)
+    rows, columns = np.nonzero(~carried & (rng.random(carried.shape) < 0.5))
+    found = growth._grown(np.where(carried, np.float32(0), np.float32(np.inf)), rows, columns)
+    away = distance_transform_edt(~carried, sampling=(0.25, 0.2))[rows, columns]
+    expected = np.maximum(away - 0.3, 0) if share else np.full(len(rows), 1e6)
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6)
 
 
 def test_ways_go_around() -> None:
