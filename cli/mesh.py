@@ -30,6 +30,7 @@ from .execution import (
 from .options import (
     AMOUNT,
     FOR_SLICERS,
+    HINTS,
     INTERVAL,
     MATERIAL,
     SECONDS,
@@ -134,10 +135,10 @@ def mesh(given: WholeOptions) -> int:
     return make_files(given) if given.bed is None and given.parts is None else make_parted(given)
 
 
-NO_PARTS = frozenset({"implicit", "report", "seconds", "every", "cluster", "shard", "store", *FOR_SLICERS})
+NO_PARTS = HINTS | {"implicit", "report", "seconds", "every", "cluster", "shard", "store"}
 """Options that parts do not have."""
 
-NO_PLUGS = NO_PARTS | {"picture", "cache", "device"}
+NO_PLUGS = NO_PARTS | FOR_SLICERS | {"picture", "cache", "device"}
 """Options that plugs and bodies of supports do not have."""
 
 NO_COPIES = NO_PLUGS | PartsJob.kinds().keys()

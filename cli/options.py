@@ -401,8 +401,10 @@ class PreparationOptions(SceneOptions):
         return changed
 
 
-FOR_SLICERS = frozenset({"colour", "palette", "filaments", "bodies", "heights", "paint_supports"})
-"""Fields of meshes with colours, and with hints for slicers."""
+HINTS = frozenset({"heights", "paint_supports"})
+"""Fields of meshes with hints for slicers."""
+FOR_SLICERS = HINTS | {"colour", "palette", "filaments", "bodies"}
+"""Fields of meshes with hints for slicers, and with colours."""
 
 
 MATERIAL = option(

@@ -15,7 +15,7 @@ from fracslice.errors import keeping
 from fracslice.records import MeshJob, PartsJob
 
 from .execution import check_targets, load_scene, refuse_options
-from .options import FOR_SLICERS, MeshOptions, Name, argument, command, option, output
+from .options import FOR_SLICERS, HINTS, MeshOptions, Name, argument, command, option, output
 from .slice import COPIES, SPACING
 from .sweeps import with_suffix
 
@@ -142,8 +142,10 @@ def refuse_what_one_has(given: SlicerOptions) -> None:
         raise click.UsageError("--copies: not with parts, --bed or --parts")
     if given.copies == 1:
         refuse_options({"spacing"}, "only for --copies")
-    if given.copies > 1 or several:
-        refuse_options(FOR_SLICERS, "not for copies or parts")
+    if given.copies > 1:
+        refuse_options(FOR_SLICERS, "not for copies")
+    if several:
+        refuse_options(HINTS, "not for parts")
     if several and given.address is not None:
         raise click.UsageError("--send: expected one file, and parts may have several")
 
@@ -164,7 +166,7 @@ def models(given: SlicerOptions, scene: Scene, job: MeshJob, path: Path, work: W
     from fracslice.slicing.packing import Beds
 
     if given.bed is not None or given.parts is not None:
-        parts = make_parts(scene, job, PartsJob(**given.values(PartsJob)), work)
+        parts = make_parts(scene, job, PartsJob(**given.values(PartsJob)), work, path)
         laid, made, names = parts.laid_out, parts.meshes, [name for name, _, _ in parts.named]
     elif given.copies > 1:
         one = make_mesh(scene, job, work)

@@ -689,6 +689,26 @@ def graph_components(count: int, some: NDArray[int64], others: NDArray[int64]) -
     `some`, `others`: ends of the edges.
     """
 
+def grow_forest(
+    away: NDArray[uint8],
+    cost: NDArray[float32],
+    origin: tuple[float, float, float],
+    cell: tuple[float, float, float],
+    floor: float,
+    steps: tuple[int, int],
+    lengths: tuple[float, float, float],
+    tries: int,
+    ends: NDArray[float64],
+) -> tuple[NDArray[float64], NDArray[int64], NDArray[int64], NDArray[int64]]:
+    """Branches from tips down to the plate: see `fracslice.printing.pillars.Forest`. Nodes [n, 3], the next
+    one on the way down from each, those that trunks begin at, and the trunk that a branch ends on at each;
+    -1 where there is none.
+
+    `away`, `cost`: of the cells of the room, [z, y, x]; `origin`, `cell`: x, y, z, mm; `steps`: from which on
+    a way is free, and narrow; `lengths`: of the longest branch, of the least height of a meeting, and of what
+    a foot costs, mm; `tries`: meetings that are tried.
+    """
+
 def ray_points(
     start: NDArray[float64], directions: NDArray[float64], which: NDArray[int64], s: NDArray[float64]
 ) -> NDArray[float64]:

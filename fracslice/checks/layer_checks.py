@@ -164,15 +164,19 @@ class _Collector:
         square = stack.pixel[0] * stack.pixel[1]
         areas, overhangs, walls, gaps = list[float](), [], [np.empty((0, 2))], [np.empty((0, 2))]
         limits, far, measured = self.limits, list[Overhang](), dict[str, list[float]]()
+        lower = None  # two layers below
         for k, now in enumerate(findings):
             below = solid.last
             reach = max(float(stack.heights[k]) / min(stack.pixel), 1.0)
             above = now.solid.runs
             bare = above.none if below is None else unsupported_pixels(below.runs, above, reach)
             overhangs.append(square * float((bare.end - bare.begin).sum()))
+            if lower is not None:  # the light that binds layers closes a slit of one layer; filament sags
+                bare = unsupported_pixels(lower.runs, bare, reach)
             if len(bare.begin):
                 worst = farthest(above, bare, k, stack.pixel, limits.overhang, limits.span)
                 far.extend([worst] if worst else [])
+            lower = below
             solid.add(now.solid)
             empty.add(now.empty)
             areas.append(now.area)

@@ -264,14 +264,24 @@ T = TypeVar("T", bound=Triangles)
 NO_TRIANGLES = Triangles(np.empty((0, 3)), np.empty((0, 3), np.int32))
 
 
+GREY = 200, 200, 196
+"""Colour of what has none beside what has one, sRGB."""
+
+
 def concatenate(parts: Sequence[T]) -> T:
-    """Concatenate triangles without welding and scalars, with colours if all have them."""
-    coloured = [part.colours for part in parts if len(part.vertices)]
-    known = [colours for colours in coloured if colours is not None]
+    """Concatenate triangles without welding and scalars, with colours if any have them."""
     offsets = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
     triangles = [part.triangles + np.int32(offset) for part, offset in zip(parts, offsets, strict=True)]
     whole = np.concatenate([part.vertices for part in parts]), np.concatenate(triangles)
-    return type(parts[0])(*whole, np.concatenate(known) if known and len(known) == len(coloured) else None)
+    if all(part.colours is None for part in parts):
+        return type(parts[0])(*whole)
+    colours = [_shown(part) if part.colours is None else part.colours for part in parts]
+    return type(parts[0])(*whole, np.concatenate(colours))
+
+
+def _shown(part: Triangles) -> NDArray[np.uint8]:
+    """Colours of vertices that have none."""
+    return np.full((len(part.vertices), 3), GREY, np.uint8)
 
 
 def count(part: Triangles) -> int:

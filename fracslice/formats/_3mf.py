@@ -1,6 +1,6 @@
 """3MF, by the core specification 1.3.
 
-Written: one object in millimetres, with colours by materials 1.2, or objects and a build; a thumbnail.
+Written: one object in millimetres, or objects and a build, with colours by materials 1.2; a thumbnail.
 Triangles of filaments are painted, too, in attributes that PrusaSlicer reads (Format/3mf.cpp), and Bambu
 Studio and OrcaSlicer (bbs_3mf.cpp), which take the filament of an object from its group of one colour. Read:
 the build, with the production extension.
@@ -12,6 +12,7 @@ import zipfile
 import zlib
 from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from html import escape
 from itertools import chain
@@ -25,9 +26,9 @@ from numpy.typing import NDArray
 from ..common.arrays import (
     COPIES,
     DEEPEST,
+    GREY,
     LARGEST,
     MOST_PARTS,
-    Filaments,
     Triangles,
     concatenate,
     count,
@@ -55,8 +56,6 @@ CORE_NAMES = {"Title", "Designer", "Description", "Copyright", "LicenseTerms", "
 CORE_NAMES |= {"CreationDate", "ModificationDate"}
 MATERIALS = "http://schemas.microsoft.com/3dmanufacturing/material/2015/02"
 PAINTS = "http://schemas.slic3r.org/3mf/2017/06"
-GROUP = 2
-"""Number of the group of colours, of the materials extension; the first one, if each filament has its own."""
 
 
 def _write(mesh: Triangles, file: BinaryIO, metadata: Mapping[str, str], work: Work) -> None:
@@ -65,19 +64,9 @@ def _write(mesh: Triangles, file: BinaryIO, metadata: Mapping[str, str], work: W
     See `MeshFormat`. Metadata that 3MF does not define get fracslice's namespace.
     """
     picture, mesh = mesh.thumbnail(), mesh.in_order()
-    coloured, texts = mesh.colours is not None, 0
-    if mesh.supported is not None:
-        texts = len(ENFORCED) * int(mesh.supported.sum())
-    parts, more = [mesh], _layer_heights(mesh)
-    if mesh.filaments is not None:
-        more |= _settings(mesh.filaments)
-        parts += mesh.filaments.bodies
-        lengths = np.array([len(text) for text in mesh.filaments.texts])
-        texts += 2 * int(lengths[mesh.filaments.text].sum())
-    vertices, triangles = (sum(len(getattr(p, name)) for p in parts) for name in ("vertices", "triangles"))
-    is_large = _is_large(vertices, triangles, coloured, texts)
+    more = _layer_heights(mesh) | _settings([mesh])
     blocks = work.ordered(lambda text: deflate(text()), _model(mesh, metadata))
-    join(file, (partial(append, block) for block in blocks), is_large, more, picture)
+    join(file, (partial(append, block) for block in blocks), _are_large([mesh]), more, picture)
 
 
 PROFILES = "Metadata/Slic3r_PE_layer_heights_profile.txt", "Metadata/layer_heights_profile.txt"
@@ -96,24 +85,75 @@ def _layer_heights(mesh: Triangles) -> dict[str, bytes]:
     return dict.fromkeys(PROFILES, text)
 
 
-def _settings(filaments: Filaments) -> dict[str, bytes]:
+def _settings(meshes: Sequence[Triangles]) -> dict[str, bytes]:
     """Filaments of bodies, as Bambu Studio and OrcaSlicer read them."""
-    if not filaments.bodies:
+    groups, objects = _Groups.of(meshes), ""
+    for number, mesh in enumerate(meshes, 1):
+        parts = "".join(
+            f'<part id="{body}" subtype="normal_part"><metadata key="name" value="filament {k}"/>'
+            f'<metadata key="extruder" value="{k}"/></part>\n'
+            for k, body, _ in groups.bodies(mesh, number)
+        )
+        if parts:
+            objects += f'<object id="{number}">\n<metadata key="extruder" value="1"/>\n{parts}</object>\n'
+    if not objects:
         return {}
-    parts = "".join(
-        f'<part id="{number}" subtype="normal_part"><metadata key="name" value="filament {k}"/>'
-        f'<metadata key="extruder" value="{k}"/></part>\n'
-        for k, number, _ in _numbered(filaments)
-    )
-    whole = f'<object id="1">\n<metadata key="extruder" value="1"/>\n{parts}</object>\n'
-    return {"Metadata/model_settings.config": f"{HEAD}<config>\n{whole}</config>\n".encode()}
+    return {"Metadata/model_settings.config": f"{HEAD}<config>\n{objects}</config>\n".encode()}
 
 
-def _numbered(filaments: Filaments) -> Iterator[tuple[int, int, Triangles]]:
-    """Bodies that are not empty, with the numbers of their filaments, from 1, and of their objects."""
-    for k, body in enumerate(filaments.bodies, 1):
-        if len(body.triangles):
-            yield k, GROUP + len(filaments.colours) + k, body
+@dataclass(frozen=True, eq=False)
+class _Groups:
+    """Groups of colours, of the materials extension, that the objects of a file share: one for each filament,
+    or one of all colours of vertices. They are numbered after the objects, and bodies after them.
+    """
+
+    objects: int  # number of objects
+    colours: NDArray[np.uint8]  # sRGB, (k, 3)
+    apart: bool  # whether each colour has a group
+
+    @classmethod
+    def of(cls, meshes: Sequence[Triangles]) -> _Groups:
+        """Groups of meshes, which have the same filaments, if any."""
+        printed = [mesh.filaments for mesh in meshes if mesh.filaments is not None]
+        if printed:
+            return cls(len(meshes), printed[0].colours, True)
+        shown = [_packed(mesh.colours) for mesh in meshes if mesh.colours is not None]
+        known = np.unique(np.concatenate([np.empty(0, np.int64), *shown]))
+        colours = np.stack([known >> 16, known >> 8 & 255, known & 255], 1).astype(np.uint8)
+        return cls(len(meshes), colours, False)
+
+    @property
+    def first(self) -> int:
+        """Number of the first group."""
+        return self.objects + 1
+
+    def texts(self) -> Iterator[Text]:
+        """Elements of the groups."""
+        shown = rows('<m:color color="#%02X%02X%02X"/>\n', self.colours)
+        if self.apart:
+            for group, text in enumerate(b"".join(shown).splitlines(), self.first):
+                yield from _texts(b'<m:colorgroup id="%d">%s</m:colorgroup>\n' % (group, text))
+        elif len(self.colours):
+            yield from _texts(b'<m:colorgroup id="%d">\n' % self.first, *shown, b"</m:colorgroup>\n")
+
+    def indices(self, colours: NDArray[np.uint8]) -> NDArray[np.int32]:
+        """Numbers of the colours of vertices in the group."""
+        return np.searchsorted(_packed(self.colours), _packed(colours)).astype(np.int32)
+
+    def bodies(self, mesh: Triangles, number: int) -> Iterator[tuple[int, int, Triangles]]:
+        """Bodies of an object that are not empty, with the numbers of their filaments, from 1, and of their
+        objects.
+        """
+        before = self.objects + number * len(self.colours)
+        for k, body in enumerate(mesh.filaments.bodies if mesh.filaments else (), 1):
+            if len(body.triangles):
+                yield k, before + k, body
+
+
+def _packed(colours: NDArray[np.integer]) -> NDArray[np.int64]:
+    """Colours as numbers, in the order of red, green and blue."""
+    packed: NDArray[np.int64] = colours.astype(np.int64) @ np.array([1 << 16, 1 << 8, 1])
+    return packed
 
 
 class Built(NamedTuple):
@@ -132,18 +172,20 @@ def write_build(
     picture: bytes | None = None,
     together: bool = False,
 ) -> None:
-    """Write objects, without colours, and a build of them, streamed as one object is.
+    """Write objects, and a build of them, streamed as one object is.
 
     `picture`: of all, as PNG; `together`: they are the bodies of one object, at their first places.
     """
 
+    meshes = [built.mesh.in_order() for built in objects]
+    groups = _Groups.of(meshes)
+
     def texts() -> Iterator[Text]:
-        yield from _texts(*_head(metadata))
+        yield from _texts(*_head(metadata, _spaces(meshes)))
+        yield from groups.texts()
         items = ""
-        for number, built in enumerate(objects, 1):
-            name = f' name="{escape(built.name)}"' if built.name else ""
-            yield from _texts(f'<object id="{number}"{name} type="model">'.encode())
-            yield from mesh_element(built.mesh.in_order())
+        for number, (mesh, built) in enumerate(zip(meshes, objects, strict=True), 1):
+            yield from _object(mesh, groups, number, built.name)
             yield from _texts(b"</object>\n")
             places = (" ".join(f"{v:.9g}" for v in place.ravel().tolist()) for place in built.places)
             what = "component" if together else "item"
@@ -156,13 +198,9 @@ def write_build(
             items = f'<item objectid="{len(objects) + 1}"/>\n'
         yield from _texts(f"</resources>\n<build>\n{items}</build>\n</model>\n".encode())
 
-    meshes = [built.mesh for built in objects]
-    vertices, triangles = (sum(len(getattr(m, name)) for m in meshes) for name in ("vertices", "triangles"))
-    blocks, is_large = (
-        work.ordered(lambda text: deflate(text()), texts()),
-        _is_large(vertices, triangles, False),
-    )
-    join(file, (partial(append, block) for block in blocks), is_large, picture=picture)
+    blocks = work.ordered(lambda text: deflate(text()), texts())
+    written = (partial(append, block) for block in blocks)
+    join(file, written, _are_large(meshes), _settings(meshes), picture)
 
 
 def write_fragments(
@@ -195,6 +233,20 @@ def _is_large(vertices: int, triangles: int, coloured: bool, painted: int = 0) -
     return vertex * vertices + triangle * triangles + painted > 2**31 - 2**20
 
 
+def _are_large(meshes: Sequence[Triangles]) -> bool:
+    """True if the text of meshes may exceed the 2 GiB of a plain ZIP member."""
+    parts, painting = list(meshes), 0
+    for mesh in meshes:
+        if mesh.supported is not None:
+            painting += len(ENFORCED) * int(mesh.supported.sum())
+        if mesh.filaments is not None:
+            parts += mesh.filaments.bodies
+            lengths = np.array([len(text) for text in mesh.filaments.texts])
+            painting += 2 * int(lengths[mesh.filaments.text].sum())
+    vertices, triangles = (sum(len(getattr(p, name)) for p in parts) for name in ("vertices", "triangles"))
+    return _is_large(vertices, triangles, any(mesh.colours is not None for mesh in meshes), painting)
+
+
 def _head(metadata: Mapping[str, str], model: str = MODEL) -> Iterator[bytes]:
     """Text before the resources."""
     yield model.encode()
@@ -204,61 +256,63 @@ def _head(metadata: Mapping[str, str], model: str = MODEL) -> Iterator[bytes]:
     yield b"<resources>"
 
 
+def _spaces(meshes: Sequence[Triangles]) -> str:
+    """Start of a model with the namespaces of its colours and paintings."""
+    painted = any(mesh.filaments is not None or mesh.supported is not None for mesh in meshes)
+    coloured = any(mesh.filaments is not None or mesh.colours is not None for mesh in meshes)
+    spaces = f'xmlns:m="{MATERIALS}" ' * coloured + f'xmlns:slic3rpe="{PAINTS}" ' * painted
+    return MODEL.replace("<model ", f"<model {spaces}")
+
+
 def _model(mesh: Triangles, metadata: Mapping[str, str]) -> Iterator[Text]:
-    if mesh.filaments is not None:
-        yield from _printed(mesh, mesh.filaments, metadata)
-        return
-    if mesh.supported is not None:
-        spaces = f'<model xmlns:slic3rpe="{PAINTS}" '
-        yield from _texts(*_head(metadata, MODEL.replace("<model ", spaces)), PLAIN)
-        yield from _painted_element(mesh)
-    elif mesh.colours is None:
-        yield from _texts(*_head(metadata), PLAIN)
-        yield from mesh_element(mesh)
-    else:
-        yield from _texts(*_head(metadata, MODEL.replace("<model ", f'<model xmlns:m="{MATERIALS}" ')))
-        colours, index = np.unique(mesh.colours, axis=0, return_inverse=True)
-        yield from _texts(f'<m:colorgroup id="{GROUP}">\n'.encode())
-        yield from _texts(*rows('<m:color color="#%02X%02X%02X"/>\n', colours))
-        yield from _texts(f'</m:colorgroup>\n<object id="1" type="model" pid="{GROUP}" pindex="0">'.encode())
-        yield from mesh_element(mesh, index.reshape(-1).astype(np.int32))
+    groups = _Groups.of([mesh])
+    yield from _texts(*_head(metadata, _spaces([mesh])))
+    yield from groups.texts()
+    yield from _object(mesh, groups, 1)
     yield from _texts(END)
 
 
-def _printed(mesh: Triangles, filaments: Filaments, metadata: Mapping[str, str]) -> Iterator[Text]:
-    """A mesh of filaments, each with a group of one colour: as painted triangles, or as a body for each."""
-    spaces = f'<model xmlns:m="{MATERIALS}" xmlns:slic3rpe="{PAINTS}" '
-    yield from _texts(*_head(metadata, MODEL.replace("<model ", spaces)))
-    for group, (red, green, blue) in enumerate(filaments.colours.tolist(), GROUP):
-        colour = f'<m:color color="#{red:02X}{green:02X}{blue:02X}"/>'
-        yield from _texts(f'<m:colorgroup id="{group}">{colour}</m:colorgroup>\n'.encode())
-    if not filaments.bodies:
-        yield from _texts(f'<object id="1" type="model" pid="{GROUP}" pindex="0">'.encode())
-        yield from _painted_element(mesh)
-        yield from _texts(END)
+def _object(mesh: Triangles, groups: _Groups, number: int, name: str = "") -> Iterator[Text]:
+    """An object without its end: with a colour for each vertex, painted for filaments, or of a body for each,
+    which are objects before it.
+    """
+    title = f' name="{escape(name)}"' if name else ""
+    if bodies := list(groups.bodies(mesh, number)):
+        for k, own, body in bodies:
+            of = f'pid="{groups.first + k - 1}" pindex="0"'
+            yield from _texts(f'<object id="{own}" name="filament {k}" type="model" {of}>'.encode())
+            yield from mesh_element(body.in_order())
+            yield from _texts(b"</object>\n")
+        components = "".join(f'<component objectid="{own}"/>' for _, own, _ in bodies)
+        whole = f'<object id="{number}"{title} type="model"><components>{components}</components>'
+        yield from _texts(whole.encode())
         return
-    for k, number, body in _numbered(filaments):
-        of = f'pid="{GROUP + k - 1}" pindex="0"'
-        yield from _texts(f'<object id="{number}" name="filament {k}" type="model" {of}>'.encode())
-        yield from mesh_element(body.in_order())
-        yield from _texts(b"</object>\n")
-    components = (f'<component objectid="{number}"/>' for _, number, _ in _numbered(filaments))
-    yield from _texts(PLAIN, f"<components>{''.join(components)}</components>".encode(), END)
+    coloured = mesh.filaments is not None or mesh.colours is not None
+    of = f' pid="{groups.first}" pindex="0"' * coloured
+    yield from _texts(f'<object id="{number}"{title} type="model"{of}>'.encode())
+    if mesh.filaments is not None or mesh.supported is not None:
+        yield from _painted_element(mesh, groups.first)
+    else:
+        colours = None if mesh.colours is None else groups.indices(mesh.colours)
+        yield from mesh_element(mesh, groups.first, colours)
 
 
 ENFORCED = ' slic3rpe:custom_supports="4" paint_supports="4"'
 """Attributes of a triangle at which slicers put supports."""
 
 
-def _painted_element(mesh: Triangles) -> Iterator[Text]:
-    """Mesh element whose triangles have the colour group of their filament, and their painting."""
+def _painted_element(mesh: Triangles, first: int) -> Iterator[Text]:
+    """Mesh element whose triangles have the colour group of their filament, and their painting.
+
+    `first`: number of the first group.
+    """
     yield from _texts(VERTICES)
     yield from vertex_rows(mesh.vertices)
     yield from _texts(TRIANGLES)
     groups, texts, plain = [""], [""], "0"  # the text of a triangle that is not painted
     of = text = np.zeros(len(mesh.triangles), np.int32)
     if (painted := mesh.filaments) is not None:
-        groups = [f' pid="{GROUP + k}" p1="0"' if k else "" for k in range(len(painted.colours))]
+        groups = [f' pid="{first + k}" p1="0"' if k else "" for k in range(len(painted.colours))]
         texts = [f' slic3rpe:mmu_segmentation="{t}" paint_color="{t}"' * (t != plain) for t in painted.texts]
         of, text = painted.of.astype(np.int32), painted.text
     held = of * 0 if mesh.supported is None else mesh.supported.astype(np.int32)
@@ -280,10 +334,10 @@ def _texts(*blocks: bytes) -> Iterator[Text]:
     return (partial(bytes, block) for block in blocks)
 
 
-def mesh_element(mesh: Triangles, colours: NDArray[np.int32] | None = None) -> Iterator[Text]:
+def mesh_element(mesh: Triangles, group: int = 0, colours: NDArray[np.int32] | None = None) -> Iterator[Text]:
     """Encode a mesh as the mesh element of an object, in blocks.
 
-    `mesh` in mm; `colours`: int32 (n,).
+    `mesh` in mm; `group`: number of the group of its colours; `colours`: int32 (n,).
     """
     yield from _texts(VERTICES)
     yield from vertex_rows(mesh.vertices)
@@ -291,7 +345,7 @@ def mesh_element(mesh: Triangles, colours: NDArray[np.int32] | None = None) -> I
     if colours is None:
         yield from triangle_rows(mesh.triangles)
     else:
-        before = *TRIANGLE, f'" pid="{GROUP}" p1="', '" p2="', '" p3="'
+        before = *TRIANGLE, f'" pid="{group}" p1="', '" p2="', '" p3="'
         yield from number_rows(before, END_OF_ROW, np.hstack([mesh.triangles, colours[mesh.triangles]]))
     yield from _texts(END_OF_MESH)
 
@@ -507,10 +561,6 @@ class _Package:
         return moved(whole, turned + matrix[3], matrix[:3])
 
 
-GREY = 0xC8C8C4
-"""Colour of what has none beside what has one, sRGB."""
-
-
 class _Coloured(_Package):
     """Collects colours of the corners of triangles, too: those of groups of colours and of base materials."""
 
@@ -545,7 +595,9 @@ class _Coloured(_Package):
             mesh, colours = self.meshes[self.object], np.array(self.corners, dtype=np.int64)
             self.corners = array("q")
             if len(colours) and colours.max() >= 0:
-                self.meshes[self.object] = _split(mesh, np.where(colours < 0, GREY, colours))
+                self.meshes[self.object] = _split(
+                    mesh, np.where(colours < 0, _packed(np.array(GREY)), colours)
+                )
 
 
 def _split(mesh: Triangles, colours: NDArray[np.int64]) -> Triangles:

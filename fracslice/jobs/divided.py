@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,14 +17,17 @@ from ..common.arrays import concatenate
 from ..common.files import check_target
 from ..errors import SceneError
 from ..fields.box import Triple
+from ..fields.field import Field
 from ..formats import check_format
 from ..mesh import Mesh
+from ..mesh.filaments import chosen_filaments
 from ..printing.dividing import Divided, divide
 from ..records import SAME, UP, MeshJob, PartsJob
 from ..scene import Print, Scene
 from ..slicing.packing import Beds
 from ..volume.amount import sizing
 from ..work import Work
+from .colouring import Colouring, refuse_colours
 from .mesh import make_mesh, mesh_of_part
 from .mesh_steps import apply_edits, plan_mesh
 from .plates import LaidOut, lay_out, write_each
@@ -76,7 +80,7 @@ class Parted:
             middle = low + np.array(peg.middle) + step * np.mean(peg.cells, axis=0)
             centred = self.peg.mesh.vertices - self.peg.mesh.bounds.mean(0)
             turned: NDArray[np.float64] = np.roll(centred, peg.axis + 1, axis=1)
-            yield Mesh(turned + middle, self.peg.mesh.triangles)
+            yield replace(self.peg.mesh, vertices=turned + middle)
 
 
 def make_parts(
@@ -85,13 +89,12 @@ def make_parts(
     """Make the meshes of an object in parts.
 
     `path`: file that the meshes are for. Raises what `divide` and `make_mesh` raise, and SceneError for
-    supports and colours.
+    supports.
     """
     work = work or Work()
     if what.edits(scene).supports != "none":
         raise SceneError("parts: expected no supports, as each part lies on the plate by itself")
-    if what.colour is not None:
-        raise SceneError("parts: expected no colours")
+    refuse_colours(what, path)
     if path is not None:
         check_format(path)
         check_target(path)
@@ -101,11 +104,40 @@ def make_parts(
         sized = apply_edits(sized.planned, scene, what, size, clock)
     divided = divide(sized.planned, sized.scale, how, work)
     voxel = sized.planned.voxel * sized.scale
-    own = replace(what, voxel=voxel, resolution=None, printing=Print())
+    own = replace(what, voxel=voxel, resolution=None, printing=Print(), **UNCOLOURED)
     meshes = [mesh_of_part(scene, sized.planned, sized.scale, part.root, own, work) for part in divided.parts]
     upright = replace(own, voxel=None, resolution=64, size=None, up=UP, scale=SAME)
     peg = make_mesh(divided.peg, upright, work) if divided.pegs else None
-    return Parted(divided, meshes, peg, how.bed)
+    made = Parted(divided, meshes, peg, how.bed)
+    return made if what.colour is None else _coloured(made, Colouring(sized.planned.root, what, work))
+
+
+UNCOLOURED: dict[str, Any] = {"colour": None, "palette": None, "filaments": None, "bodies": False}
+"""Parts are coloured once all are made, as they share their filaments."""
+
+
+def _coloured(made: Parted, colouring: Colouring) -> Parted:
+    """Parts with the colours of the object, of the filaments that suit its surface. Pegs have none: slicers
+    print them of the first filament.
+    """
+    parts = made.meshes
+    meshes = [colouring.coloured(part.mesh, part.place) for part in parts]
+    if (wanted := colouring.what.filaments) is not None:
+        surface = concatenate([_outside(part, colouring.root) for part in parts])
+        filaments = chosen_filaments(surface, wanted, lambda points: colouring.paint(points).colours)
+        pairs = zip(meshes, parts, strict=True)
+        meshes = [colouring.printed(mesh, part.place, filaments) for mesh, part in pairs]
+    coloured = zip(parts, meshes, strict=True)
+    results = [Result(part.report, part.place, part.planned, mesh, part.work) for part, mesh in coloured]
+    return replace(made, meshes=results)
+
+
+def _outside(part: Result, whole: Field) -> Mesh:
+    """Triangles of a part that are not deeper than a voxel in the whole object, scene units."""
+    corners = part.place.units(part.mesh.corners.reshape(-1, 3)).reshape(-1, 3, 3)
+    x, y, z = np.ascontiguousarray(corners.mean(1).T)
+    outer = whole.kernel().points(x, y, z) > -whole.bounds.lipschitz * part.planned.voxel
+    return Mesh(corners[outer].reshape(-1, 3), np.arange(3 * outer.sum(), dtype=np.int32).reshape(-1, 3))
 
 
 def write_parts(made: Parted, path: str | Path, about: dict[str, str], work: Work) -> list[Path]:

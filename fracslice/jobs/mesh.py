@@ -10,13 +10,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..common.arrays import product
 from ..common.memory import peak_rss_mb
-from ..common.messages import lacking
 from ..errors import EmptyError, MeshError, SceneError, SharedError, TooLargeError, VolumeError, keeping
 from ..fields.box import Box
 from ..fields.field import Field
@@ -26,6 +25,7 @@ from ..scene import Print, Scene
 from ..version import __version__
 from ..work import Work, ahead, in_background
 from . import mesh_steps
+from .colouring import Colouring, refuse_colours
 from .mesh_steps import (
     Checks,
     Executor,
@@ -311,19 +311,13 @@ class _Job:
     def refuse(self) -> None:
         """Raise the errors of invalid arguments before any work is done."""
         self.what.voxels(self.size.longest)
-        if self.what.bodies and (reason := lacking("manifold3d", "bodies of filaments need")):
-            raise SceneError(reason)
+        refuse_colours(self.what, self.path)
         if self.path is not None:
             from ..common.files import check_target
-            from ..formats import ENDINGS, check_format, mesh_format
 
-            ending = check_format(self.path)
             check_target(self.path)
-            if self.what.colour is not None and not mesh_format(ending).has_colours:
-                coloured = ", ".join(name for name in ENDINGS if mesh_format(name).has_colours)
-                raise SceneError(f"colour: expected a file that holds colours: {coloured}")
-            for name in ("heights", "bodies", "paint_supports"):
-                if getattr(self.what, name) and ending != ".3mf":
+            for name in ("heights", "paint_supports"):
+                if getattr(self.what, name) and self.path.suffix.lower() != ".3mf":
                     raise SceneError(f"{name}: expected a file that holds them, .3mf")
         if self.what.colour is not None and self.clock.work.cluster is not None:
             raise SceneError(f"colour {self.what.colour}: expected no cluster and no shard")
@@ -660,28 +654,11 @@ class Writing:
             return adapted(stack, what.heights[1], work).tops
 
     def _painted(self, meshes: Iterator[Mesh], finish: Finish) -> Iterator[Mesh]:
-        """Colour the vertices. Edits that are no formulas have the colour of the object there."""
-        from ..rendering.materials import Paint, paint
-
-        what, work = self.what, self.clock.work
-        colour, palette = what.colour, what.palette
-        assert colour is not None
-        field: Any = finish.of.planned.root
-        while field.tree is None:
-            field = field.root
-
-        def paint_at(points: np.ndarray) -> Paint:
-            return paint(field.tree, finish.place.units(points), colour, work, palette)
-
+        """Colour the meshes."""
+        colouring = Colouring(finish.of.planned.root, self.what, self.clock.work)
         for mesh in meshes:
             with self.clock("colouring"):
-                done = paint_at(mesh.vertices)
-                made = replace(mesh, colours=done.colours, scalars=done.scalars)
-                if what.filaments is not None:
-                    from ..mesh.filaments import with_filaments
-
-                    how = what.filaments, lambda points: paint_at(points).colours, what.bodies
-                    made = with_filaments(made, *how, work)
+                made = colouring.whole(mesh, finish.place)
             yield made
 
 

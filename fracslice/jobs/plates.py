@@ -188,7 +188,7 @@ class LaidOut:
 
         return concatenate(
             [
-                Mesh(product(mesh.vertices, place[:3]) + place[3], mesh.triangles)
+                Mesh(product(mesh.vertices, place[:3]) + place[3], mesh.triangles, mesh.colours)
                 for number, mesh in enumerate(self.meshes)
                 for place in self.places(number)
             ]

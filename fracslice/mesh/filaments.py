@@ -137,19 +137,18 @@ def spread_points(mesh: Mesh, count: int) -> NDArray[np.float64]:
     return points
 
 
-def with_filaments(
-    mesh: Mesh, wanted: int | Sequence[str], colours_at: ColoursAt, bodies: bool, work: Work
-) -> Mesh:
+def chosen_filaments(mesh: Mesh, wanted: int | Sequence[str], colours_at: ColoursAt) -> Colours:
+    """Colours of filaments for the surface of a mesh: as many as are wanted, or these, such as #e33399."""
+    if not isinstance(wanted, int):
+        return parse_colours(wanted)
+    return chosen_colours(colours_at(spread_points(mesh, SAMPLES)), np.ones(SAMPLES), wanted)
+
+
+def with_filaments(mesh: Mesh, filaments: Colours, colours_at: ColoursAt, bodies: bool, work: Work) -> Mesh:
     """A coloured mesh whose vertices and triangles have the colours of filaments, with a body for each where
     these are wanted.
-
-    `wanted`: number of filaments, or their colours, such as #e33399.
     """
     assert mesh.colours is not None
-    if isinstance(wanted, int):
-        filaments = chosen_colours(colours_at(spread_points(mesh, SAMPLES)), np.ones(SAMPLES), wanted)
-    else:
-        filaments = parse_colours(wanted)
     numbers = nearest_filament(mesh.colours, filaments)
 
     def numbers_at(points: NDArray[np.float64]) -> NDArray[np.uint8]:

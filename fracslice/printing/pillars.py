@@ -9,7 +9,6 @@ than it is steep.
 
 from __future__ import annotations
 
-import heapq
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -18,6 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .._native import grow_forest
+from ..common.arrays import triple
 from ..fields.field import Field, Kernel
 from ..formulas import Node, box, capsule, intersection, plane, transform, union
 from ..volume import Pillars, Supports
@@ -199,42 +200,6 @@ class Room:
         along = start + (np.arange(count) / (count - 1))[:, None] * (end - start)
         return bool((self.away[self.at(along)] >= least).all())
 
-    def corner(self, start: Points) -> Points:
-        """First corner of the shortest way from a point down to the plate, or its end."""
-        z, y, x = (int(axis) for axis in self.at(start))
-        _, ny, nx = self.away.shape
-        (low_x, low_y, low_z), (wide, deep, high) = self.origin.tolist(), self.cell.tolist()
-        across, along = math.hypot(wide, high), math.hypot(deep, high)
-        ways = [(0, 0, high), (0, -1, across), (0, 1, across), (-1, 0, along), (1, 0, along)]
-        points = [start.tolist()]
-        while z:
-            z -= 1
-            least, to, below = math.inf, (y, x), self.cost[z]
-            for dy, dx, way in ways:
-                j, i = y + dy, x + dx
-                if 0 <= j < ny and 0 <= i < nx and (cost := way + below.item(j, i)) < least:
-                    least, to = cost, (j, i)
-            # straight down, the way keeps its place
-            place = (
-                points[-1][:2]
-                if to == (y, x)
-                else [low_x + (to[1] + 0.5) * wide, low_y + (to[0] + 0.5) * deep]
-            )
-            points.append([*place, low_z + (z + 0.5) * high])
-            y, x = to
-        points[-1][2] = self.floor
-        return self._straight(np.array(points))
-
-    def _straight(self, way: Points) -> Points:
-        """Last point [3] of a way [n, 3] up to which it may be straight, as its free cells permit."""
-        least, step = self.wide if self.away[self.at(way[0])] >= self.wide else NARROW, len(way) - 1
-        while step > 1 and not (self._steep(way[0], way[step]) and self.is_free(way[0], way[step], least)):
-            step //= 2
-        return np.asarray(way[step])
-
-    def _steep(self, start: Points, end: Points) -> bool:
-        return bool(math.dist(start[:2], end[:2]) <= (start[2] - end[2]) * 1.001)
-
 
 def steps_from(full: NDArray[np.bool_], most: int) -> NDArray[np.uint8]:
     """Steps from the nearest full cell, at most `most`: a ball of as many cells is free around cells that are
@@ -255,20 +220,12 @@ def steps_from(full: NDArray[np.bool_], most: int) -> NDArray[np.uint8]:
     return away
 
 
-class Meeting(NamedTuple):
-    """A place where a branch may end."""
-
-    is_trunk: bool  # whether it ends at a trunk, not at another branch
-    number: int  # of the trunk, or of the other branch's node
-    point: Points
-
-
 class Forest:
     """Branches that grow from tips down to the plate.
 
     Attributes
     ----------
-    place : list of float64 [3]
+    place : float64 [n, 3]
         Nodes, those of the tips first.
     down : list of int
         The next node on the way down from each; -1 if it is straight down to the plate, or on a trunk.
@@ -280,93 +237,11 @@ class Forest:
 
     def __init__(self, room: Room, strength: Strength, ends: Points, radii: NDArray[np.float64]) -> None:
         self.room, self.strength, self.tips, self.radii = room, strength, len(ends), radii
-        self.place, self.down = list[Points](), list[int]()
-        self.trunks, self.joins = list[int](), list[list[int]]()
-        # nodes that are not led on yet: the arrays have room for more
-        self._open, self._points = np.zeros(64, bool), np.full((64, 3), np.inf)
-        heap = list[tuple[float, int]]()
-        for point in ends:
-            self._add(point, heap)
-        while heap:
-            _, k = heapq.heappop(heap)
-            if self._open[k]:
-                self._open[k] = False
-                self._lead(k, heap)
-
-    def _add(self, point: Points, heap: list[tuple[float, int]] | None = None) -> int:
-        """Add a node, which is to be led on if there is a heap of those."""
-        k = len(self.place)
-        if k == len(self._open):
-            self._open = np.append(self._open, np.zeros(k, bool))
-            self._points = np.append(self._points, np.full((k, 3), np.inf), axis=0)
-        self.place.append(point)
-        self.down.append(-1)
-        self._points[k] = point
-        if heap is not None:
-            self._open[k] = True
-            heapq.heappush(heap, (-float(point[2]), k))
-        return k
-
-    def _lead(self, k: int, heap: list[tuple[float, int]]) -> None:
-        """Lead a node to another branch, to a trunk or down."""
-        point, room = self.place[k], self.room
-        for is_trunk, number, meeting in self._meetings(point):
-            if not room.is_free(point, meeting, room.wide):
-                continue
-            if is_trunk:
-                self.down[k] = self._add(meeting)
-                self.joins[number].append(self.down[k])
-                return
-            if room.is_free(self.place[number], meeting, room.wide):
-                self._open[number] = False
-                self.down[k] = self.down[number] = self._add(meeting, heap)
-                return
-        corner = room.corner(point)
-        if corner[2] > room.floor or math.dist(corner[:2], point[:2]) > 0:
-            self.down[k] = self._add(corner, heap)
-            return
-        self.trunks.append(k)
-        self.joins.append([])
-
-    def _meetings(self, point: Points) -> list[Meeting]:
-        """What a node may be led to, first what saves most of the length of pillars."""
-        own = float(self.room.cost[self.room.at(point)]) + FOOT
-        others, tops = np.flatnonzero(self._open[: len(self.place)]), np.array(self.trunks, np.int64)
-        others, trunks = others[self._near(point, others)], self._near(point, tops)
-        found = list[tuple[float, bool, int, Points]]()
-        for is_trunk, numbers, (places, saved) in (
-            (False, others, self._with_branches(point, own, self._points[others])),
-            (True, trunks, self._with_trunks(point, own, self._points[tops[trunks]])),
-        ):
-            best = np.argsort(-saved, kind="stable")[:TRIES]
-            found += [(-saved[k], is_trunk, int(numbers[k]), places[k]) for k in best if saved[k] > 0]
-        return [Meeting(*one[1:]) for one in sorted(found, key=lambda one: one[:3])[:TRIES]]
-
-    def _near(self, point: Points, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Which of some nodes a branch may reach."""
-        return np.flatnonzero(np.abs(self._points[nodes, :2] - point[:2]).max(1, initial=0) < FARTHEST)
-
-    def _with_branches(self, point: Points, own: float, others: Points) -> tuple[Points, Points]:
-        """Highest places [n, 3] below 45 degrees from a node and from others, and what they save."""
-        away = np.linalg.norm((others - point)[:, :2], axis=1)
-        low = np.minimum((point[2] + others[:, 2] - away) / 2, others[:, 2])
-        share = np.divide(point[2] - low, away, out=np.ones_like(away), where=away > 0)
-        meeting = point + np.minimum(share, 1)[:, None] * (others - point)
-        meeting[:, 2] = low
-        mine, theirs = (np.linalg.norm(meeting - ends, axis=1) for ends in (point, others))
-        cost = self.room.cost
-        saved = own + cost[self.room.at(others)] - mine - theirs - cost[self.room.at(meeting)]
-        saved[(np.maximum(mine, theirs) > FARTHEST) | (low < self.room.floor + LOWEST)] = -np.inf
-        return meeting, saved
-
-    def _with_trunks(self, point: Points, own: float, top: Points) -> tuple[Points, Points]:
-        """Highest places [t, 3] of trunks below 45 degrees from a node, and what they save."""
-        away = np.linalg.norm((top - point)[:, :2], axis=1)
-        meeting = np.column_stack([top[:, :2], np.minimum(point[2] - away, top[:, 2])])
-        mine = np.linalg.norm(meeting - point, axis=1)
-        saved = own - mine
-        saved[(mine > FARTHEST) | (meeting[:, 2] < self.room.floor + LOWEST)] = -np.inf
-        return meeting, saved
+        steps, lengths = (room.wide, NARROW), (FARTHEST, LOWEST, FOOT)
+        grid = room.away, room.cost, triple(room.origin), triple(room.cell), room.floor
+        self.place, down, trunks, on = grow_forest(*grid, steps, lengths, TRIES, ends)
+        self.down, self.trunks = down.tolist(), trunks.tolist()
+        self.joins = [np.flatnonzero(on == trunk).tolist() for trunk in range(len(trunks))]
 
     def beams(self, largest: float, lowest: float) -> tuple[Points, Points, Points]:
         """Beams [m, 2, 4] of all branches, the feet of trunks [t, 4], and the radii of all nodes [n].
@@ -376,7 +251,7 @@ class Forest:
         load, floor, least = self._loads(), self.room.floor, self.strength.pillar / 2
         radii = np.maximum(least, np.sqrt(np.array(load)))
         beams, feet = list[tuple[int, int]](), list[int]()  # pairs of balls (x, y, z, radius)
-        balls = [[*point.tolist(), r] for point, r in zip(self.place, radii.tolist(), strict=True)]
+        balls = np.column_stack([self.place, radii]).tolist()
         for k, nxt in enumerate(self.down):
             if nxt >= 0:
                 beams.append((k, nxt))
@@ -395,7 +270,7 @@ class Forest:
             feet.append(len(balls) - 1)
         made, pairs = np.array(balls).reshape(-1, 4), np.array(beams, np.int64).reshape(-1, 2)
         low = made[:, 2] < lowest
-        ends = min((float(point[2]) for point in self.place[: self.tips]), default=floor)
+        ends = float(self.place[: self.tips, 2].min(initial=np.inf)) if self.tips else floor
         wider = _widening(made[pairs], floor, min(ends, lowest), largest)
         made[low, 3] *= wider
         made[: self.tips][low[: self.tips], 3] *= min(wider, CONE) / wider
@@ -404,7 +279,7 @@ class Forest:
     def _loads(self) -> list[float]:
         """Contacts that each node carries, squares of their radii."""
         load = [*(self.radii**2).tolist(), *([0.0] * (len(self.place) - self.tips))]
-        for k in sorted(range(len(self.place)), key=lambda k: (-self.place[k][2], k)):
+        for k in np.argsort(-self.place[:, 2], kind="stable").tolist():
             if self.down[k] >= 0:
                 load[self.down[k]] += load[k]
         return load
@@ -414,11 +289,13 @@ class Forest:
         from scipy.spatial import cKDTree
 
         floor, result, held = self.room.floor, [], dict[int, int]()
-        tops = np.array([self.place[k] for k in self.trunks]).reshape(-1, 3)
+        tops = self.place[self.trunks].reshape(-1, 3)
         tall = np.flatnonzero(tops[:, 2] - floor > TALL)
         near = cKDTree(tops[tall, :2]).query_pairs(NEAR, output_type="ndarray") if len(tall) else tall
-        pairs = tall[near.reshape(-1, 2)].tolist()
-        for far, a, b in sorted((math.dist(tops[a, :2], tops[b, :2]), a, b) for a, b in pairs):
+        some, others = tall[near.reshape(-1, 2)].T
+        away = np.sqrt(((tops[some] - tops[others])[:, :2] ** 2).sum(1))
+        for n in np.lexsort([others, some, away]).tolist():
+            a, b, far = int(some[n]), int(others[n]), float(away[n])
             if max(held.get(a, 0), held.get(b, 0)) >= 2 or far < 1.5:
                 continue
             radius, low, made = self.strength.pillar * 0.35, floor + 3.0, 0

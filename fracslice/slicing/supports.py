@@ -71,6 +71,9 @@ GROWN, TALL = 0.1, 0.3
 POCKET = 4.5
 """Reach in holes whose exits are narrow, mm: tips in them are dear. Below the limit of `fracslice.checks`."""
 
+BESIDE = 3
+"""Cells from one within which most cells are carried, along each axis."""
+
 REGAINED = 1.0
 """Reach that is regained for each mm of material above."""
 
@@ -309,16 +312,16 @@ class _Survey:
 
 
 def _places(components: LayerComponents, chosen: NDArray[np.int64]) -> list[tuple[int, int]]:
-    """A pixel (x, y) of each chosen component, near its middle."""
-    runs, result = components.runs, []
-    rows = np.repeat(np.arange(runs.height), np.diff(runs.rows)) if len(chosen) else np.empty(0, np.int64)
-    for node in chosen.tolist():
-        own = np.flatnonzero(components.label == node)
-        x, y = components.nodes.middle[node] - 0.5
-        nearest = np.clip(round(float(x)), runs.begin[own], runs.end[own] - 1)
-        first = np.argmin(np.hypot(nearest - x, rows[own] - y))
-        result.append((int(nearest[first]), int(rows[own[first]])))
-    return result
+    """A pixel (x, y) of each chosen component, near its middle; `chosen`: ascending."""
+    runs, is_chosen = components.runs, np.zeros(len(components), bool)
+    is_chosen[chosen] = True
+    at = np.flatnonzero(is_chosen[components.label])
+    node, row = components.label[at], np.searchsorted(runs.rows, at, "right") - 1
+    x, y = components.nodes.middle[node].T - 0.5
+    nearest = np.clip(np.rint(x), runs.begin[at], runs.end[at] - 1)
+    order = np.lexsort([np.hypot(nearest - x, row - y), node])
+    best = order[np.diff(node[order], prepend=-1) > 0]
+    return list(zip(nearest[best].astype(int).tolist(), row[best].tolist(), strict=True))
 
 
 @dataclass(eq=False)
@@ -360,7 +363,8 @@ class _Growth:
         rows, columns = np.nonzero(bare)
         if not len(rows):
             return result, more
-        here = self._filled(result, bare)
+        here = result.copy()
+        here[rows, columns] = self._grown(result, rows, columns)
         while True:
             worst = int((here[rows, columns] - reach[rows, columns]).argmax())
             y, x = int(rows[worst]), int(columns[worst])
@@ -375,16 +379,35 @@ class _Growth:
         result[bare] = here[bare]
         return result, more
 
-    def _filled(self, used: NDArray[np.float32], bare: NDArray[np.bool_]) -> NDArray[np.float32]:
+    def _grown(
+        self, used: NDArray[np.float32], rows: NDArray[np.intp], columns: NDArray[np.intp]
+    ) -> NDArray[np.float32]:
         """Reach that bare cells use: of the nearest one that is carried and, beyond what is free, the way to
-        it.
+        it. Most are beside one; what is farther than a few cells is looked for in the whole layer.
         """
-        from scipy.ndimage import distance_transform_edt
-
+        padded = np.pad(used, BESIDE, constant_values=np.inf)
+        left, result = np.arange(len(rows)), np.full(len(rows), 1e6, np.float32)
+        for y, x, away in self._beside:
+            near = padded[rows[left] + y, columns[left] + x]
+            found = np.isfinite(near)
+            result[left[found]] = near[found] + max(away - float(self.cell[2]), 0.0)
+            left = left[~found]
+            if not len(left):
+                return result
         carried = np.isfinite(used)
-        if not carried.any():
-            return np.where(bare, np.float32(1e6), used)
-        side = self.cell[1::-1].tolist()
-        away, nearest = distance_transform_edt(~carried, sampling=side, return_indices=True)
-        grown = used[tuple(nearest)] + np.maximum(away - self.cell[2], 0)
-        return np.where(bare, grown, used).astype(np.float32)
+        if carried.any():
+            from scipy.ndimage import distance_transform_edt
+
+            side = self.cell[1::-1].tolist()
+            far, nearest = distance_transform_edt(~carried, sampling=side, return_indices=True)
+            at = rows[left], columns[left]
+            result[left] = used[tuple(nearest[:, at[0], at[1]])] + np.maximum(far[at] - self.cell[2], 0)
+        return result
+
+    @cached_property
+    def _beside(self) -> list[tuple[int, int, float]]:
+        """Cells (y, x) around one at `BESIDE`, the nearest first, and how far they are, mm."""
+        steps = range(-BESIDE, BESIDE + 1)
+        wide, deep = self.cell[:2].tolist()
+        around = [(math.hypot(j * deep, i * wide), BESIDE + j, BESIDE + i) for j in steps for i in steps]
+        return [(y, x, away) for away, y, x in sorted(around) if away < (BESIDE + 1) * min(wide, deep)]

@@ -104,7 +104,7 @@ def test_each_bed_of_parts_has_a_file(ball: Path, installed: Path, capfd: pytest
     [
         (["--copies", "2", "--parts", "2x1x1"], "--copies: not with parts"),
         (["--parts", "2x1x1", "--send", "prusalink://host"], "--send: expected one file"),
-        (["--parts", "2x1x1", "--heights", "0.1mm..0.2mm"], "--heights: not for copies or parts"),
+        (["--parts", "2x1x1", "--heights", "0.1mm..0.2mm"], "--heights: not for parts"),
         (["--spacing", "1mm"], "--spacing: only for --copies"),
     ],
 )

@@ -211,7 +211,7 @@ def test_bodies_are_closed_meet_and_add_up(tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "two.3mf") as file:
         settings = file.read("Metadata/model_settings.config").decode()
     parts = re.findall(r'<part id="(\d+)".*?key="extruder" value="(\d)"', settings)
-    assert parts == [("5", "1"), ("6", "2")]
+    assert parts == [("4", "1"), ("5", "2")]
 
 
 def test_palettes_have_the_names_of_materials() -> None:

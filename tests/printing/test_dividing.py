@@ -149,7 +149,6 @@ def test_the_command_writes_beds_or_files(
         ("--parts 8x1x1", "8 parts along x, each 6.25 mm long: expected at least 10 mm, for pegs"),
         ("--parts 5x5x5", "5 x 5 x 5 parts: expected at most 64"),
         ("--parts 2x1x1 --supports light", "parts: expected no supports"),
-        ("--parts 2x1x1 --colour material", "--colour: not for an object in parts"),
     ],
 )
 def test_what_is_wrong_is_one_line(

@@ -31,13 +31,13 @@ from fracslice.formulas import (
 )
 from fracslice.jobs.mesh import make_apart, make_implicit
 from fracslice.jobs.plates import write_bodies
-from fracslice.printing.pillars import Exits, Object, Room, steps_from
+from fracslice.printing.pillars import STRENGTHS, Exits, Forest, Object, Room, steps_from
 from fracslice.scene import Print, scene
 from fracslice.slicing import SliceJob, Slicer, Stack, plan_stack
 from fracslice.slicing.layers import Layer, ScreenView
 from fracslice.slicing.orientation import _runs, orientations
 from fracslice.slicing.stack import plan_object
-from fracslice.slicing.supports import layers_with_room
+from fracslice.slicing.supports import _Growth, layers_with_room
 from fracslice.volume.amount import Sizing
 from fracslice.work import Work
 
@@ -291,6 +291,19 @@ def test_steps_are_at_most_distances() -> None:
         assert (away[distance > 2 * steps] > steps).all()
 
 
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.1])
+def test_what_bare_cells_use_is_the_way_to_the_nearest_one_that_is_carried(share: float) -> None:
+    """Cells are no squares; a step of 0.3 mm is free. Without any that is carried, all is beyond reach."""
+    rng = np.random.default_rng(2)
+    carried = rng.random((60, 70)) < share
+    growth = _Growth(carried[None], carried[None], np.array([0.2, 0.25, 0.3]), 3.0)
+    rows, columns = np.nonzero(~carried & (rng.random(carried.shape) < 0.5))
+    found = growth._grown(np.where(carried, np.float32(0), np.float32(np.inf)), rows, columns)
+    away = distance_transform_edt(~carried, sampling=(0.25, 0.2))[rows, columns]
+    expected = np.maximum(away - 0.3, 0) if share else np.full(len(rows), 1e6)
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6)
+
+
 def test_ways_go_around() -> None:
     full = np.zeros((40, 40, 40), bool)
     full[20, 8:32, 8:32] = True  # a plate
@@ -298,13 +311,14 @@ def test_ways_go_around() -> None:
     start = np.array([20.5, 20.5, 36.5])
     assert math.isinf(room.cost[room.at(start - [0, 0, 15])])  # inside the plate's surroundings
     assert room.cost[room.at(np.array([2.5, 2.5, 36.5]))] == pytest.approx(36)
-    way = [np.array([11.5, 20.5, 39.5])]
-    while way[-1][2] > 0:
-        way.append(room.corner(way[-1]))
+    tips = np.array([[11.5, 20.5, 39.5]])
+    forest = Forest(room, STRENGTHS["medium"], tips, np.array([0.2]))
+    assert forest.down == [*range(1, len(forest.place)), -1] and forest.trunks == [len(forest.place) - 1]
+    way = [*forest.place, forest.place[-1] * (1, 1, 0)]
+    assert len(way) > 2
     for one, other in pairwise(way):
         assert room.is_free(one, other, room.wide)
         assert math.dist(one[:2], other[:2]) <= 1.001 * (one[2] - other[2])
-    assert way[-1][2] == 0
     assert way[-1][0] < 8
 
 

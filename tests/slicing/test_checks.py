@@ -173,6 +173,17 @@ def test_an_island_above_an_empty_layer_overhangs() -> None:
     assert report.largest_overhang == pytest.approx(16 / 1.21, rel=0.05)
 
 
+@pytest.mark.parametrize(("layers", "found"), [(1, False), (2, True)])
+def test_a_slit_of_one_layer_carries_what_is_above_it(layers: int, found: bool) -> None:
+    """A cube of 10 mm, cut in two but for one side: the upper part reaches 8 mm."""
+    height = 0.01 * layers
+    slit = at(box(size=(1, 2, height)), 0.2, 0, height / 2)
+    report = checked(difference(CUBE, slit))
+    assert [area < 25 for area in report.areas[49:53]] == [False, True, found, False]
+    assert (report.overhang is not None) == found
+    assert report.overhang is None or report.overhang.layer == 52
+
+
 @pytest.mark.parametrize("pixel", [0.1, 0.5, 1.0, 2.0])
 def test_cantilevers_are_measured_by_the_limit_with_any_pixel(pixel: float) -> None:
     below, above = np.zeros((2, 20, 60), bool)

@@ -2,6 +2,7 @@
 #include "../disjoint_sets.h"
 #include "../mesh/input.h"
 #include "../volume/brick_arrays.h"
+#include "forest.h"
 #include "sampled_field.h"
 
 #include <cstring>
@@ -183,6 +184,23 @@ nb::object bind_steps(const IjkArray& ijk, const IndexArray& index, const Sample
     return to_numpy<uint8_t>(released([&] { return steps_to(layout, seeds.data()); }), {layout.count, volume::kSamples});
 }
 
+template <class T>
+using Cells = nb::ndarray<const T, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
+
+nb::tuple bind_forest(const Cells<uint8_t>& away, const Cells<float>& cost, const Point& origin, const Point& cell, double floor,
+                      const std::array<int, 2>& steps, const std::array<double, 3>& lengths, size_t tries, const Points& ends) {
+    for (size_t k = 0; k < 3; ++k) require(away.shape(k) == cost.shape(k) && away.shape(k) > 0, "cells differ in number");
+    const std::array<int64_t, 3> shape{int64_t(away.shape(0)), int64_t(away.shape(1)), int64_t(away.shape(2))};
+    const Room room{away.data(), cost.data(), shape, origin, cell, floor};
+    const auto [wide, narrow] = steps;
+    const auto [farthest, lowest, foot] = lengths;
+    const auto given = rows_of(ends);
+    const Grown made = released(
+        [&] { return grow_forest(room, {wide, narrow, farthest, lowest, foot, tries}, {given.begin(), given.end()}); });
+    return nb::make_tuple(to_numpy<double>(made.places), to_numpy<int64_t>(made.down, {made.down.size()}),
+                          to_numpy<int64_t>(made.trunks, {made.trunks.size()}), to_numpy<int64_t>(made.on, {made.on.size()}));
+}
+
 }  // namespace
 
 void bind_printing(nb::module_& module) {
@@ -210,6 +228,8 @@ void bind_printing(nb::module_& module) {
     module.def("least", &bind_least, "some"_a, "rows"_a, "more"_a, "others"_a);
     module.def("bricks_near", &bind_near, "points"_a, "reach"_a, "shape"_a);
     module.def("capsule_squares", &bind_squares, "lines"_a, "points"_a, "of"_a, "reach"_a, "ijk"_a, "index"_a);
+    module.def("grow_forest", &bind_forest, "away"_a, "cost"_a, "origin"_a, "cell"_a, "floor"_a, "steps"_a, "lengths"_a, "tries"_a,
+               "ends"_a);
     module.def("steps_to", &bind_steps, "ijk"_a, "index"_a, "seeds"_a);
 }
 

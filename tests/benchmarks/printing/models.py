@@ -21,11 +21,12 @@ from .supports import ours, prusa
 SMALLEST = {"names": ("menger-tower",), "voxels": 24, "layer": 0.4, "peer": 0}
 RUNS = 1
 VASE = Path(__file__).parents[3] / "examples/vase.stl"
+NAMES = *library.names(), "vase"
 
 
 def rows(
     run: Run,
-    names: tuple[str, ...] = (*library.names(), "vase"),
+    names: tuple[str, ...] = NAMES,
     size: float = 30.0,
     layer: float = 0.1,
     voxels: int = 64,
@@ -35,7 +36,7 @@ def rows(
     for name in names:
         with tempfile.TemporaryDirectory() as folder:
             model = Path(folder) / f"{name}.stl"
-            own = make_mesh(_scene(name), MeshJob(size=size, resolution=voxels), path=model).report.mesh
+            own = make_mesh(scene_of(name), MeshJob(size=size, resolution=voxels), path=model).report.mesh
             row = ours(run, _model(model), size, layer, orient=False)
             if peer:
                 row |= prusa(model, own.volume_mm3, layer, row)
@@ -48,7 +49,8 @@ def rows(
         yield {"": f"median of {len(volumes)}", **ratios}
 
 
-def _scene(name: str) -> Scene:
+def scene_of(name: str) -> Scene:
+    """A shipped scene, or the vase."""
     return scene(_model(VASE), unit=1.0) if name == "vase" else read(library.path(name))
 
 

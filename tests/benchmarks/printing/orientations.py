@@ -7,6 +7,7 @@ Tweaker-3 turns the mesh of the object so that its overhangs are least; it is co
 from __future__ import annotations
 
 import importlib
+import statistics
 from collections.abc import Iterator
 from typing import Any
 
@@ -15,32 +16,28 @@ from fracslice.common.messages import lacking
 from fracslice.fields.box import Triple
 from fracslice.formulas import Node
 from fracslice.records import Print
-from fracslice.scene import library, read
 from fracslice.slicing import SliceJob, plan_stack
 from fracslice.slicing.orientation import orientations
 from fracslice.volume.amount import Sizing
 from fracslice.work import Work
-from tests.stability.random_scenes import random_scene
 
 from ..runner import Row, Run
+from .models import NAMES, scene_of
 
-SMALLEST = {"shipped": 1, "random": 0}
+SMALLEST = {"names": ("bauble",)}
 RUNS = 1
 SIZE, VOXELS = 30.0, 96
 
 
-def rows(run: Run, shipped: int = 10, random: int = 10) -> Iterator[Row]:
-    work = Work(threads=run.threads[0])
-    objects: list[tuple[str, Node]] = [(n, read(library.path(n)).root) for n in library.names()[:shipped]]
-    objects += [(f"random {tree}", random_scene(tree, 0)) for tree in range(random)]
-    ratios = []
-    for name, root in objects:
-        row = _row(run, root, work)
+def rows(run: Run, names: tuple[str, ...] = NAMES) -> Iterator[Row]:
+    work, ratios = Work(threads=run.threads[0]), []
+    for name in names:
+        row = _row(run, scene_of(name).root, work)
         if "ratio" in row:
             ratios.append(row["ratio"])
         yield {"": name, **row}
     if ratios:
-        yield {"": "median", "ratio": sorted(ratios)[len(ratios) // 2]}
+        yield {"": f"median of {len(ratios)}", "ratio": statistics.median(ratios)}
 
 
 def _row(run: Run, root: Node, work: Work) -> Row:
