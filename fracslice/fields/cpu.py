@@ -6,20 +6,21 @@ Loading it takes milliseconds. Its functions (`machine`) release the GIL, so pla
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._native import Regions
 from ..common.cache import Kept, cache_folder, key
 from ..expr.frontend import loop_function
 from ..expr.graph import Program
+from ..expr.language import InMemory
 from ..expr.loops import Loop, bricks, points
 from ..expr.runtime import REGISTERS, CompiledFunction, constant, host, lane_count, load_object, toolchain
 from .field import Kernel, Loops, Precision
 from .linker import Linked
+from .regions import Region
 
 if TYPE_CHECKING:
     from .node import Node
@@ -39,6 +40,24 @@ def object_code(program: Program, bits: int, width: int, loops: Sequence[Loop]) 
         return compile_object(program, Target(bits, width, min(REGISTERS, width), *host()), loops)
 
     return Kept(cache_folder()).cached(name, compiled)  # incomplete code would crash the process
+
+
+def parameters(linked: Linked, dtype: np.dtype | str) -> np.ndarray:
+    """Return the parameters P of a linked scene, with the addresses of what is in memory."""
+    regions = ((place, in_memory(region)) for place, region in linked.regions)
+    return constant(linked.parameters, dtype, (*linked.held, *regions))
+
+
+@lru_cache(maxsize=8)
+def in_memory(region: Region) -> InMemory:
+    """Return a long union as native code knows it; kernels with the same one share it."""
+    from .._native import Regions
+
+    width = lane_count(64)
+    loop = load_functions(region.program, 64, width, (points,))["points"]
+    numbers = constant(region.numbers.ravel(), "float64", region.held).reshape(region.numbers.shape)
+    place = region.smooth, region.lipschitz, region.centre, region.half
+    return InMemory(int(region.digest[:16], 16), Regions(loop, numbers, width, *place))
 
 
 BATCH = 1 << 10
@@ -63,30 +82,13 @@ class CpuKernel(Kernel):
         Lanes.
     """
 
-    def __init__(
-        self, linked: Linked, precision: Precision = "float32", region: Region | None = None
-    ) -> None:
+    def __init__(self, linked: Linked, precision: Precision = "float32") -> None:
         self.dtype = np.dtype(precision)
         self.width = lane_count(self.dtype.itemsize * 8)
         functions = load_functions(linked.program, self.dtype.itemsize * 8, self.width, (points, bricks))
         self._points, self._bricks = functions["points"], functions["bricks"]
-        self._parameters = constant(linked.parameters, self.dtype, linked.held)
+        self._parameters = parameters(linked, precision)
         self._offsets = constant(np.indices((8, 8, 8)).reshape(3, 512), self.dtype)
-        if region is not None:
-            alone = self if region.union is linked else CpuKernel(region.union, precision)
-            self._look_around(linked, region, alone)
-
-    def _look_around(self, linked: Linked, region: Region, alone: CpuKernel) -> None:
-        """Let the loops pass over elements of a union that are far from a point; see `Regions`."""
-        given = [
-            (kernel._points, kernel._parameters, [astuple(one) for one in lists])
-            for kernel, lists in ((self, linked.lists), (alone, region.union.lists))
-        ]
-        where = region.lipschitz, region.centre, region.half, self.width
-        regions = Regions(given[0], self._bricks, given[1], *where)
-        loops = (CompiledFunction(regions, loop, self.dtype) for loop in (points, bricks))
-        self._points, self._bricks = loops
-        self._parameters = constant(np.array([regions.address], np.uint64).view(self.dtype), self.dtype)
 
     @property
     def entry(self) -> tuple[CompiledFunction, np.ndarray]:
@@ -109,33 +111,6 @@ class CpuKernel(Kernel):
     ) -> None:
         assert corners.shape == (len(out), 3) and out.shape == (len(corners), 512)
         self._bricks(self._parameters, *origin, voxel, *self._offsets, corners, out, len(corners))
-
-
-@dataclass(frozen=True)
-class Region:
-    """Union in a scene, its Lipschitz constant, and a cube around it, scene units."""
-
-    union: Linked  # the union alone
-    lipschitz: float
-    centre: tuple[float, ...]
-    half: float
-
-    @classmethod
-    def of(cls, linked: Linked) -> Region | None:
-        """Region of a scene with a long union, or None; measured constants bound no element of it."""
-        if linked.union is None or sum(one.count for one in linked.lists) < LONG:
-            return None
-        bounds, union = linked.union.bounds, linked.union.linked
-        if not bounds.box.finite or bounds.exterior_only or bounds.measured or not union.lists:
-            return None
-        centre = tuple((a + b) / 2 for a, b in zip(bounds.box.lo, bounds.box.hi, strict=True))
-        return cls(union, bounds.lipschitz, centre, ROOM * max(bounds.box.size))
-
-
-LONG, ROOM = 32, 0.75
-"""Elements of a union from which on those near a point are looked for; half side of the cube, in which they
-are, per largest side of the solid.
-"""
 
 
 _kernel = lru_cache(maxsize=32)(CpuKernel)
@@ -161,7 +136,7 @@ def compile_scene(root: Node, precision: Precision = "float32") -> CpuKernel:
     KernelError
         If the scene cannot be linked or compiled.
     """
-    return _kernel(root.linked, precision, Region.of(root.linked))
+    return _kernel(root.linked, precision)
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,11 +160,11 @@ def compile_loops(linked: Linked, loops: tuple[Loop, ...], precision: Precision)
 
     `precision`: "float32" or "float64".
     """
-    parameters = constant(linked.parameters, precision, linked.held)
-    bits = parameters.dtype.itemsize * 8
+    placed = parameters(linked, precision)
+    bits = placed.dtype.itemsize * 8
     width = lane_count(bits)
     functions = load_functions(linked.program, bits, width, loops)
-    return Loops(width, BATCH, {name: CompiledLoop(f, parameters) for name, f in functions.items()})
+    return Loops(width, BATCH, {name: CompiledLoop(f, placed) for name, f in functions.items()})
 
 
 def load_functions(
