@@ -74,8 +74,7 @@ class Regions {
     template <class Real>
     const int32_t* at_points(const Real* points, size_t count) const {
         Recent& recent = recent_of_thread();
-        Cell& window = recent.window;
-        if (window.spans(points, count)) return window.list.data();
+        if (recent.window.spans(points, count)) return recent.list.data();
         Point lo, hi;
         for (size_t axis = 0; axis < 3; ++axis) {
             const auto [least, most] = std::minmax_element(points + axis * count, points + (axis + 1) * count);
@@ -83,11 +82,12 @@ class Regions {
         }
         const Cell* cell = leaf(lo, *recent.cell);
         const double extent = std::max({hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]});
-        if (cell != &root_ && extent < kWide * cell->half && look_around(lo, hi, std::max(kRoom * extent, cell->half), recent)) {
+        if (cell != &root_ && extent < kWide * cell->half && look_around(lo, hi, extent, cell->half, recent) &&
+            recent.window.spans(points, count)) {  // not so where least and most are those of numbers that are none
             recent.cell = cell;
-            return window.list.data();
+            return recent.list.data();
         }
-        window.half = 0;
+        recent.window = {};
         recent.found.clear();
         for (size_t i = 0; i < count; ++i) {
             const Point p{double(points[i]), double(points[count + i]), double(points[2 * count + i])};
@@ -103,7 +103,7 @@ class Regions {
     template <class Real>
     const int32_t* in_boxes(const Real* ends, size_t count) const {
         Recent& recent = recent_of_thread();
-        recent.window.half = 0;
+        recent.window = {};
         recent.found.clear();
         for (size_t i = 0; i < count; ++i) {
             Point lo, hi;
@@ -124,7 +124,8 @@ class Regions {
     static constexpr size_t kFew = 16;   // elements of a leaf
     static constexpr int kDeepest = 10;  // levels of cells
     static constexpr double kWide = 8;   // extent of points, in half sides of a leaf, up to which they have a window
-    static constexpr double kRoom = 1.1;  // half side of a window, in extents: a brick is in that of its first points
+    static constexpr double kRoom = 1.1;  // side to which a window grows, in extents of points: a brick has one window
+    static constexpr double kMargin = 0.02;  // of a window around points, in their extents
     static constexpr int kStuck = 5;     // levels without use, after which a cell is not divided
 
     struct Cell {
@@ -138,30 +139,49 @@ class Regions {
         bool holds(const Point& p) const {
             return std::abs(p[0] - centre[0]) < half && std::abs(p[1] - centre[1]) < half && std::abs(p[2] - centre[2]) < half;
         }
+        bool is_leaf() const { return level == kDeepest || list.size() <= kFew + 1 || stuck == kStuck; }
+    };
+
+    // A box around what is asked, and what is asked next near by; at first nothing.
+    struct Window {
+        Point lo{1, 1, 1}, hi{-1, -1, -1};
+
         // Whether no lane is outside; what is no number is nowhere.
         template <class Real>
         bool spans(const Real* points, size_t count) const {
             int outside = 0;
             for (size_t axis = 0; axis < 3; ++axis) {
-                const Real least = Real(centre[axis] - half), most = Real(centre[axis] + half);
+                const Real least = Real(lo[axis]), most = Real(hi[axis]);
                 for (size_t i = axis * count; i < (axis + 1) * count; ++i) outside |= (points[i] <= least) | (points[i] >= most);
             }
             return !outside;
         }
-        bool is_leaf() const { return level == kDeepest || list.size() <= kFew + 1 || stuck == kStuck; }
+        // Grows to hold a box: towards it, at once by as much as its side may be; false if that is too little.
+        bool grow(const Point& least, const Point& most, double side) {
+            if (lo[0] > hi[0]) return false;
+            Window grown = *this;
+            for (size_t axis = 0; axis < 3; ++axis) {
+                const double low = std::min(lo[axis], least[axis]), high = std::max(hi[axis], most[axis]);
+                if (high - low > side) return false;
+                grown.lo[axis] = low < lo[axis] ? high - side : low;
+                grown.hi[axis] = high > hi[axis] ? low + side : high;
+            }
+            *this = grown;
+            return true;
+        }
     };
 
     // What a thread asked last.
     struct Recent {
         uint64_t number = 0;
         const Cell* cell = nullptr;
-        Cell window;  // what is asked next is often near by
+        Window window;
+        std::vector<int32_t> list;  // the number of elements, and these
         std::vector<const Cell*> found;
         Ordered ordered{0};
 
         // Lists the elements of the cells found.
         const int32_t* join() {
-            std::vector<int32_t>& list = window.list;
             std::sort(found.begin(), found.end(), std::less<>());
             found.erase(std::unique(found.begin(), found.end()), found.end());
             list.assign(1, 0);
@@ -174,18 +194,17 @@ class Regions {
         }
     };
 
-    // Makes the window a cube of half side `half` around a box; false if it is not within the root.
-    bool look_around(const Point& lo, const Point& hi, double half, Recent& recent) const {
-        Cell& window = recent.window;
-        window.half = half;
+    // Makes the window hold a box of an extent in a leaf of a half side: the room around few points is that of the leaf. False if it
+    // is not within the root.
+    bool look_around(const Point& lo, const Point& hi, double extent, double half, Recent& recent) const {
+        const double margin = 4 * extent < half ? half : kMargin * extent;
         Point least, most;
-        for (int axis = 0; axis < 3; ++axis) {
-            window.centre[axis] = (lo[axis] + hi[axis]) / 2;
-            least[axis] = window.centre[axis] - half, most[axis] = window.centre[axis] + half;
-        }
-        if (!root_.holds(least) || !root_.holds(most)) return false;
+        for (size_t axis = 0; axis < 3; ++axis) least[axis] = lo[axis] - margin, most[axis] = hi[axis] + margin;
+        Window& window = recent.window;
+        if (!window.grow(least, most, kRoom * extent)) window = {least, most};
+        if (!root_.holds(window.lo) || !root_.holds(window.hi)) return false;
         recent.found.clear();
-        gather(root_, least, most, half, recent.found);
+        gather(root_, window.lo, window.hi, std::max(extent, half), recent.found);
         recent.join();
         return true;
     }
@@ -194,7 +213,8 @@ class Regions {
         thread_local std::array<Recent, 4> recents;
         Recent& recent = recents[number_ % recents.size()];
         if (recent.number != number_) {
-            recent.window.half = 0;
+            recent.window = {};
+            recent.list = {0};
             recent.number = number_;
             recent.cell = &root_;
             recent.ordered = Ordered(elements_.count);
