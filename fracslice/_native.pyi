@@ -98,8 +98,18 @@ class Regions:
         half: float,
     ) -> None: ...
     @property
+    def points(self) -> Near:
+        """What compiled code asks about points."""
+    @property
+    def bricks(self) -> Near:
+        """What it asks about the points of a brick, of which the corners come first."""
+
+class Near:
+    """Functions that compiled code calls."""
+
+    @property
     def address(self) -> int:
-        """Where compiled code finds the functions to call."""
+        """Where they are."""
 
 class Sides:
     """Six sides of the object within a box, proven by free balls: -x, -y, -z, x, y and z.

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from .linker import Linked
 from .regions import Region
 
 if TYPE_CHECKING:
+    from .._native import Regions
     from .node import Node
 
 
@@ -42,14 +43,22 @@ def object_code(program: Program, bits: int, width: int, loops: Sequence[Loop]) 
     return Kept(cache_folder()).cached(name, compiled)  # incomplete code would crash the process
 
 
-def parameters(linked: Linked, dtype: np.dtype | str) -> np.ndarray:
-    """Return the parameters P of a linked scene, with the addresses of what is in memory."""
-    regions = ((place, in_memory(region)) for place, region in linked.regions)
+def parameters(
+    linked: Linked, dtype: np.dtype | str, loop: Literal["points", "bricks"] = "points"
+) -> np.ndarray:
+    """Return the parameters P of a linked scene, with the addresses of what is in memory.
+
+    `loop`: what asks for the elements of long unions, "bricks" or anything else.
+    """
+    regions = (
+        (place, InMemory(int(region.digest[:16], 16), getattr(regions_of(region), loop)))
+        for place, region in linked.regions
+    )
     return constant(linked.parameters, dtype, (*linked.held, *regions))
 
 
 @lru_cache(maxsize=8)
-def in_memory(region: Region) -> InMemory:
+def regions_of(region: Region) -> Regions:
     """Return a long union as native code knows it; kernels with the same one share it."""
     from .._native import Regions
 
@@ -57,7 +66,7 @@ def in_memory(region: Region) -> InMemory:
     loop = load_functions(region.program, 64, width, (points,))["points"]
     numbers = constant(region.numbers.ravel(), "float64", region.held).reshape(region.numbers.shape)
     place = region.smooth, region.lipschitz, region.centre, region.half
-    return InMemory(int(region.digest[:16], 16), Regions(loop, numbers, width, *place))
+    return Regions(loop, numbers, width, *place)
 
 
 BATCH = 1 << 10
@@ -85,10 +94,16 @@ class CpuKernel(Kernel):
     def __init__(self, linked: Linked, precision: Precision = "float32") -> None:
         self.dtype = np.dtype(precision)
         self.width = lane_count(self.dtype.itemsize * 8)
-        functions = load_functions(linked.program, self.dtype.itemsize * 8, self.width, (points, bricks))
+        self._parameters = self._of_bricks = parameters(linked, precision)
+        loop, offsets = bricks, np.indices((8, 8, 8)).reshape(3, 512)
+        if linked.regions:  # corners come first, which tell a long union where a brick lies
+            self._of_bricks = parameters(linked, precision, "bricks")
+            corners = offsets[:, np.isin(offsets, (0, 7)).all(0)]
+            offsets = np.hstack([np.resize(corners.T, (self.width, 3)).T, offsets])
+            loop = bricks.fix(ahead=self.width)
+        functions = load_functions(linked.program, self.dtype.itemsize * 8, self.width, (points, loop))
         self._points, self._bricks = functions["points"], functions["bricks"]
-        self._parameters = parameters(linked, precision)
-        self._offsets = constant(np.indices((8, 8, 8)).reshape(3, 512), self.dtype)
+        self._offsets = constant(offsets, self.dtype)
 
     @property
     def entry(self) -> tuple[CompiledFunction, np.ndarray]:
@@ -110,7 +125,7 @@ class CpuKernel(Kernel):
         self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray
     ) -> None:
         assert corners.shape == (len(out), 3) and out.shape == (len(corners), 512)
-        self._bricks(self._parameters, *origin, voxel, *self._offsets, corners, out, len(corners))
+        self._bricks(self._of_bricks, *origin, voxel, *self._offsets, corners, out, len(corners))
 
 
 _kernel = lru_cache(maxsize=32)(CpuKernel)

@@ -7,7 +7,7 @@ import pytest
 
 from fracslice import render
 from fracslice.fields import linker
-from fracslice.fields.cpu import CpuKernel, compile_scene, in_memory
+from fracslice.fields.cpu import CpuKernel, compile_scene, regions_of
 from fracslice.fields.devices import cells, reference
 from fracslice.formulas import (
     Node,
@@ -16,6 +16,7 @@ from fracslice.formulas import (
     intersection,
     julia,
     material,
+    repeat,
     shell,
     sphere,
     torus,
@@ -56,6 +57,8 @@ SCENES = {
     "two": intersection(union(*elements(64, sphere())), union(*elements(64, box()))),
     "seams": union(*elements(200, sphere()), smooth=0.05),
     "seams of three kinds": shell(union(*elements(150, *KINDS), smooth=0.1), thickness=0.02),
+    "turned": transform(union(*elements(100, sphere())), rotate=(1, 2, 3, 50)),
+    "torn": repeat(union(*elements(100, sphere())), period=(1.1, 2.1, 2.1), count=(2, 1, 1)),
     "wide seams": union(*elements(60, *KINDS), smooth=1.0),
 }
 PRECISIONS = pytest.mark.parametrize("precision", ["float32", "float64"])
@@ -111,7 +114,7 @@ def test_pictures_are_those_of_all_elements(monkeypatch) -> None:  # type: ignor
 def test_regions_of_equal_unions_are_one() -> None:
     """So that samples, roots and pictures share what is known."""
     one, other = (union(*[sphere(radius=0.5)] * 40, smooth=0.1).linked for _ in range(2))
-    assert in_memory(one.regions[0][1]) is in_memory(other.regions[0][1])
+    assert regions_of(one.regions[0][1]) is regions_of(other.regions[0][1])
 
 
 def test_which_unions_are_looked_at_by_region() -> None:

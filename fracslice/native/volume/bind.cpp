@@ -135,14 +135,15 @@ class RegionsOfUnion {
           regions_({reinterpret_cast<Elements::Points>(nb::cast<uintptr_t>(points.attr("address"))), numbers.data(), numbers.shape(0),
                     numbers.shape(1), std::max<size_t>(width, 1), smooth, lipschitz},
                    centre, half),
-          near_(entry_of(regions_)) {}
-    uintptr_t address() const { return reinterpret_cast<uintptr_t>(&near_); }
+          of_points_(near_points_of(regions_)), of_bricks_(near_bricks_of(regions_)) {}
+    const Near& of_points() const { return of_points_; }
+    const Near& of_bricks() const { return of_bricks_; }
 
   private:
     nb::object points_;
     Numbers numbers_;
     Regions regions_;
-    Near near_;
+    Near of_points_, of_bricks_;
 };
 
 }  // namespace
@@ -152,7 +153,9 @@ void bind_extent(nb::module_& module) {
     nb::class_<RegionsOfUnion>(module, "Regions")
         .def(nb::init<nb::object, const Numbers&, size_t, double, double, const Point&, double>(), "points"_a, "numbers"_a, "width"_a,
              "smooth"_a, "lipschitz"_a, "centre"_a, "half"_a)
-        .def_prop_ro("address", &RegionsOfUnion::address);
+        .def_prop_ro("points", &RegionsOfUnion::of_points)
+        .def_prop_ro("bricks", &RegionsOfUnion::of_bricks);
+    nb::class_<Near>(module, "Near").def_prop_ro("address", [](const Near& near) { return reinterpret_cast<uintptr_t>(&near); });
     nb::class_<Sides>(module, "Sides")
         .def(nb::init<nb::object, nb::object, double, bool, const Point&, const Point&, int>(), "sign"_a, "conservative"_a,
              "lipschitz"_a, "far"_a, "lo"_a, "hi"_a, "threads"_a = 0)

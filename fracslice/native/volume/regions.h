@@ -74,21 +74,9 @@ class Regions {
     template <class Real>
     const int32_t* at_points(const Real* points, size_t count) const {
         Recent& recent = recent_of_thread();
-        if (recent.window.spans(points, count)) return recent.list.data();
-        Point lo, hi;
-        for (size_t axis = 0; axis < 3; ++axis) {
-            const auto [least, most] = std::minmax_element(points + axis * count, points + (axis + 1) * count);
-            lo[axis] = double(*least), hi[axis] = double(*most);
-        }
-        const Cell* cell = leaf(lo, *recent.cell);
-        const double extent = std::max({hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]});
-        if (cell != &root_ && extent < kWide * cell->half && look_around(lo, hi, extent, cell->half, recent) &&
-            recent.window.spans(points, count)) {  // not so where least and most are those of numbers that are none
-            recent.cell = cell;
-            return recent.list.data();
-        }
-        recent.window = {};
+        if (recent.window.spans(points, count)) return recent.answer;
         recent.found.clear();
+        const Cell* cell = recent.cell;
         for (size_t i = 0; i < count; ++i) {
             const Point p{double(points[i]), double(points[count + i]), double(points[2 * count + i])};
             if (std::isnan(p[0] + p[1] + p[2])) continue;
@@ -96,14 +84,37 @@ class Regions {
             if (recent.found.empty() || recent.found.back() != cell) recent.found.push_back(cell);
         }
         recent.cell = cell;
-        return recent.join();
+        return recent.answered();
+    }
+
+    // The same for points of a brick, of which the corners come first.
+    template <class Real>
+    const int32_t* in_brick(const Real* points, size_t count) const {
+        Recent& recent = recent_of_thread();
+        if (recent.window.spans(points, count)) return recent.answer;
+        Window box;
+        double extent = 0;
+        for (size_t axis = 0; axis < 3; ++axis) {
+            const auto [least, most] = std::minmax_element(points + axis * count, points + (axis + 1) * count);
+            box.lo[axis] = double(*least), box.hi[axis] = double(*most);
+            extent = std::max(extent, box.hi[axis] - box.lo[axis]);
+        }
+        for (size_t axis = 0; axis < 3; ++axis) box.lo[axis] -= kMargin * extent, box.hi[axis] += kMargin * extent;
+        // Least and most may be those of numbers that are none; a brick may be torn apart, by a repeat.
+        if (!box.spans(points, count) || !root_.holds(box.lo) || !root_.holds(box.hi)) return at_points(points, count);
+        recent.cell = leaf(box.lo, *recent.cell);
+        if (extent > kWide * recent.cell->half) return at_points(points, count);
+        recent.found.clear();
+        gather(root_, box.lo, box.hi, kFine * extent, recent.found);
+        const int32_t* answer = recent.answered();
+        if (recent.found.size() > 1) recent.window = box;
+        return answer;
     }
 
     // The same for boxes: the least coordinates, then the largest ones.
     template <class Real>
     const int32_t* in_boxes(const Real* ends, size_t count) const {
         Recent& recent = recent_of_thread();
-        recent.window = {};
         recent.found.clear();
         for (size_t i = 0; i < count; ++i) {
             Point lo, hi;
@@ -117,16 +128,16 @@ class Regions {
                 recent.found.push_back(&root_);
             }
         }
-        return recent.join();
+        return recent.answered();
     }
 
   private:
     static constexpr size_t kFew = 16;   // elements of a leaf
     static constexpr int kDeepest = 10;  // levels of cells
-    static constexpr double kWide = 8;   // extent of points, in half sides of a leaf, up to which they have a window
-    static constexpr double kRoom = 1.1;  // side to which a window grows, in extents of points: a brick has one window
-    static constexpr double kMargin = 0.02;  // of a window around points, in their extents
     static constexpr int kStuck = 5;     // levels without use, after which a cell is not divided
+    static constexpr double kWide = 32;  // extent of a brick, in half sides of a leaf, up to which it is asked for as a whole
+    // Of a brick, in its extents: beyond its corners, as its points are rounded; cells that need not be divided.
+    static constexpr double kMargin = 0.02, kFine = 0.5;
 
     struct Cell {
         Point centre{};
@@ -142,7 +153,7 @@ class Regions {
         bool is_leaf() const { return level == kDeepest || list.size() <= kFew + 1 || stuck == kStuck; }
     };
 
-    // A box around what is asked, and what is asked next near by; at first nothing.
+    // A box; at first of nothing.
     struct Window {
         Point lo{1, 1, 1}, hi{-1, -1, -1};
 
@@ -156,65 +167,55 @@ class Regions {
             }
             return !outside;
         }
-        // Grows to hold a box: towards it, at once by as much as its side may be; false if that is too little.
-        bool grow(const Point& least, const Point& most, double side) {
-            if (lo[0] > hi[0]) return false;
-            Window grown = *this;
-            for (size_t axis = 0; axis < 3; ++axis) {
-                const double low = std::min(lo[axis], least[axis]), high = std::max(hi[axis], most[axis]);
-                if (high - low > side) return false;
-                grown.lo[axis] = low < lo[axis] ? high - side : low;
-                grown.hi[axis] = high > hi[axis] ? low + side : high;
-            }
-            *this = grown;
-            return true;
-        }
     };
 
     // What a thread asked last.
     struct Recent {
         uint64_t number = 0;
-        const Cell* cell = nullptr;
-        Window window;
-        std::vector<int32_t> list;  // the number of elements, and these
-        std::vector<const Cell*> found;
+        const Cell* cell = nullptr;       // of a point
+        Window window;                    // where the answer holds
+        const int32_t* answer = nullptr;  // the number of elements, and these
+        std::vector<const Cell*> found, joined;
+        std::vector<int32_t> list;  // elements of the cells that are joined
         Ordered ordered{0};
 
-        // Lists the elements of the cells found.
-        const int32_t* join() {
+        // The elements of the cells found.
+        const int32_t* answered() {
+            window = {};
+            if (found.size() == 1) {
+                const Cell& cell = *found[0];
+                if (cell.above) {
+                    for (size_t axis = 0; axis < 3; ++axis) {
+                        window.lo[axis] = cell.centre[axis] - cell.half;
+                        window.hi[axis] = cell.centre[axis] + cell.half;
+                    }
+                }
+                return answer = cell.list.data();
+            }
             std::sort(found.begin(), found.end(), std::less<>());
             found.erase(std::unique(found.begin(), found.end()), found.end());
+            if (found != joined) join();
+            return answer = list.data();
+        }
+        void join() {
             list.assign(1, 0);
             for (const Cell* cell : found) {
                 for (size_t k = 1; k < cell->list.size(); ++k) ordered.insert(uint32_t(cell->list[k]));
             }
             ordered.take(list);
             list[0] = int32_t(list.size() - 1);
-            return list.data();
+            joined = found;
         }
     };
-
-    // Makes the window hold a box of an extent in a leaf of a half side: the room around few points is that of the leaf. False if it
-    // is not within the root.
-    bool look_around(const Point& lo, const Point& hi, double extent, double half, Recent& recent) const {
-        const double margin = 4 * extent < half ? half : kMargin * extent;
-        Point least, most;
-        for (size_t axis = 0; axis < 3; ++axis) least[axis] = lo[axis] - margin, most[axis] = hi[axis] + margin;
-        Window& window = recent.window;
-        if (!window.grow(least, most, kRoom * extent)) window = {least, most};
-        if (!root_.holds(window.lo) || !root_.holds(window.hi)) return false;
-        recent.found.clear();
-        gather(root_, window.lo, window.hi, std::max(extent, half), recent.found);
-        recent.join();
-        return true;
-    }
 
     Recent& recent_of_thread() const {
         thread_local std::array<Recent, 4> recents;
         Recent& recent = recents[number_ % recents.size()];
         if (recent.number != number_) {
             recent.window = {};
+            recent.joined.clear();
             recent.list = {0};
+            recent.answer = recent.list.data();
             recent.number = number_;
             recent.cell = &root_;
             recent.ordered = Ordered(elements_.count);
@@ -336,8 +337,8 @@ class Regions {
 
 // What `fracslice.expr.emitter` calls, by its place in memory: with this, and the rows of as many lanes.
 struct Near {
-    const int32_t* (*points_of_floats)(const Near*, const float*, size_t);
-    const int32_t* (*points_of_doubles)(const Near*, const double*, size_t);
+    const int32_t* (*floats)(const Near*, const float*, size_t);
+    const int32_t* (*doubles)(const Near*, const double*, size_t);
     const int32_t* (*boxes_of_floats)(const Near*, const float*, size_t);
     const int32_t* (*boxes_of_doubles)(const Near*, const double*, size_t);
     const Regions* regions;
@@ -349,12 +350,21 @@ const int32_t* near_points(const Near* near, const Real* rows, size_t count) {
 }
 
 template <class Real>
+const int32_t* near_brick(const Near* near, const Real* rows, size_t count) {
+    return near->regions->in_brick(rows, count);
+}
+
+template <class Real>
 const int32_t* near_boxes(const Near* near, const Real* rows, size_t count) {
     return near->regions->in_boxes(rows, count);
 }
 
-inline Near entry_of(const Regions& regions) {
+inline Near near_points_of(const Regions& regions) {
     return {&near_points<float>, &near_points<double>, &near_boxes<float>, &near_boxes<double>, &regions};
+}
+
+inline Near near_bricks_of(const Regions& regions) {
+    return {&near_brick<float>, &near_brick<double>, &near_boxes<float>, &near_boxes<double>, &regions};
 }
 
 }  // namespace fracslice::volume

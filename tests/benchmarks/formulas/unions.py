@@ -1,6 +1,7 @@
 """Time of bricks of a union, per sample, with the elements that matter there and with all.
 
-The bricks are those near the surface of overlapping balls, with sharp seams and with seams of 0.3 radii.
+The bricks are those near the surface of overlapping balls, with sharp seams and with seams of 0.3 radii, and
+of these turned about no axis of the grid.
 Ratios of the shortest of interleaved runs on one thread.
 """
 
@@ -8,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
+from itertools import product
 
 import numpy as np
 
@@ -22,12 +24,12 @@ SMALLEST = {"counts": (40,), "bricks": 20}
 VOXELS = 128
 
 
-def balls(count: int, seam: float) -> Node:
-    """Balls at random places, which overlap; `seam`: its width in radii."""
+def balls(count: int, seam: float, turn: float) -> Node:
+    """Balls at random places, which overlap; `seam`: its width in radii; `turn`: in degrees."""
     rng, radius = np.random.default_rng(0), 1.2 * count ** (-1 / 3)
     places = rng.uniform(-1, 1, (count, 3)).tolist()
     parts = (transform(sphere(radius=radius), translate=tuple(place)) for place in places)
-    return union(*parts, smooth=seam * radius)
+    return transform(union(*parts, smooth=seam * radius), rotate=(1, 2, 3, turn))
 
 
 def corners(root: Node, most: int) -> np.ndarray:
@@ -43,10 +45,11 @@ def rows(
     run: Run,
     counts: tuple[int, ...] = (10, 100, 1000, 10000),
     seams: tuple[float, ...] = (0, 0.3),
+    turns: tuple[float, ...] = (0, 50),
     bricks: int = 200,
 ) -> Iterator[Row]:
-    for count, seam in ((count, seam) for seam in seams for count in counts):
-        root = balls(count, seam)
+    for turn, seam, count in product(turns, seams, counts):
+        root = balls(count, seam, turn)
         at = corners(root, bricks)
         out = np.empty((len(at), 512), np.float32)
         kernels = {"near": compile_scene(root), "all": CpuKernel(link_whole(root))}
@@ -54,7 +57,7 @@ def rows(
         spent = run.interleaved(acts)
         near, every = (spent.spread(k, "cpu_s").min for k in acts)
         yield {
-            "": f"{count} balls, {'smooth' if seam else 'sharp'}",
+            "": f"{count} balls, {'smooth' if seam else 'sharp'}{', turned' if turn else ''}",
             "all / near": every / near,
             "near, million samples/s": 1e-6 * out.size / near,
         }
