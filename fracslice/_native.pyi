@@ -66,48 +66,50 @@ Entry = tuple[CompiledFunction, NDArray[Any]] | Callable[[NDArray[float64], NDAr
 [1, n] to be written.
 """
 
-Listed = tuple[CompiledFunction, NDArray[Any], Sequence[tuple[int, ...]]]
-"""Loop `expr.loops.points`, its P, and of each list the index of the number of elements, this number, and the
-count of numbers of an element.
-"""
-
 class Regions:
-    """Loops over a field whose P ends with lists of the elements of a union: cells know those near to them.
+    """Elements of a long union that matter near a point, for compiled code.
 
     Parameters
     ----------
-    whole : Listed
-        Field.
-    bricks : CompiledFunction
-        Loop `expr.loops.bricks` over it.
-    alone : Listed
-        Field of the union alone.
+    points : CompiledFunction
+        Loop `expr.loops.points` in float64 over the field of one element.
+    numbers : ndarray of float64, shape (n, size)
+        P of each element.
+    width : int
+        Lanes of the loop.
+    smooth : float
+        Width of the seams.
     lipschitz : float
-        Lipschitz constant of `alone`, with any of the elements.
+        Lipschitz constant of the union.
     centre : tuple of float
         Centre of a cube; points outside see all elements.
     half : float
         Half side of the cube.
-    width : int
-        Lanes of the loops.
     """
 
     def __init__(
         self,
-        whole: Listed,
-        bricks: CompiledFunction,
-        alone: Listed,
+        points: CompiledFunction,
+        numbers: NDArray[float64],
+        width: int,
+        smooth: float,
         lipschitz: float,
         centre: tuple[float, ...],
         half: float,
-        width: int,
     ) -> None: ...
     @property
-    def address(self) -> int:
-        """What takes the place of P in the loops: the words of this address."""
+    def points(self) -> Near:
+        """What compiled code asks about points."""
+    @property
+    def bricks(self) -> Near:
+        """What it asks about the points of a brick, of which the corners come first."""
 
-    def get_function_address(self, name: str) -> int:
-        """Return the address of the loop "points" or "bricks" over the regions."""
+class Near:
+    """Functions that compiled code calls."""
+
+    @property
+    def address(self) -> int:
+        """Where they are."""
 
 class Sides:
     """Six sides of the object within a box, proven by free balls: -x, -y, -z, x, y and z.

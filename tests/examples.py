@@ -6,12 +6,15 @@ from collections.abc import Collection, Iterable
 from functools import reduce
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import matplotlib
 import pytest
 
 from fracslice.common.parameters import Number
+from fracslice.fields import linker
 from fracslice.fields.definitions import Definition, formula
+from fracslice.fields.linker import Linked
 from fracslice.formulas import (
     Formula,
     Node,
@@ -314,3 +317,11 @@ def stamped(cases: Iterable[Any], often: Collection[Any] = REPRESENTATIVES) -> l
     """Cases of a test: those of `often` in every run, the others in `make nightly`."""
     values = ((case, case if isinstance(case, tuple) else (case,)) for case in cases)
     return [case if case in often else pytest.param(*of, marks=pytest.mark.nightly) for case, of in values]
+
+
+def link_whole(root: Node) -> Linked:
+    """Link a scene whose long unions ask all elements."""
+    with patch.object(linker, "is_long", return_value=False):
+        linked = linker.link(root)
+    assert not linked.regions
+    return linked

@@ -110,8 +110,12 @@ def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def dot(a: np.ndarray, b: np.ndarray) -> float:
     """Inner product of two vectors of equal length."""
+    return _dot(a.tolist(), b.tolist())
+
+
+def _dot(a: list[float], b: list[float]) -> float:
     total = 0.0
-    for x, y in zip(a.tolist(), b.tolist(), strict=True):
+    for x, y in zip(a, b, strict=True):
         total += x * y
     return total
 
@@ -139,24 +143,24 @@ def stretches(matrix: np.ndarray) -> np.ndarray:
     One-sided Jacobi rotations make the columns orthogonal (Hestenes 1958, "Inversion of matrices by
     biorthogonalization and related results").
     """
-    columns = np.array(matrix, float).T.copy()
+    columns = np.array(matrix, float).T.tolist()
     for _ in range(SWEEPS):
         turned = False
         for p, q in ((0, 1), (0, 2), (1, 2)):
-            a, b = dot(columns[p], columns[p]), dot(columns[q], columns[q])
-            both = dot(columns[p], columns[q])
+            one, other = columns[p], columns[q]
+            a, b, both = _dot(one, one), _dot(other, other), _dot(one, other)
             if abs(both) <= SMALL * math.sqrt(a * b):
                 continue
             half = (b - a) / (2 * both)
             tangent = math.copysign(1 / (abs(half) + math.sqrt(1 + half * half)), half)
             cosine = 1 / math.sqrt(1 + tangent * tangent)
             sine = cosine * tangent
-            one, other = columns[p], columns[q]
-            columns[p], columns[q] = cosine * one - sine * other, sine * one + cosine * other
+            columns[p] = [cosine * x - sine * y for x, y in zip(one, other, strict=True)]
+            columns[q] = [sine * x + cosine * y for x, y in zip(one, other, strict=True)]
             turned = True
         if not turned:
             break
-    return np.sort([length(column) for column in columns])[::-1]
+    return np.sort([math.sqrt(_dot(column, column)) for column in columns])[::-1]
 
 
 def rotation(rotate: Sequence[float]) -> np.ndarray:
@@ -173,7 +177,8 @@ def affine(values: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
 
     Returns float64.
     """
-    linear = np.diag(np.broadcast_to(np.array(values["scale"]), 3))
+    linear = np.zeros((3, 3))
+    linear.flat[::4] = values["scale"]
     if values["rotate"]:
         linear = product(rotation(values["rotate"]), linear)
     offset = np.array(values["translate"])

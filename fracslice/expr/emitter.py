@@ -265,29 +265,56 @@ class SpecialIntrinsics:
         """Emit `outline_distance`."""
         return self.distance(outline, x, y)
 
+    def intrinsic_near(self, x: Value, y: Value, z: Value, place: Value) -> Any:
+        """Emit a question for the elements of a long union that matter at all lanes: the address of their
+        number and of these, int32.
+        """
+        address, point = self.address_of(place), self.numbers(x, y, z)
+        cells = isinstance(point[0], Interval)
+        ends = [v.lo for v in point] + [v.hi for v in point] if cells else point
+        found = ir.IntType(32).as_pointer()
+        return self.asked(address, 2 * cells, self.rows(ends), found)
+
     def distance(self, place: Value, *at: Value) -> Value:
         """Emit a question to the native code at an address, given as words, about all lanes."""
+        address, point = self.address_of(place), self.numbers(*at)
+        if isinstance(point[0], Interval):
+            return enclosed(lambda *middle: self.distance_at(address, middle), *point)
+        return self.distance_at(address, point)
+
+    def distance_at(self, address: Any, point: Sequence[Vec]) -> Vec:
+        """Emit the call of a function of `native/mesh/distances.h`: values at the points of all lanes."""
+        rows, result = self.rows(point), self.rows([None])
+        self.asked(address, 0, rows, ir.VoidType(), result)
+        return self.intrinsic_load(result, ir.Constant(WHOLE, 0))
+
+    def address_of(self, place: Value) -> Any:
+        """Emit the address that some words make."""
         words = [number(self.builder, word, WHOLE) for word in place]
         shifted = (self.builder.shl(word, ir.Constant(WHOLE, 16 * k)) for k, word in enumerate(words))
-        address, point = reduce(self.builder.or_, shifted), self.numbers(*at)
-        if isinstance(point[0], Interval):
-            return enclosed(lambda *middle: self.asked(address, middle), *point)
-        return self.asked(address, point)
+        return reduce(self.builder.or_, shifted)
 
-    def asked(self, address: Any, point: Sequence[Vec]) -> Vec:
-        """Emit the call of a function of `native/mesh/distances.h`: values at the points of all lanes."""
-        real, size, builder = self.lanes.scalar, self.lanes.width, self.builder
+    def rows(self, values: Sequence[Vec | None]) -> Any:
+        """Emit memory for rows of lanes, with some values."""
+        size, builder = self.lanes.width, self.builder
         with builder.goto_entry_block():  # in a loop, the stack would grow
-            rows = builder.alloca(real, (len(point) + 1) * size)
+            rows = builder.alloca(self.lanes.scalar, len(values) * size)
         rows.align = 64
-        for k, coordinate in enumerate(point):
-            self.intrinsic_store(rows, ir.Constant(WHOLE, k * size), coordinate)
-        result, place = builder.gep(rows, [ir.Constant(WHOLE, len(point) * size)]), ir.IntType(8).as_pointer()
-        kind = ir.FunctionType(ir.VoidType(), [place, rows.type, rows.type, WHOLE]).as_pointer()
+        for k, value in enumerate(values):
+            if value is not None:
+                self.intrinsic_store(rows, ir.Constant(WHOLE, k * size), value)
+        return rows
+
+    def asked(self, address: Any, first: int, rows: Any, result: ir.Type, *into: Any) -> Any:
+        """Emit the call of native code by the table of functions at an address: the one of floats, whose
+        number is `first`, or that of doubles, which follows.
+        """
+        builder, place = self.builder, ir.IntType(8).as_pointer()
+        given = [builder.inttoptr(address, place), rows, *into, ir.Constant(WHOLE, self.lanes.width)]
+        kind = ir.FunctionType(result, [value.type for value in given]).as_pointer()
         entries = builder.inttoptr(address, kind.as_pointer())
-        function = builder.load(builder.gep(entries, [ir.Constant(WHOLE, self.lanes.bits // 64)]))
-        builder.call(function, [builder.inttoptr(address, place), rows, result, ir.Constant(WHOLE, size)])
-        return self.intrinsic_load(result, ir.Constant(WHOLE, 0))
+        at = builder.gep(entries, [ir.Constant(WHOLE, first + self.lanes.bits // 64)])
+        return builder.call(builder.load(at), given)
 
     def intrinsic_together(self) -> None:
         """Wait for the other threads of the warp."""
@@ -322,7 +349,7 @@ _COUNTS = {
         (1, ("any_of", "int", "lower", "upper", "truth")),
         (2, ("ratio", "atan2", "minimum", "maximum", "min", "max", "load", "around", "gather", "element")),
         (3, ("where", "store", "outline_distance", "set")),
-        (4, ("solid_distance",)),
+        (4, ("solid_distance", "near")),
     )
     for name in names
 }

@@ -16,6 +16,7 @@ the values on NumPy arrays and on intervals, the derivatives of steps, and the c
 | `call` | arguments | function, or its name | what the function returns |
 | `index` | none, or a number | number | counter of a loop |
 | `truth` | number | | whether it is not zero |
+| `near` | point, address in words | | the number of elements of a long union that matter there, and these |
 | names of Python's `operator` | one or two | | the operator's |
 | names of the vocabulary and of intrinsics | the function's | | the function's |
 """

@@ -197,7 +197,7 @@ def points(P, X, Y, Z, F, n):
 
 
 @loop("rxxxxrrrirn")
-def bricks(P, ox, oy, oz, h, IX, IY, IZ, corners, F, n):
+def bricks(P, ox, oy, oz, h, IX, IY, IZ, corners, F, n, ahead):
     """Evaluate the 512 samples of bricks, at ``(ox, oy, oz) + h * (corner + (IX, IY, IZ))``.
 
     Parameters
@@ -207,13 +207,15 @@ def bricks(P, ox, oy, oz, h, IX, IY, IZ, corners, F, n):
     ox, oy, oz, h
         Position of grid point (0, 0, 0), and grid spacing, scene units.
     IX, IY, IZ
-        Offsets of the samples from the corner, [512] each.
+        Offsets from the corner, [ahead + 512] each: of points that are asked first, then of the samples.
     corners
         Grid index of the first sample of each brick, int32 [n, 3].
     F
         Receives the values, [n, 512].
     n
         Number of bricks.
+    ahead
+        Number of points that are asked first, a multiple of WIDTH, constant; their values are not kept.
     """
     samples = 512 if WIDTH > 1 else 1  # of a round: a brick, or the one of a thread
     for first in shares(512 * n, samples):
@@ -222,15 +224,18 @@ def bricks(P, ox, oy, oz, h, IX, IY, IZ, corners, F, n):
         x0 = corners[3 * b]
         y0 = corners[3 * b + 1]
         z0 = corners[3 * b + 2]
-        for s in range(begin, begin + samples, WIDTH):
+        for s in range(begin - ahead, begin + samples, WIDTH):
             if WIDTH > 1:
-                ix, iy, iz = load(IX, s), load(IY, s), load(IZ, s)
+                ix, iy, iz = load(IX, s + ahead), load(IY, s + ahead), load(IZ, s + ahead)
             else:  # loads are what a thread waits for
                 ix, iy, iz = 1.0 * (s >> 6 & 7), 1.0 * (s >> 3 & 7), 1.0 * (s & 7)
             x = (ix + x0) * h + ox
             y = (iy + y0) * h + oy
             z = (iz + z0) * h + oz
-            store(F, 512 * b + s, field(x, y, z, P))
+            store(F, 512 * b + max(s, 0), field(x, y, z, P))
+
+
+bricks = bricks.fix(ahead=0)
 
 
 @loop("rrrrrrrn", points="interval")

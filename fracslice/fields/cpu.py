@@ -6,22 +6,24 @@ Loading it takes milliseconds. Its functions (`machine`) release the GIL, so pla
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from .._native import Regions
 from ..common.cache import Kept, cache_folder, key
 from ..expr.frontend import loop_function
 from ..expr.graph import Program
+from ..expr.language import InMemory
 from ..expr.loops import Loop, bricks, points
 from ..expr.runtime import REGISTERS, CompiledFunction, constant, host, lane_count, load_object, toolchain
 from .field import Kernel, Loops, Precision
 from .linker import Linked
+from .regions import Region
 
 if TYPE_CHECKING:
+    from .._native import Regions
     from .node import Node
 
 
@@ -39,6 +41,32 @@ def object_code(program: Program, bits: int, width: int, loops: Sequence[Loop]) 
         return compile_object(program, Target(bits, width, min(REGISTERS, width), *host()), loops)
 
     return Kept(cache_folder()).cached(name, compiled)  # incomplete code would crash the process
+
+
+def parameters(
+    linked: Linked, dtype: np.dtype | str, loop: Literal["points", "bricks"] = "points"
+) -> np.ndarray:
+    """Return the parameters P of a linked scene, with the addresses of what is in memory.
+
+    `loop`: what asks for the elements of long unions, "bricks" or anything else.
+    """
+    regions = (
+        (place, InMemory(int(region.digest[:16], 16), getattr(regions_of(region), loop)))
+        for place, region in linked.regions
+    )
+    return constant(linked.parameters, dtype, (*linked.held, *regions))
+
+
+@lru_cache(maxsize=8)
+def regions_of(region: Region) -> Regions:
+    """Return a long union as native code knows it; kernels with the same one share it."""
+    from .._native import Regions
+
+    width = lane_count(64)
+    loop = load_functions(region.program, 64, width, (points,))["points"]
+    numbers = constant(region.numbers.ravel(), "float64", region.held).reshape(region.numbers.shape)
+    place = region.smooth, region.lipschitz, region.centre, region.half
+    return Regions(loop, numbers, width, *place)
 
 
 BATCH = 1 << 10
@@ -63,30 +91,19 @@ class CpuKernel(Kernel):
         Lanes.
     """
 
-    def __init__(
-        self, linked: Linked, precision: Precision = "float32", region: Region | None = None
-    ) -> None:
+    def __init__(self, linked: Linked, precision: Precision = "float32") -> None:
         self.dtype = np.dtype(precision)
         self.width = lane_count(self.dtype.itemsize * 8)
-        functions = load_functions(linked.program, self.dtype.itemsize * 8, self.width, (points, bricks))
+        self._parameters = self._of_bricks = parameters(linked, precision)
+        loop, offsets = bricks, np.indices((8, 8, 8)).reshape(3, 512)
+        if linked.regions:  # corners come first, which tell a long union where a brick lies
+            self._of_bricks = parameters(linked, precision, "bricks")
+            corners = offsets[:, np.isin(offsets, (0, 7)).all(0)]
+            offsets = np.hstack([np.resize(corners.T, (self.width, 3)).T, offsets])
+            loop = bricks.fix(ahead=self.width)
+        functions = load_functions(linked.program, self.dtype.itemsize * 8, self.width, (points, loop))
         self._points, self._bricks = functions["points"], functions["bricks"]
-        self._parameters = constant(linked.parameters, self.dtype, linked.held)
-        self._offsets = constant(np.indices((8, 8, 8)).reshape(3, 512), self.dtype)
-        if region is not None:
-            alone = self if region.union is linked else CpuKernel(region.union, precision)
-            self._look_around(linked, region, alone)
-
-    def _look_around(self, linked: Linked, region: Region, alone: CpuKernel) -> None:
-        """Let the loops pass over elements of a union that are far from a point; see `Regions`."""
-        given = [
-            (kernel._points, kernel._parameters, [astuple(one) for one in lists])
-            for kernel, lists in ((self, linked.lists), (alone, region.union.lists))
-        ]
-        where = region.lipschitz, region.centre, region.half, self.width
-        regions = Regions(given[0], self._bricks, given[1], *where)
-        loops = (CompiledFunction(regions, loop, self.dtype) for loop in (points, bricks))
-        self._points, self._bricks = loops
-        self._parameters = constant(np.array([regions.address], np.uint64).view(self.dtype), self.dtype)
+        self._offsets = constant(offsets, self.dtype)
 
     @property
     def entry(self) -> tuple[CompiledFunction, np.ndarray]:
@@ -108,34 +125,7 @@ class CpuKernel(Kernel):
         self, corners: np.ndarray, origin: tuple[float, float, float], voxel: float, out: np.ndarray
     ) -> None:
         assert corners.shape == (len(out), 3) and out.shape == (len(corners), 512)
-        self._bricks(self._parameters, *origin, voxel, *self._offsets, corners, out, len(corners))
-
-
-@dataclass(frozen=True)
-class Region:
-    """Union in a scene, its Lipschitz constant, and a cube around it, scene units."""
-
-    union: Linked  # the union alone
-    lipschitz: float
-    centre: tuple[float, ...]
-    half: float
-
-    @classmethod
-    def of(cls, linked: Linked) -> Region | None:
-        """Region of a scene with a long union, or None; measured constants bound no element of it."""
-        if linked.union is None or sum(one.count for one in linked.lists) < LONG:
-            return None
-        bounds, union = linked.union.bounds, linked.union.linked
-        if not bounds.box.finite or bounds.exterior_only or bounds.measured or not union.lists:
-            return None
-        centre = tuple((a + b) / 2 for a, b in zip(bounds.box.lo, bounds.box.hi, strict=True))
-        return cls(union, bounds.lipschitz, centre, ROOM * max(bounds.box.size))
-
-
-LONG, ROOM = 32, 0.75
-"""Elements of a union from which on those near a point are looked for; half side of the cube, in which they
-are, per largest side of the solid.
-"""
+        self._bricks(self._of_bricks, *origin, voxel, *self._offsets, corners, out, len(corners))
 
 
 _kernel = lru_cache(maxsize=32)(CpuKernel)
@@ -161,7 +151,7 @@ def compile_scene(root: Node, precision: Precision = "float32") -> CpuKernel:
     KernelError
         If the scene cannot be linked or compiled.
     """
-    return _kernel(root.linked, precision, Region.of(root.linked))
+    return _kernel(root.linked, precision)
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,11 +175,11 @@ def compile_loops(linked: Linked, loops: tuple[Loop, ...], precision: Precision)
 
     `precision`: "float32" or "float64".
     """
-    parameters = constant(linked.parameters, precision, linked.held)
-    bits = parameters.dtype.itemsize * 8
+    placed = parameters(linked, precision)
+    bits = placed.dtype.itemsize * 8
     width = lane_count(bits)
     functions = load_functions(linked.program, bits, width, loops)
-    return Loops(width, BATCH, {name: CompiledLoop(f, parameters) for name, f in functions.items()})
+    return Loops(width, BATCH, {name: CompiledLoop(f, placed) for name, f in functions.items()})
 
 
 def load_functions(

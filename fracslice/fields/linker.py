@@ -13,11 +13,10 @@ operator is read with its child in the place of ``child``. Identities are omitte
 from __future__ import annotations
 
 import ast
-from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache, reduce
-from itertools import groupby, islice
+from functools import cached_property, lru_cache
+from itertools import groupby
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -26,7 +25,8 @@ from ..common.parameters import AUTO
 from ..errors import KernelError
 from ..expr.frontend import FormulaReader, formula
 from ..expr.graph import Entry, FlowGraph, Function, Program, Value, Width, Writer, identified, written
-from ..expr.language import CHILD, Fixed, InMemory, OfPoint, words
+from ..expr.language import CHILD, WORDS, Fixed, InMemory, OfPoint, words
+from .regions import Region, is_long
 
 if TYPE_CHECKING:
     from .node import Node
@@ -39,9 +39,6 @@ function, and the compile time of a large one grows with the number of its parts
 UNROLLED = 3
 """Elements of one structure that are unrolled; more become a loop."""
 
-MANY = 16
-"""Elements of a sharp union from which on they are listed in P, so that it may list fewer of them."""
-
 EMPTY = 1e30
 """Value of a union that lists no element."""
 
@@ -52,15 +49,6 @@ POINT = ("x", "y", "z")
 
 FIELD = "field"
 """Name of the field's function."""
-
-
-@dataclass(frozen=True)
-class ListInP:
-    """List of elements of one structure."""
-
-    header: int  # index in P of their number; the index of the first one's numbers follows
-    count: int
-    size: int  # numbers of an element
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,17 +63,14 @@ class Linked:
         Parameters P, float64 [n].
     held
         Arguments in memory, each with the index in P of its first word.
-    lists
-        Lists of the elements of a union, at the end of P, which may hold fewer of them.
-    union
-        Scene of this union alone, with the transforms around it, or None.
+    regions
+        Long unions, each with the index in P of the first word of its address.
     """
 
     program: Program
     parameters: np.ndarray
     held: tuple[tuple[int, InMemory], ...] = ()
-    lists: tuple[ListInP, ...] = ()
-    union: Node | None = None
+    regions: tuple[tuple[int, Region], ...] = ()
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Linked) and self._contents == other._contents
@@ -193,9 +178,7 @@ class Run:
 
     part: Subroutine  # function of the elements
     count: int  # number of elements
-    # offset from P0 of the first element's numbers; of those that are listed, of their number and their place
-    start: int
-    is_listed: bool = False  # true if the number of elements and their place are numbers in P
+    start: int  # offset from P0 of the first element's numbers
 
     def call(self, writer: Writer, point: Sequence[Value] = (), k: Value | None = None) -> Value:
         """Write the call of one element.
@@ -203,11 +186,19 @@ class Run:
         `point`: another one than x, y, z; `k`: index of the element.
         """
         names = writer.names
-        place = self.header(writer, 1) if self.is_listed else writer.add("add", names["P0"], self.start)
+        place = self.first(writer)
         if k is not None:
             place = writer.add("add", place, writer.add("mul", writer.constant(self.part.size), k))
         point = point or [names[name] for name in POINT]
         return writer.call(self.part.function, *point, names["P"], place)
+
+    def first(self, writer: Writer) -> Value:
+        """Write the index in P of the first element's numbers."""
+        return writer.add("add", writer.names["P0"], self.start)
+
+    def begin(self, writer: Writer) -> Value | None:
+        """Write the value of the first element; None if there may be none."""
+        return self.call(writer)
 
     def each(
         self, writer: Writer, begun: bool, changed: set[str], fold: Callable[[Run, Value | None], None]
@@ -226,28 +217,69 @@ class Run:
             fold(self, writer.names["i"])
             return True
 
-        end = self.header(writer, 0) if self.is_listed else writer.constant(self.count)
-        writer.counted("i", [writer.constant(int(begun)), end], changed, body, [])
+        limits = [writer.constant(int(begun)), writer.constant(self.count)]
+        writer.counted("i", limits, changed, body, [])
 
-    def header(self, writer: Writer, k: int) -> Value:
-        """Write the number of many elements (0) or the place of the first one (1)."""
+    @property
+    def is_loop(self) -> bool:
+        """True if its elements are not unrolled."""
+        return self.count > UNROLLED
+
+    @property
+    def taken(self) -> int:
+        """Entries of P that it takes from its start on."""
+        return self.count * self.part.size
+
+    @property
+    def about(self) -> str:
+        """Text of its place."""
+        return f"{self.count} {self.start} {self.part.size}"
+
+
+@dataclass(frozen=True)
+class LongRun(Run):
+    """Elements of a long union. In P stand the words of an address, where a compiled kernel asks for those
+    that matter (`regions`), then the index of the first one's numbers and the number of all.
+    """
+
+    def first(self, writer: Writer) -> Value:
+        return self._number(writer, WORDS)
+
+    def begin(self, writer: Writer) -> Value | None:
+        return None
+
+    def each(
+        self, writer: Writer, begun: bool, changed: set[str], fold: Callable[[Run, Value | None], None]
+    ) -> None:
+        names, width = writer.names, writer.width
+        near = None
+        if width.lanes and not width.on_gpu:
+            words = (self._number(writer, k) for k in range(WORDS))
+            near = writer.add("near", *(names[name] for name in POINT), writer.add("tuple", *words))
+
+        def body() -> bool:
+            k = writer.names["i"]
+            fold(self, writer.add("element", near, writer.add("add", k, 1)) if near else k)
+            return True
+
+        end = writer.add("element", near, 0) if near else self._number(writer, WORDS + 1)
+        writer.counted("i", [end], changed, body, [])
+
+    def _number(self, writer: Writer, k: int) -> Value:
         index = writer.add("add", writer.names["P0"], self.start + k)
         return writer.add("int", writer.add("element", writer.names["P"], index))
 
     @property
     def is_loop(self) -> bool:
-        """True if its elements are not unrolled."""
-        return self.is_listed or self.count > UNROLLED
+        return True
 
     @property
     def taken(self) -> int:
-        """Entries of P that it takes from its start on."""
-        return 2 if self.is_listed else self.count * self.part.size
+        return WORDS + 2
 
     @property
     def about(self) -> str:
-        """Text of its place."""
-        return f"{'listed' if self.is_listed else self.count} {self.start} {self.part.size}"
+        return f"long {self.start} {self.part.size}"
 
 
 class Dialect(Protocol):
@@ -260,8 +292,8 @@ class Dialect(Protocol):
 
     def arguments(self, node: Node) -> Arguments: ...
 
-    def lists(self, node: Node) -> bool:
-        """Return whether the elements of a node may be listed in P."""
+    def region(self, node: Node, program: Program, numbers: PartNumbers) -> Region:
+        """Return the region of a long union; `program`: of one element; `numbers`: those of all."""
 
     def order(self, node: Node, parts: Sequence[Subroutine]) -> Sequence[int]:
         """Return an order in which the children may be evaluated."""
@@ -272,33 +304,35 @@ class Dialect(Protocol):
 
 @dataclass
 class PartNumbers:
-    """Numbers of P, and lists of elements that come after them."""
+    """Numbers of P, and what is in memory; see `Linked`."""
 
     values: list[float] = field(default_factory=list)
-    held: list[tuple[int, InMemory]] = field(default_factory=list)  # see `Linked`
-    lists: list[ElementList] = field(default_factory=list)
+    held: list[tuple[int, InMemory]] = field(default_factory=list)
 
 
 @dataclass
-class ElementList:
-    """Elements of one structure: the index of their number, and their own numbers."""
+class LongUnion:
+    """Elements of a long union, whose numbers come after the other ones of P."""
 
-    header: int
-    count: int
-    is_open: bool  # see `_Tree.open_path`
-    numbers: PartNumbers = field(default_factory=PartNumbers)
+    header: int  # index in P of the first word of its address
+    region: Region
+    numbers: PartNumbers
 
 
 def link_tree(linker: Linker, root: Node, dialect: Dialect) -> Function:
     """Link a tree and append its numbers to P; return its function of x, y, z and P."""
     start = len(linker.parameters)
-    top = _Tree(linker, dialect).linked(dialect.kept(root)).function
+    return function_of(_Tree(linker, dialect).linked(dialect.kept(root)), start)
+
+
+def function_of(part: Subroutine, start: int) -> Function:
+    """Return the function of x, y, z and P of a part whose numbers begin at an index in P."""
 
     def write(writer: Writer) -> Value:
         given = [writer.names[name] for name in (*POINT, "P")]
-        return writer.call(top, *given, writer.constant(start))
+        return writer.call(part.function, *given, writer.constant(start))
 
-    return written("tree", (*POINT, "P"), identified("tree", top, start), write)
+    return written("tree", (*POINT, "P"), identified("tree", part.function, start), write)
 
 
 @dataclass
@@ -309,75 +343,72 @@ class _Tree:
     inside: dict[int, list[Node]] = field(default_factory=dict)
     given: dict[int, Arguments] = field(default_factory=dict)
     runs: dict[int, list[Run]] = field(default_factory=dict)
+    long: set[int] = field(default_factory=set)  # long unions that are in no other one
 
     def linked(self, root: Node) -> Subroutine:
-        order, stack = [], [root]
+        order, stack = [], [(root, False)]
+        within = set[int]()
         while stack:
-            node = stack.pop()
+            node, is_within = stack.pop()
             order.append(node)
-            self.inside[id(node)] = [self.dialect.kept(child) for child in node.fields]
-            stack += self.inside[id(node)]
+            inside = self.inside[id(node)] = [self.dialect.kept(child) for child in node.fields]
+            if is_within:
+                within.add(id(node))
+            elif is_long(node):
+                self.long.add(id(node))
+            stack += [(child, is_within or id(node) in self.long) for child in inside]
+        self.long -= within
         for node in reversed(order):
             self.parts[id(node)] = self.part(node)
-        *path, end = self.open_path(root)
-        self.append(root, self.linker.main, end)
-        if self.dialect.lists(end):
-            around = [node for node in reversed(path) if node.formula.kind != "csg"]
-            self.linker.union = reduce(lambda inner, node: node.changed((inner,)), around, end)
+        self.append(root, self.linker.main)
         return self.parts[id(root)]
 
-    def open_path(self, root: Node) -> list[Node]:
-        """Nodes down to the largest sharp union below operators that only grow with its value."""
-        path = [root]
-        while inside := self.inside[id(path[-1])]:
-            node = path[-1]
-            is_csg = node.formula.kind == "csg" and node.is_unordered
-            if self.dialect.lists(node) and len(inside) >= MANY:
-                break
-            if not is_csg and node.formula.name not in GROWING:
-                break
-            first = inside[:1] if node.formula.name == "difference" else inside
-            path.append(max(first, key=lambda child: len(self.inside[id(child)])))
-        return path
-
-    def append(self, root: Node, numbers: PartNumbers, union: Node | None = None) -> None:
-        """Append the numbers of a node and of its elements; listed ones go to a list of their own.
-
-        `union`: see `open_path`.
-        """
-        stack: list[Node | tuple[list[Node], bool]] = [root]
+    def append(self, root: Node, numbers: PartNumbers) -> None:
+        """Append the numbers of a node and of its elements; those of a long union come after all others."""
+        stack = [root]
         while stack:
             node = stack.pop()
-            if isinstance(node, tuple):
-                elements, is_open = node
-                listed = ElementList(len(numbers.values), len(elements), is_open)
-                numbers.lists.append(listed)
-                numbers.values += [float(len(elements)), 0.0]
-                for element in elements:
-                    self.append(element, listed.numbers)
-                continue
             given, start = self.given[id(node)], len(numbers.values)
             numbers.held += [(start + place, memory) for place, memory in given.held]
             numbers.values += given.numbers
-            inside = iter(self.inside[id(node)])
-            after: list[Node | tuple[list[Node], bool]] = []
-            for run in self.runs[id(node)]:
-                group = list(islice(inside, run.count))
-                after += [(group, node is union)] if run.is_listed else group
-            stack += reversed(after)
+            if id(node) in self.long:
+                self.append_long(node, numbers)
+            else:
+                stack += reversed(self.inside[id(node)])
+
+    def append_long(self, node: Node, numbers: PartNumbers) -> None:
+        """Append what stands in P of a long union, and keep the numbers of its elements."""
+        elements, size = self.inside[id(node)], self.runs[id(node)][0].part.size
+        kinds, own = self.kinds(node), PartNumbers()
+        for k, element in enumerate(elements, 1):
+            if len(kinds) > 1:
+                own.values.append(float(kinds.index(self.parts[id(element)])))
+            self.append(element, own)
+            own.values += [0.0] * (k * size - len(own.values))
+        region = self.dialect.region(node, self.alone(node), own)
+        self.linker.unions.append(LongUnion(len(numbers.values), region, own))
+        numbers.values += [*[0.0] * (WORDS + 1), float(len(elements))]
+
+    def kinds(self, node: Node) -> list[Subroutine]:
+        """Functions of the elements of a long union, each once."""
+        return list(dict.fromkeys(self.parts[id(element)] for element in self.inside[id(node)]))
+
+    def alone(self, node: Node) -> Program:
+        """Program of one element of a long union, whose numbers are P."""
+        first = {self.parts[id(element)]: element for element in reversed(self.inside[id(node)])}
+        order, stack = [], [*first.values()]
+        while stack:
+            order.append(self.parts[id(stack[-1])].function)
+            stack += self.inside[id(stack.pop())]
+        element = self.runs[id(node)][0].part
+        parts = tuple(dict.fromkeys([*reversed(order), element.function]))
+        called = self.linker.called.intersection(parts)
+        return Program({FIELD: function_of(element, 0)}, parts, frozenset(called))
 
     def part(self, node: Node) -> Subroutine:
         """Function of a node whose children are linked."""
         given = self.given[id(node)] = self.dialect.arguments(node)
-        children = self.inside[id(node)]
-        places = self.dialect.order(node, [self.parts[id(child)] for child in children])
-        children = self.inside[id(node)] = [children[k] for k in places]
-        runs, size = [], len(given.numbers)
-        listed = self.dialect.lists(node) and len(children) >= MANY
-        for part, group in groupby(self.parts[id(child)] for child in children):
-            runs.append(Run(part, len(list(group)), size, listed))
-            size += runs[-1].taken
-        self.runs[id(node)] = runs
+        runs = self.runs[id(node)] = self.runs_of(node, len(given.numbers))
         key = (
             given.function,
             given.fixed,
@@ -386,9 +417,34 @@ class _Tree:
         )
 
         def make(name: str) -> Subroutine:
+            size = len(given.numbers) + sum(run.taken for run in runs)
             return Subroutine(self.dialect.write(name, node, given, runs), size, self.weight(runs))
 
         return self.linker.part(self.dialect.prefix, key, make)
+
+    def runs_of(self, node: Node, start: int) -> list[Run]:
+        """Runs of the elements of a node, whose numbers begin at an offset from P0."""
+        children = self.inside[id(node)]
+        if id(node) in self.long:
+            return [LongRun(self.any_of(self.kinds(node)), len(children), start)]
+        places = self.dialect.order(node, [self.parts[id(child)] for child in children])
+        children = self.inside[id(node)] = [children[k] for k in places]
+        runs = list[Run]()
+        for part, group in groupby(self.parts[id(child)] for child in children):
+            runs.append(Run(part, len(list(group)), start))
+            start += runs[-1].taken
+        return runs
+
+    def any_of(self, kinds: Sequence[Subroutine]) -> Subroutine:
+        """Function of elements of several kinds, of which the first number is the kind."""
+        if len(kinds) == 1:
+            return kinds[0]
+
+        def make(name: str) -> Subroutine:
+            size = 1 + max(part.size for part in kinds)
+            return Subroutine(one_of(name, kinds), size, self.weight([Run(part, 1, 1) for part in kinds]))
+
+        return self.linker.part(self.dialect.prefix, ("one of", *(part.function for part in kinds)), make)
 
     def weight(self, runs: Sequence[Run]) -> int:
         """Weight of a function with these calls. If it is too large, the heaviest parts are called, not
@@ -408,12 +464,29 @@ class _Tree:
         return 1 + sum(held.values())
 
 
-GROWING = frozenset({"transform", "material"})
-"""Domain operators whose value grows with that of their element."""
-
-
 LEADING = {"shape": 3, "csg": 2, "domain": 4}
 """Number of leading arguments (points, values or child) by kind of formula."""
+
+
+def one_of(name: str, kinds: Sequence[Subroutine]) -> Function:
+    """Return the function of a part that is of the kind, of several, that its first number is."""
+
+    def write(writer: Writer) -> Value:
+        names = writer.names
+        kind = writer.add("int", writer.add("element", names["P"], names["P0"]))
+        given = [*(names[name] for name in POINT), names["P"], writer.add("add", names["P0"], 1)]
+        ends = []
+        for k, part in enumerate(kinds):
+            others = None
+            if k < len(kinds) - 1:
+                writer.block, others = writer.fork(writer.add("eq", kind, k))
+            value = writer.call(part.function, *given)
+            ends.append((writer.block, {"f": value}))
+            writer.block = others or writer.block
+        writer.joined(ends)
+        return writer.names["f"]
+
+    return written(name, PART, identified("one of", *(part.function for part in kinds)), write)
 
 
 def part_function(
@@ -448,9 +521,10 @@ class FieldDialect:
             )
         return arguments(node, leading(node))
 
-    def lists(self, node: Node) -> bool:
-        """Return True for a sharp union."""
-        return node.formula.name == "union" and node.is_unordered
+    def region(self, node: Node, program: Program, numbers: PartNumbers) -> Region:
+        """Return the region of a long union; see `Dialect.region`."""
+        values = np.array(numbers.values).reshape(len(node.children), -1)
+        return Region.of(node, program, values, numbers.held)
 
     def order(self, node: Node, parts: Sequence[Subroutine]) -> Sequence[int]:
         """Group elements of the same structure where their order changes no bit of the result."""
@@ -485,12 +559,12 @@ class FieldDialect:
                 names_now = writer.names
                 names_now["f"] = writer.call(given.read, names_now["f"], other, *given.load(writer))
 
-            listed = runs[0].is_listed
-            names["f"] = writer.constant(EMPTY) if listed else runs[0].call(writer)
+            first = runs[0].begin(writer)
+            names["f"] = first or writer.constant(EMPTY)
             if sum(run.count for run in runs) == 1:
                 names["f"] = writer.call(given.read, names["f"], *given.load(writer))
             for number, run in enumerate(runs):
-                run.each(writer, number == 0 and not listed, {"f"}, fold)
+                run.each(writer, number == 0 and bool(first), {"f"}, fold)
             return writer.names["f"]
 
         return part_function(name, given, runs, write, "csg")
@@ -583,7 +657,7 @@ class Linker:
     called: set[Function] = field(default_factory=set)  # those that are called, not inlined
     # arrays that stand behind the numbers in P, each with the index of the number that is its offset
     tables: list[tuple[int, np.ndarray]] = field(default_factory=list)
-    union: Node | None = None  # see `Linked`
+    unions: list[LongUnion] = field(default_factory=list)
     _parts: dict[Any, Subroutine] = field(default_factory=dict)
 
     def field(self, root: Node) -> None:
@@ -609,29 +683,20 @@ class Linker:
         return self.main.values
 
     def linked(self) -> Linked:
-        """Return what is collected: P is the numbers, then each array once, then the lists of elements."""
-        numbers, tail = self._numbers_and_arrays(), list[float]()
-        held, lists = [*self.main.held], list[ListInP]()
-        last = sorted(self.main.lists, key=lambda listed: listed.is_open)
-        waiting = deque[tuple[Any, int, ElementList]]((numbers, 0, listed) for listed in last)
-        while waiting:  # those of the open union are the last
-            values, base, listed = waiting.popleft()
-            place, own = len(numbers) + len(tail), listed.numbers
-            values[base + listed.header + 1] = place
-            held += [(place + index, memory) for index, memory in own.held]
-            waiting.extendleft((tail, len(tail), inner) for inner in reversed(own.lists))
-            tail += own.values
-            lists.append(ListInP(listed.header, listed.count, len(own.values) // listed.count))
-            if not listed.is_open:
-                lists.clear()
-        if len(numbers) + len(tail) > LARGEST:
-            raise KernelError(
-                f"a scene of {len(numbers) + len(tail):,} numbers: expected at most {LARGEST:,}"
-            )
-        numbers = np.concatenate([numbers, tail])
+        """Return what is collected: P is the numbers, then each array once, then those of long unions."""
+        numbers, held = self._numbers_and_arrays(), [*self.main.held]
+        tails, end = [numbers], len(numbers)
+        for union in self.unions:
+            numbers[union.header + WORDS] = end
+            held += [(end + place, memory) for place, memory in union.numbers.held]
+            tails.append(np.array(union.numbers.values))
+            end += len(tails[-1])
+        if end > LARGEST:
+            raise KernelError(f"a scene of {end:,} numbers: expected at most {LARGEST:,}")
         parts = tuple(part.function for part in self._parts.values())
         program = Program(dict(self.functions), parts, frozenset(self.called))
-        return Linked(program, numbers, tuple(held), tuple(lists), self.union if lists else None)
+        regions = tuple((union.header, union.region) for union in self.unions)
+        return Linked(program, np.concatenate(tails), tuple(held), regions)
 
     def _numbers_and_arrays(self) -> np.ndarray:
         """The numbers, then each array once, float64 [n]."""

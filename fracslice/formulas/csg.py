@@ -157,8 +157,8 @@ for _operator in SHARP:
 def union_bounds(node: Node) -> Box:
     sharp, smooth = reduce(Box.__or__, (c.bounds.box for c in node.children)), node["smooth"]
     seams = len(node.children) - 1
-    if not isinstance(smooth, Varying):
-        return sharp.grown(seams * smooth / 4)
+    if not isinstance(smooth, Varying):  # seams end a width below the lowest element, however many
+        return sharp.grown(min(seams / 4, 1.0) * smooth)
     # Where seams reach beyond the box, they are wider by the slope times the way to a corner.
     width, wider = max(smooth.most(sharp), 0.0), seams * math.sqrt(3) * smooth.slope / 4
     return sharp.grown(seams * width / 4 / (1 - wider) if wider < 1 else math.inf)

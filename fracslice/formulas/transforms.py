@@ -57,12 +57,16 @@ def transform_check(node: Node) -> None:
 @transform.identity
 def transform_identity(node: Node) -> bool:
     linear, offset = affine(node.values)
-    return bool((linear == np.eye(3)).all() and not offset.any())
+    return _is_identity(linear) and not offset.any()
 
 
 @transform.select
 def transform_select(node: Node):  # type: ignore[no-untyped-def]
-    return translate_node if (affine(node.values)[0] == np.eye(3)).all() else transform.function
+    return translate_node if _is_identity(affine(node.values)[0]) else transform.function
+
+
+def _is_identity(linear: np.ndarray) -> bool:
+    return bool(linear.tolist() == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 @transform.arguments

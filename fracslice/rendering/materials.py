@@ -21,13 +21,15 @@ from numpy.typing import NDArray
 
 from ..common.arrays import from_linear
 from ..expr.frontend import FormulaReader, formula, kernel_function, source_function
-from ..expr.graph import ON_ARRAYS, Entry, Evaluator, FlowGraph, Function, Value, Writer, identified
+from ..expr.graph import ON_ARRAYS, Entry, Evaluator, FlowGraph, Function, Program, Value, Writer, identified
 from ..expr.vocabulary import absolute, atan2, minimum, sqrt, where
 from ..fields.linker import (
+    EMPTY,
     Arguments,
     DomainReader,
     FieldDialect,
     Linker,
+    PartNumbers,
     Run,
     Subroutine,
     append_numbers,
@@ -37,6 +39,7 @@ from ..fields.linker import (
     link_tree,
     part_function,
 )
+from ..fields.regions import Region
 from ..fields.registry import Fixed, Node
 from ..formulas.material import material, stops
 from ..work import Work, chunks
@@ -273,9 +276,10 @@ class TraceDialect(FieldDialect):
         passed = append_numbers(float(self.materials[id(node)]), paint)
         return Arguments(node.function, (), (passed,), tuple(paint))
 
-    def lists(self, node: Node) -> bool:
-        """Return False: the first element's paint is that of a union; see `Dialect.lists`."""
-        return False
+    def region(self, node: Node, program: Program, numbers: PartNumbers) -> Region:
+        """Return the region of a long union, which the field's own tree has; see `Dialect.region`."""
+        ((_, region),) = node.linked.regions
+        return region
 
     def order(self, node: Node, parts: Sequence[Subroutine]) -> Sequence[int]:
         """Keep the order of the children: at equal distances the first child's paint is taken.
@@ -335,12 +339,13 @@ class TraceDialect(FieldDialect):
                 names["paint"] = add("where", mine, names["paint"], p)
                 names["tone"] = add("where", mine, names["tone"], t)
 
-            first = writer.items(runs[0].call(writer), 3)
+            begun, zero = runs[0].begin(writer), writer.constant(0.0)
+            first = writer.items(begun, 3) if begun else [writer.constant(EMPTY), zero, zero]
             writer.names.update(zip(("f", "paint", "tone"), first, strict=True))
             if sum(run.count for run in runs) == 1:
                 writer.names["f"] = writer.call(given.read, writer.names["f"], *given.load(writer))
             for k, run in enumerate(runs):
-                run.each(writer, k == 0, {"f", "paint", "tone"}, fold)
+                run.each(writer, k == 0 and bool(begun), {"f", "paint", "tone"}, fold)
             return add("tuple", *(writer.names[name] for name in ("f", "paint", "tone")))
 
         return part_function(name, given, runs, write, "traced csg")

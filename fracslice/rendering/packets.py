@@ -26,9 +26,9 @@ import numpy as np
 
 from ..errors import Cancelled
 from ..expr.loops import WIDTH, Loop, load, loop, shares, store, together
-from ..expr.runtime import constant, lane_count
+from ..expr.runtime import lane_count
 from ..expr.vocabulary import any_of, where
-from ..fields.cpu import load_functions
+from ..fields.cpu import load_functions, parameters
 from ..work import Work, chunks
 from .accumulator import CHANNELS, COUNT, COVER, GOAL, PassPlan, SampleRange
 from .linking import Frame
@@ -492,7 +492,7 @@ class CpuTracer:
     def aim(self, frame: Frame) -> None:
         """Load the parameters of another frame of the same source, such as another camera or depth."""
         self.frame = frame
-        self._parameters = constant(frame.linked.parameters, self.dtype, frame.linked.held)
+        self._parameters = parameters(frame.linked, self.dtype)
         self._shift, self._blocks, self._starts = WHOLE, 1, np.zeros(1, self.dtype)
 
     def look_ahead(self, work: Work) -> None:

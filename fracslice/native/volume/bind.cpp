@@ -6,17 +6,13 @@
 #include "regions.h"
 #include "signs.h"
 
-#include <nanobind/stl/string.h>
-#include <nanobind/stl/tuple.h>
-#include <nanobind/stl/vector.h>
 #include <tbb/parallel_for.h>
-
-#include <memory>
 
 namespace fracslice::volume {
 namespace {
 
 using Rows3 = nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
+using Numbers = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using Row = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
 // The six sides of an object, lower ones first, in the order of the axes.
@@ -131,63 +127,35 @@ int64_t count_open_edges(const IjkArray& ijk, const ValuesArray& values, const I
     return open_edges(bricks, signs_of(bricks));
 }
 
-// Loops over a field, in regions, in the precision of its P; holds what they call.
-class RegionLoops {
+// Regions of a long union; holds what they read.
+class RegionsOfUnion {
   public:
-    using P = nb::ndarray<nb::ro, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-    using Lists = std::vector<std::array<size_t, 3>>;
-    using Listed = std::tuple<nb::object, P, Lists>;  // the loop "points", its P, and lists of the elements
-
-    RegionLoops(const Listed& whole, nb::object bricks, const Listed& alone, double lipschitz, const Point& centre, double half,
-                size_t width)
-        : held_{std::get<0>(whole), std::get<0>(alone), bricks} {
-        const auto make = [&]<class Real>(std::unique_ptr<const Regions<Real>>& made) {
-            made = std::make_unique<Regions<Real>>(listing<Real>(whole), code<typename Regions<Real>::Bricks>(bricks),
-                                                   listing<Real>(alone), lipschitz, centre, half, width);
-            address_ = reinterpret_cast<uintptr_t>(made.get());
-            points_ = reinterpret_cast<uintptr_t>(&points_in_regions<Real>);
-            bricks_ = reinterpret_cast<uintptr_t>(&bricks_in_regions<Real>);
-        };
-        std::get<1>(whole).dtype() == nb::dtype<float>() ? make(singles_) : make(doubles_);
-    }
-    uintptr_t address() const { return address_; }
-    uintptr_t loop(const std::string& name) const { return name == "points" ? points_ : bricks_; }
+    RegionsOfUnion(nb::object points, const Numbers& numbers, size_t width, double smooth, double lipschitz, const Point& centre, double half)
+        : points_(points), numbers_(numbers),
+          regions_({reinterpret_cast<Elements::Points>(nb::cast<uintptr_t>(points.attr("address"))), numbers.data(), numbers.shape(0),
+                    numbers.shape(1), std::max<size_t>(width, 1), smooth, lipschitz},
+                   centre, half),
+          of_points_(near_points_of(regions_)), of_bricks_(near_bricks_of(regions_)) {}
+    const Near& of_points() const { return of_points_; }
+    const Near& of_bricks() const { return of_bricks_; }
 
   private:
-    template <class Loop>
-    static Loop code(const nb::object& compiled) {
-        return reinterpret_cast<Loop>(nb::cast<uintptr_t>(compiled.attr("address")));
-    }
-    template <class Real>
-    static Listing<Real> listing(const Listed& given) {
-        const auto& [points, p, lists] = given;
-        require(p.dtype() == nb::dtype<Real>(), "expected P of one precision");
-        const Real* first = static_cast<const Real*>(p.data());
-        Listing<Real> all{code<typename Listing<Real>::Points>(points), {first, first + p.size()}, {}};
-        size_t numbers = 0;
-        for (const auto& [header, count, size] : lists) {
-            all.lists.push_back({header, count, size});
-            numbers += count * size;
-            require(header + 2 <= p.size(), "expected the header of a list in P");
-        }
-        require(numbers <= p.size(), "expected lists at the end of P");
-        return all;
-    }
-    std::array<nb::object, 3> held_;
-    std::unique_ptr<const Regions<float>> singles_;
-    std::unique_ptr<const Regions<double>> doubles_;
-    uintptr_t address_ = 0, points_ = 0, bricks_ = 0;
+    nb::object points_;
+    Numbers numbers_;
+    Regions regions_;
+    Near of_points_, of_bricks_;
 };
 
 }  // namespace
 
 void bind_extent(nb::module_& module) {
     using namespace nanobind::literals;
-    nb::class_<RegionLoops>(module, "Regions")
-        .def(nb::init<const RegionLoops::Listed&, nb::object, const RegionLoops::Listed&, double, const Point&, double, size_t>(),
-             "whole"_a, "bricks"_a, "alone"_a, "lipschitz"_a, "centre"_a, "half"_a, "width"_a)
-        .def_prop_ro("address", &RegionLoops::address)
-        .def("get_function_address", &RegionLoops::loop, "name"_a);
+    nb::class_<RegionsOfUnion>(module, "Regions")
+        .def(nb::init<nb::object, const Numbers&, size_t, double, double, const Point&, double>(), "points"_a, "numbers"_a, "width"_a,
+             "smooth"_a, "lipschitz"_a, "centre"_a, "half"_a)
+        .def_prop_ro("points", &RegionsOfUnion::of_points)
+        .def_prop_ro("bricks", &RegionsOfUnion::of_bricks);
+    nb::class_<Near>(module, "Near").def_prop_ro("address", [](const Near& near) { return reinterpret_cast<uintptr_t>(&near); });
     nb::class_<Sides>(module, "Sides")
         .def(nb::init<nb::object, nb::object, double, bool, const Point&, const Point&, int>(), "sign"_a, "conservative"_a,
              "lipschitz"_a, "far"_a, "lo"_a, "hi"_a, "threads"_a = 0)

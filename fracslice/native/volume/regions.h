@@ -3,162 +3,225 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <deque>
 #include <functional>
 #include <limits>
 #include <mutex>
-#include <numeric>
 #include <vector>
 
 namespace fracslice::volume {
 
-// P of loops over a field, which ends with lists of the elements of a union.
-template <class Real>
-struct Listing {
-    struct List {
-        size_t header;       // index of the number of elements; the index of the first one's numbers follows
-        size_t count, size;  // elements, and numbers of each
-    };
-    using Points = void (*)(const Real*, const Real*, const Real*, const Real*, Real*, ptrdiff_t);
-
-    Points points;
-    std::vector<Real> parameters;
-    std::vector<List> lists;
-
-    size_t count() const {
-        size_t all = 0;
-        for (const List& list : lists) all += list.count;
-        return all;
-    }
-    // Writes P with some elements alone, in order.
-    void some(const uint32_t* live, size_t n, std::vector<Real>& out) const {
-        size_t from = parameters.size(), before = 0;
-        for (const List& list : lists) from -= list.count * list.size;
-        out.assign(parameters.begin(), parameters.begin() + ptrdiff_t(from));
-        const uint32_t* end = live + n;
-        for (const List& list : lists) {
-            const size_t place = out.size();
-            size_t count = 0;
-            for (; live < end && *live < before + list.count; ++live, ++count) {
-                const Real* element = &parameters[from + (*live - before) * list.size];
-                out.insert(out.end(), element, element + list.size);
-            }
-            out[list.header] = Real(count);
-            out[list.header + 1] = Real(place);
-            before += list.count;
-            from += list.count * list.size;
-        }
-    }
-};
-
-// The field of a union is the least value of its elements. In a ball of radius r around c, an element whose value at c exceeds the
-// least one by 2 L r is nowhere the least: P may leave it out, and no bit of the field changes. The cells of an octree, made when
-// a point first falls into them, hold the elements that are left and their P.
-template <class Real>
-class Regions {
+// Numbers up to a bound, each once, in order.
+class Ordered {
   public:
-    using Bricks = void (*)(const Real*, Real, Real, Real, Real, const Real*, const Real*, const Real*, const int32_t*, Real*,
-                            ptrdiff_t);
-    using Point = std::array<double, 3>;
+    explicit Ordered(size_t bound) : words_((bound + 63) / 64), used_((words_.size() + 63) / 64) {}
 
-    // `alone`: the union without what its value is combined with, of slope `lipschitz`; `width`: lanes of the loops. Points outside
-    // of the cube of half side `half` around `centre` see all elements.
-    Regions(Listing<Real> whole, Bricks bricks, Listing<Real> alone, double lipschitz, const Point& centre, double half, size_t width)
-        : whole_(std::move(whole)), alone_(std::move(alone)), bricks_(bricks), lipschitz_(lipschitz),
-          width_(std::max<size_t>(width, 1)) {
-        root_.centre = centre;
-        root_.half = half;
-        root_.live.resize(whole_.count());
-        std::iota(root_.live.begin(), root_.live.end(), uint32_t(0));
-        root_.parameters = whole_.parameters;
+    void insert(uint32_t number) {
+        words_[number / 64] |= uint64_t(1) << number % 64;
+        used_[number / 4096] |= uint64_t(1) << number / 64 % 64;
     }
-
-    void points(const Real* x, const Real* y, const Real* z, Real* f, size_t n) const {
-        for (size_t begin = 0; begin < n; begin += kPart) {
-            const size_t count = std::min(kPart, n - begin);
-            part(x + begin, y + begin, z + begin, f + begin, count);
-        }
-    }
-
-    // See `expr.loops.bricks`.
-    void bricks(Real ox, Real oy, Real oz, Real h, const Real* ix, const Real* iy, const Real* iz, const int32_t* corners, Real* f,
-                size_t n) const {
-        thread_local std::vector<uint32_t> live;
-        thread_local std::vector<Real> parameters;
-        const std::array<Real, 3> origin{ox, oy, oz};
-        for (size_t b = 0; b < n; ++b) {
-            Point lo, hi;
-            for (int axis = 0; axis < 3; ++axis) {  // half a sample more on each side: the loop rounds
-                lo[axis] = double(origin[axis]) + (corners[3 * b + axis] - 0.5) * double(h);
-                hi[axis] = double(origin[axis]) + (corners[3 * b + axis] + 7.5) * double(h);
+    // Appends them to `out`, and leaves none.
+    void take(std::vector<int32_t>& out) {
+        for (size_t block = 0; block < used_.size(); ++block) {
+            for (; used_[block]; used_[block] &= used_[block] - 1) {
+                const size_t word = 64 * block + size_t(std::countr_zero(used_[block]));
+                for (uint64_t& bits = words_[word]; bits; bits &= bits - 1) {
+                    out.push_back(int32_t(64 * word + size_t(std::countr_zero(bits))));
+                }
             }
-            live.clear();
-            const bool inside = root_.holds(lo) && root_.holds(hi);
-            if (inside) {
-                gather(root_, lo, hi, live);
-                std::sort(live.begin(), live.end());
-                live.erase(std::unique(live.begin(), live.end()), live.end());
-                whole_.some(live.data(), live.size(), parameters);
-            }
-            const Real* p = inside ? parameters.data() : whole_.parameters.data();
-            bricks_(p, ox, oy, oz, h, ix, iy, iz, corners + 3 * b, f + 512 * b, 1);
         }
     }
 
   private:
-    struct Cell;
+    std::vector<uint64_t> words_, used_;  // bits of the numbers, and of the words that are not zero
+};
 
-    // Points in a row, from `begin` to before `end`, that are in one cell.
-    struct Streak {
-        const Cell* cell;
-        uint32_t begin, end;
-    };
+// The elements of a union, one by one.
+struct Elements {
+    using Points = void (*)(const double*, const double*, const double*, const double*, double*, ptrdiff_t);
 
-    // Points of one cell are evaluated together.
-    void part(const Real* x, const Real* y, const Real* z, Real* f, size_t n) const {
-        thread_local std::vector<Streak> streaks;
-        streaks.clear();
-        const Cell* cell = &root_;
-        for (size_t i = 0; i < n; ++i) {
-            const Point p{double(x[i]), double(y[i]), double(z[i])};
-            if (cell == &root_ || !cell->holds(p)) cell = leaf(p, *cell);
-            if (streaks.empty() || streaks.back().cell != cell) streaks.push_back({cell, uint32_t(i), uint32_t(i)});
-            ++streaks.back().end;
-        }
-        if (streaks.size() * kGrain > n)
-            std::sort(streaks.begin(), streaks.end(), [](const Streak& a, const Streak& b) {
-                return a.cell != b.cell ? std::less<>()(a.cell, b.cell) : a.begin < b.begin;
-            });
-        for (size_t begin = 0, end; begin < streaks.size(); begin = end) {
-            for (end = begin + 1; end < streaks.size() && streaks[end].cell == streaks[begin].cell;) ++end;
-            some(&streaks[begin], end - begin, x, y, z, f);
-        }
+    Points points;          // the loop "points" over the field of one
+    const double* numbers;  // P of each
+    size_t count, size;
+    size_t width;      // lanes of the loop
+    double smooth;     // width of the seams
+    double lipschitz;  // of the union
+};
+
+// A union folds its elements one after the other. In a ball of radius r around c, where f is what is folded so far: an element whose
+// value at c exceeds f by more than the width of a seam and 2 L r is above the seam everywhere in the ball, and changes no bit; one
+// that is below f by as much makes what was before it change none. Seams of width 0 may be folded in any order. The cells of an
+// octree, made when they are first asked for, list the elements that are left. More than these may be folded as well. (Values of
+// parts of a tree at the centre of a cell, and L: Barbier et al. 2025, "Lipschitz Pruning".)
+class Regions {
+  public:
+    using Point = std::array<double, 3>;
+
+    // Points outside of the cube of half side `half` around `centre` see all elements.
+    Regions(const Elements& elements, const Point& centre, double half) : elements_(elements) {
+        root_.centre = centre;
+        root_.half = half;
+        root_.list.resize(elements.count + 1);
+        root_.list[0] = int32_t(elements.count);
+        for (size_t k = 0; k < elements.count; ++k) root_.list[k + 1] = int32_t(k);
     }
 
-    static constexpr size_t kPart = size_t(1) << 14;  // points that are ordered at a time
-    static constexpr size_t kFew = 48;     // elements of a leaf
-    static constexpr int kDeepest = 9;    // levels of cells
-    static constexpr int kStuck = 5;      // levels without use, after which a cell is not divided
-    static constexpr size_t kGrain = 16;  // points in a row, of one cell on the average, that need not be sorted
+    // The number of elements that matter at points, then these; valid until the thread's next question to any regions.
+    template <class Real>
+    const int32_t* at_points(const Real* points, size_t count) const {
+        Recent& recent = recent_of_thread();
+        if (recent.window.spans(points, count)) return recent.answer;
+        recent.found.clear();
+        const Cell* cell = recent.cell;
+        for (size_t i = 0; i < count; ++i) {
+            const Point p{double(points[i]), double(points[count + i]), double(points[2 * count + i])};
+            if (std::isnan(p[0] + p[1] + p[2])) continue;
+            if (cell == &root_ || !cell->holds(p)) cell = leaf(p, *cell);
+            if (recent.found.empty() || recent.found.back() != cell) recent.found.push_back(cell);
+        }
+        recent.cell = cell;
+        return recent.answered();
+    }
+
+    // The same for points of a brick, of which the corners come first.
+    template <class Real>
+    const int32_t* in_brick(const Real* points, size_t count) const {
+        Recent& recent = recent_of_thread();
+        if (recent.window.spans(points, count)) return recent.answer;
+        Window box;
+        double extent = 0;
+        for (size_t axis = 0; axis < 3; ++axis) {
+            const auto [least, most] = std::minmax_element(points + axis * count, points + (axis + 1) * count);
+            box.lo[axis] = double(*least), box.hi[axis] = double(*most);
+            extent = std::max(extent, box.hi[axis] - box.lo[axis]);
+        }
+        for (size_t axis = 0; axis < 3; ++axis) box.lo[axis] -= kMargin * extent, box.hi[axis] += kMargin * extent;
+        // Least and most may be those of numbers that are none; a brick may be torn apart, by a repeat.
+        if (!box.spans(points, count) || !root_.holds(box.lo) || !root_.holds(box.hi)) return at_points(points, count);
+        recent.cell = leaf(box.lo, *recent.cell);
+        if (extent > kWide * recent.cell->half) return at_points(points, count);
+        recent.found.clear();
+        gather(root_, box.lo, box.hi, kFine * extent, recent.found);
+        const int32_t* answer = recent.answered();
+        if (recent.found.size() > 1) recent.window = box;
+        return answer;
+    }
+
+    // The same for boxes: the least coordinates, then the largest ones.
+    template <class Real>
+    const int32_t* in_boxes(const Real* ends, size_t count) const {
+        Recent& recent = recent_of_thread();
+        recent.found.clear();
+        for (size_t i = 0; i < count; ++i) {
+            Point lo, hi;
+            for (size_t axis = 0; axis < 3; ++axis) {
+                lo[axis] = double(ends[axis * count + i]);
+                hi[axis] = double(ends[(3 + axis) * count + i]);
+            }
+            if (root_.holds(lo) && root_.holds(hi)) {
+                gather(root_, lo, hi, hi[0] - lo[0], recent.found);
+            } else {
+                recent.found.push_back(&root_);
+            }
+        }
+        return recent.answered();
+    }
+
+  private:
+    static constexpr size_t kFew = 16;   // elements of a leaf
+    static constexpr int kDeepest = 10;  // levels of cells
+    static constexpr int kStuck = 5;     // levels without use, after which a cell is not divided
+    static constexpr double kWide = 32;  // extent of a brick, in half sides of a leaf, up to which it is asked for as a whole
+    // Of a brick, in its extents: beyond its corners, as its points are rounded; cells that need not be divided.
+    static constexpr double kMargin = 0.02, kFine = 0.5;
 
     struct Cell {
         Point centre{};
         double half = 0;
         int level = 0, stuck = 0;  // `stuck`: levels above it that left out few elements
         const Cell* above = nullptr;
-        std::vector<uint32_t> live;
-        std::vector<Real> parameters;  // of a leaf
+        std::vector<int32_t> list = {0};                     // the number of elements, and these
         mutable std::atomic<const Cell*> children{nullptr};  // eight
 
         bool holds(const Point& p) const {
             return std::abs(p[0] - centre[0]) < half && std::abs(p[1] - centre[1]) < half && std::abs(p[2] - centre[2]) < half;
         }
-        bool is_leaf() const { return level == kDeepest || live.size() <= kFew || stuck == kStuck; }
+        bool is_leaf() const { return level == kDeepest || list.size() <= kFew + 1 || stuck == kStuck; }
     };
+
+    // A box; at first of nothing.
+    struct Window {
+        Point lo{1, 1, 1}, hi{-1, -1, -1};
+
+        // Whether no lane is outside; what is no number is nowhere.
+        template <class Real>
+        bool spans(const Real* points, size_t count) const {
+            int outside = 0;
+            for (size_t axis = 0; axis < 3; ++axis) {
+                const Real least = Real(lo[axis]), most = Real(hi[axis]);
+                for (size_t i = axis * count; i < (axis + 1) * count; ++i) outside |= (points[i] <= least) | (points[i] >= most);
+            }
+            return !outside;
+        }
+    };
+
+    // What a thread asked last.
+    struct Recent {
+        uint64_t number = 0;
+        const Cell* cell = nullptr;       // of a point
+        Window window;                    // where the answer holds
+        const int32_t* answer = nullptr;  // the number of elements, and these
+        std::vector<const Cell*> found, joined;
+        std::vector<int32_t> list;  // elements of the cells that are joined
+        Ordered ordered{0};
+
+        // The elements of the cells found.
+        const int32_t* answered() {
+            window = {};
+            if (found.size() == 1) {
+                const Cell& cell = *found[0];
+                if (cell.above) {
+                    for (size_t axis = 0; axis < 3; ++axis) {
+                        window.lo[axis] = cell.centre[axis] - cell.half;
+                        window.hi[axis] = cell.centre[axis] + cell.half;
+                    }
+                }
+                return answer = cell.list.data();
+            }
+            std::sort(found.begin(), found.end(), std::less<>());
+            found.erase(std::unique(found.begin(), found.end()), found.end());
+            if (found != joined) join();
+            return answer = list.data();
+        }
+        void join() {
+            list.assign(1, 0);
+            for (const Cell* cell : found) {
+                for (size_t k = 1; k < cell->list.size(); ++k) ordered.insert(uint32_t(cell->list[k]));
+            }
+            ordered.take(list);
+            list[0] = int32_t(list.size() - 1);
+            joined = found;
+        }
+    };
+
+    Recent& recent_of_thread() const {
+        thread_local std::array<Recent, 4> recents;
+        Recent& recent = recents[number_ % recents.size()];
+        if (recent.number != number_) {
+            recent.window = {};
+            recent.joined.clear();
+            recent.list = {0};
+            recent.answer = recent.list.data();
+            recent.number = number_;
+            recent.cell = &root_;
+            recent.ordered = Ordered(elements_.count);
+        }
+        return recent;
+    }
 
     // The leaf of a point, near that of another one; the root, which lists all elements, for points outside.
     const Cell* leaf(const Point& p, const Cell& near) const {
@@ -175,9 +238,10 @@ class Regions {
         return cell;
     }
 
-    void gather(const Cell& cell, const Point& lo, const Point& hi, std::vector<uint32_t>& live) const {
-        if (cell.is_leaf()) {
-            live.insert(live.end(), cell.live.begin(), cell.live.end());
+    // Cells that cover a box: leaves, or those of a side `enough` at most.
+    void gather(const Cell& cell, const Point& lo, const Point& hi, double enough, std::vector<const Cell*>& found) const {
+        if (cell.is_leaf() || 2 * cell.half <= enough) {
+            found.push_back(&cell);
             return;
         }
         const Cell* eight = children(cell);
@@ -186,7 +250,7 @@ class Regions {
             for (int axis = 0; axis < 3; ++axis) {
                 apart = apart || lo[axis] > eight[k].centre[axis] + eight[k].half || hi[axis] < eight[k].centre[axis] - eight[k].half;
             }
-            if (!apart) gather(eight[k], lo, hi, live);
+            if (!apart) gather(eight[k], lo, hi, enough, found);
         }
     }
 
@@ -199,23 +263,9 @@ class Regions {
         return made;
     }
 
-    // Values of each element alone at the centres of the eight parts decide which of them lists it.
     const Cell* divide(const Cell& cell) const {
-        const size_t lanes = (8 + width_ - 1) / width_ * width_;
         const double half = cell.half / 2;
-        std::vector<Real> rows(4 * lanes), parameters;
-        std::vector<Real> values(8 * cell.live.size());
-        for (size_t k = 0; k < lanes; ++k) {
-            for (int axis = 0; axis < 3; ++axis) {
-                rows[axis * lanes + k] = Real(cell.centre[axis] + (k % 8 >> axis & 1 ? half : -half));
-            }
-        }
-        for (size_t i = 0; i < cell.live.size(); ++i) {
-            alone_.some(&cell.live[i], 1, parameters);
-            Real* f = &rows[3 * lanes];
-            alone_.points(parameters.data(), &rows[0], &rows[lanes], &rows[2 * lanes], f, ptrdiff_t(lanes));
-            std::copy_n(f, 8, &values[8 * i]);
-        }
+        const std::vector<double> values = values_at_centres(cell);
         std::array<Cell, 8>* eight;
         {
             std::lock_guard guard(store_);
@@ -226,74 +276,95 @@ class Regions {
             part.level = cell.level + 1;
             part.above = &cell;
             part.half = half;
-            double least = std::numeric_limits<double>::infinity(), size = std::abs(half);
-            for (int axis = 0; axis < 3; ++axis) {
-                part.centre[axis] = cell.centre[axis] + (k >> axis & 1 ? half : -half);
-                size = std::max(size, std::abs(part.centre[axis]));
-            }
-            for (size_t i = 0; i < cell.live.size(); ++i) least = std::min(least, double(values[8 * i + k]));
-            // Beyond the corners of the cell, as points on its faces are rounded; then what values are rounded by.
-            const double reach = 2 * lipschitz_ * std::sqrt(3.0) * half * 1.001;
-            const double rounding = 4096 * double(std::numeric_limits<Real>::epsilon()) * (size * lipschitz_ + std::abs(least));
-            for (size_t i = 0; i < cell.live.size(); ++i) {
-                if (!(double(values[8 * i + k]) > least + reach + rounding)) part.live.push_back(cell.live[i]);
-            }
-            part.stuck = part.live.size() * 4 > cell.live.size() * 3 ? cell.stuck + 1 : 0;
-            if (part.is_leaf()) whole_.some(part.live.data(), part.live.size(), part.parameters);
+            for (int axis = 0; axis < 3; ++axis) part.centre[axis] = cell.centre[axis] + (k >> axis & 1 ? half : -half);
+            choose(cell.list, &values[k], part);
+            part.stuck = part.list.size() * 4 > cell.list.size() * 3 ? cell.stuck + 1 : 0;
         }
         return eight->data();
     }
 
-    // Points of some streaks in one cell.
-    void some(const Streak* streaks, size_t count, const Real* x, const Real* y, const Real* z, Real* f) const {
-        thread_local std::vector<Real> rows;
-        size_t n = 0;
-        for (size_t k = 0; k < count; ++k) n += streaks[k].end - streaks[k].begin;
-        const size_t lanes = (n + width_ - 1) / width_ * width_;
-        rows.resize(4 * lanes);
-        const std::array<const Real*, 3> given{x, y, z};
-        for (int axis = 0; axis < 3; ++axis) {
-            Real* row = &rows[axis * lanes];
-            for (size_t k = 0; k < count; ++k) row = std::copy(given[axis] + streaks[k].begin, given[axis] + streaks[k].end, row);
-            std::fill(row, &rows[axis * lanes] + lanes, row[-1]);
+    // Values of each element of a cell alone at the centres of its eight parts.
+    std::vector<double> values_at_centres(const Cell& cell) const {
+        const size_t lanes = (8 + elements_.width - 1) / elements_.width * elements_.width;
+        std::vector<double> rows(4 * lanes), values(8 * (cell.list.size() - 1));
+        for (size_t k = 0; k < lanes; ++k) {
+            for (int axis = 0; axis < 3; ++axis) {
+                rows[axis * lanes + k] = cell.centre[axis] + (k % 8 >> axis & 1 ? 0.5 : -0.5) * cell.half;
+            }
         }
-        const std::vector<Real>& parameters = streaks->cell->parameters;
-        whole_.points(parameters.data(), &rows[0], &rows[lanes], &rows[2 * lanes], &rows[3 * lanes], ptrdiff_t(lanes));
-        const Real* made = &rows[3 * lanes];
-        for (size_t k = 0; k < count; ++k) {
-            const size_t own = streaks[k].end - streaks[k].begin;
-            std::copy_n(made, own, f + streaks[k].begin);
-            made += own;
+        for (size_t i = 1; i < cell.list.size(); ++i) {
+            const double* p = elements_.numbers + elements_.size * size_t(cell.list[i]);
+            elements_.points(p, &rows[0], &rows[lanes], &rows[2 * lanes], &rows[3 * lanes], ptrdiff_t(lanes));
+            std::copy_n(&rows[3 * lanes], 8, &values[8 * (i - 1)]);
         }
+        return values;
     }
 
-    Listing<Real> whole_, alone_;
-    Bricks bricks_;
-    double lipschitz_;
-    size_t width_;
+    // Lists the elements of `from` that matter in a cell; `values`: theirs at its centre, eight apart.
+    void choose(const std::vector<int32_t>& from, const double* values, Cell& cell) const {
+        const size_t count = from.size() - 1;
+        const double seam = elements_.smooth, lipschitz = elements_.lipschitz;
+        double least = std::numeric_limits<double>::infinity(), size = std::abs(cell.half);
+        for (size_t i = 0; i < count; ++i) least = std::min(least, values[8 * i]);
+        for (int axis = 0; axis < 3; ++axis) size = std::max(size, std::abs(cell.centre[axis]));
+        // Beyond the corners of the cell, as points on its faces are rounded; then what values are rounded by, in float32 at most.
+        const double rounding = 4096.0 * std::numeric_limits<float>::epsilon() * (size * lipschitz + std::abs(least) + seam);
+        const double apart = seam + 2 * lipschitz * std::sqrt(3.0) * cell.half * 1.001 + rounding;
+        double f = seam > 0 ? std::numeric_limits<double>::infinity() : least;
+        cell.list.assign(1, 0);
+        for (size_t i = 0; i < count; ++i) {
+            const double value = values[8 * i];
+            if (value > f + apart) continue;
+            if (value < f - apart) cell.list.resize(1);
+            cell.list.push_back(from[i + 1]);
+            if (seam > 0) {
+                const double h = std::max(seam - std::abs(f - value), 0.0);
+                f = std::min(f, value) - h * h / (4 * seam);
+            }
+        }
+        cell.list[0] = int32_t(cell.list.size() - 1);
+    }
+
+    static inline std::atomic<uint64_t> made_{0};
+
+    Elements elements_;
+    uint64_t number_ = ++made_;  // another one for each of the process
     Cell root_;
     mutable std::deque<std::array<Cell, 8>> cells_;
     mutable std::mutex store_;
     mutable std::array<std::mutex, 64> locks_;
 };
 
-// Loops with the arguments of the compiled ones, whose P holds the address of regions.
+// What `fracslice.expr.emitter` calls, by its place in memory: with this, and the rows of as many lanes.
+struct Near {
+    const int32_t* (*floats)(const Near*, const float*, size_t);
+    const int32_t* (*doubles)(const Near*, const double*, size_t);
+    const int32_t* (*boxes_of_floats)(const Near*, const float*, size_t);
+    const int32_t* (*boxes_of_doubles)(const Near*, const double*, size_t);
+    const Regions* regions;
+};
+
 template <class Real>
-const Regions<Real>& regions_at(const Real* p) {
-    const Regions<Real>* regions;
-    std::memcpy(&regions, p, sizeof regions);
-    return *regions;
+const int32_t* near_points(const Near* near, const Real* rows, size_t count) {
+    return near->regions->at_points(rows, count);
 }
 
 template <class Real>
-void points_in_regions(const Real* p, const Real* x, const Real* y, const Real* z, Real* f, ptrdiff_t n) {
-    regions_at(p).points(x, y, z, f, size_t(n));
+const int32_t* near_brick(const Near* near, const Real* rows, size_t count) {
+    return near->regions->in_brick(rows, count);
 }
 
 template <class Real>
-void bricks_in_regions(const Real* p, Real ox, Real oy, Real oz, Real h, const Real* ix, const Real* iy, const Real* iz,
-                       const int32_t* corners, Real* f, ptrdiff_t n) {
-    regions_at(p).bricks(ox, oy, oz, h, ix, iy, iz, corners, f, size_t(n));
+const int32_t* near_boxes(const Near* near, const Real* rows, size_t count) {
+    return near->regions->in_boxes(rows, count);
+}
+
+inline Near near_points_of(const Regions& regions) {
+    return {&near_points<float>, &near_points<double>, &near_boxes<float>, &near_boxes<double>, &regions};
+}
+
+inline Near near_bricks_of(const Regions& regions) {
+    return {&near_brick<float>, &near_brick<double>, &near_boxes<float>, &near_boxes<double>, &regions};
 }
 
 }  // namespace fracslice::volume
