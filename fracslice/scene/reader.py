@@ -150,6 +150,12 @@ class _Open:
         return SceneError(f"{self.place}: <{self.element.name}> {message}")
 
 
+def let_go(parser: expat.XMLParserType) -> None:
+    """Part a parser from its handlers, which hold it: Python does not count its memory as garbage."""
+    parser.StartElementHandler = parser.EndElementHandler = parser.CharacterDataHandler = None
+    parser.StartDoctypeDeclHandler = parser.CommentHandler = None
+
+
 class _Builder:
     """Builds nodes from the leaves up during parsing, without recursion at any depth."""
 
@@ -180,6 +186,8 @@ class _Builder:
             raise SceneError(f"{place}: not well-formed XML: {expat.ErrorString(error.code)}") from None
         except (LookupError, ValueError) as error:
             raise SceneError(f"{self.source}:1: cannot decode the file: {error}") from None
+        finally:
+            let_go(self.parser)
         return self.done
 
     def doctype(self, *_: object) -> None:

@@ -19,7 +19,7 @@ from ..fields.node import FORMULAS
 from ..records import Part
 from ..scene.layout import SCENE, SECTIONS, SOLID, Element
 from ..scene.model import Scene, part_to_xml
-from ..scene.reader import reads
+from ..scene.reader import let_go, reads
 
 Place = tuple[int, ...]
 """Numbers of the children that lead from `<scene>`, which is (), to an element."""
@@ -119,6 +119,8 @@ def parse(text: str) -> Tag:
         parser.Parse(data, True)
     except expat.ExpatError as error:
         raise SceneError(f"{error.lineno}: not well-formed XML: {expat.ErrorString(error.code)}") from None
+    finally:
+        let_go(parser)
     return top.children[0]
 
 
