@@ -288,8 +288,8 @@ def test_half_an_hour_of_random_input_takes_no_memory(served: Served) -> None:
     page.set_default_timeout(30000)
     page.get_by_label("First view").click()
     picture(page)
-    for first, last in zip(marks[1], marks[-1], strict=True):
-        assert last < 1.1 * first + 20, marks  # megabytes
+    for first, last in zip(marks[2], marks[-1], strict=True):  # by then all is loaded, and caches are full
+        assert last < 1.05 * first + 10, marks  # megabytes
 
 
 def test_a_film_is_made_of_views(served: Served) -> None:
