@@ -187,14 +187,15 @@ def test_a_task_beside_is_computed_once(threads: int) -> None:
 
 
 def test_a_task_beside_ends_before_its_block_does() -> None:
-    ended = threading.Event()
+    begun, ended = threading.Event(), threading.Event()
 
     def task() -> None:
+        begun.set()
         time.sleep(0.05)
         ended.set()
 
     with suppress(ZeroDivisionError), in_background(task, 2):
-        time.sleep(0.01)
+        assert begun.wait(60)
         raise ZeroDivisionError
     assert ended.is_set()
 
