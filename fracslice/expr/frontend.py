@@ -168,9 +168,8 @@ def _read(kind: type[Reader], function: Callable[..., Any], fixed: Fixed, name: 
 
 
 _function = lru_cache(maxsize=2048)(_read)
-_loop = lru_cache(maxsize=32)(
-    _read
-)  # few: what is fixed in a loop holds its scene, another one after each edit
+# Few: what is fixed in a loop holds its scene, and each edit makes another one.
+_loop = lru_cache(maxsize=32)(_read)
 
 
 @lru_cache(maxsize=256)

@@ -166,8 +166,12 @@ def union_bounds(node: Node) -> Box:
 
 @union.tips
 def union_tips(node: Node) -> NDArray[np.float64] | None:
-    tips = [child.tips for child in node.children if child.tips is not None] if node["smooth"] == 0 else []
-    return outermost(np.hstack(tips).T) if len(tips) == len(node.children) else None
+    tips = list[NDArray[np.float64]]()
+    for child in node.children if node["smooth"] == 0 else ():
+        if (own := child.tips) is None:
+            return None
+        tips.append(own)
+    return outermost(np.hstack(tips).T) if tips else None
 
 
 @intersection.bounds

@@ -226,7 +226,7 @@ class Page:
             self.studio.job.cancel.set()
 
     def begin(self, **_: Any) -> None:
-        """Begin what lasts until the server ends."""
+        """Begin what lasts until the server ends; asyncio itself does not keep its tasks."""
         self._tasks = [asyncio.get_running_loop().create_task(of()) for of in (self.follow, self.tidy)]
 
     async def follow(self) -> None:

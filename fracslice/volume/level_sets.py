@@ -68,7 +68,8 @@ def level_set(
         raise VolumeError(f"its grid {found.name!r} {error}") from None
     (x, y, z), (u, v, w) = native.box
     digest = int(key("level set", sha256, found.name, what, level)[:16], 16)
-    tips = None if native.tips is None else np.array(native.tips).T
+    ends = native.tips
+    tips = None if ends is None else np.array(ends).T
     return LevelSet(digest, native, Box((x, y, z), (u, v, w)), tips, native.steepness)
 
 
