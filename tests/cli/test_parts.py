@@ -11,6 +11,7 @@ from fracslice.cli.main import run
 from fracslice.mesh.models import read_mesh
 from fracslice.scene import read
 from fracslice.volume.parts import LATTICES, cut, filled
+from tests.examples import stamped
 from tests.mesh import shapes
 
 pytestmark = pytest.mark.once
@@ -28,13 +29,18 @@ def cube_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return shapes.cube(10, (1, 2, 3)).export(tmp_path / "cube.stl")
 
 
-def test_a_filled_model_has_a_wall_and_a_share_of_the_rest(cube: Path) -> None:
+@pytest.mark.parametrize(
+    ("period", "resolution", "error"), stamped([(8, 41, 0.01), (4, 65, 4e-3)], [(8, 41, 0.01)])
+)
+def test_a_filled_model_has_a_wall_and_a_share_of_the_rest(
+    period: int, resolution: int, error: float, cube: Path
+) -> None:
     """Inside is a cube of 8 mm, of whole cells."""
-    options = "--with schwarz_d --volume-fraction 0.25 --shell 1mm --period 8mm --resolution 41 -q"
-    assert status(f"fill cube.stl -o filled.ply {options}") in (0, 1)  # cavities are sealed
+    options = f"--volume-fraction 0.25 --shell 1mm --period {period}mm --resolution {resolution} -q"
+    assert status(f"fill cube.stl -o filled.ply --with schwarz_d {options}") in (0, 1)  # cavities are sealed
     mesh = read_mesh("filled.ply")
     np.testing.assert_allclose(mesh.size, 10, rtol=1e-6)
-    assert mesh.volume == pytest.approx(1000 - 512 + 0.25 * 512, rel=0.01)
+    assert mesh.volume == pytest.approx(1000 - 512 + 0.25 * 512, rel=error)
 
 
 def test_lengths_are_those_of_the_finished_object(cube: Path) -> None:

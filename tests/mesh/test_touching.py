@@ -69,6 +69,7 @@ def test_the_largest_of_distant_bodies_is_sampled_anew() -> None:
 @pytest.mark.nightly
 def test_cells_that_touch_along_edges_become_one_body() -> None:
     root = cells(keep=(0, 2), level=2)
+    assert make_mesh(root, size="60mm", resolution=36).report.mesh.components == 196
     assert make_mesh(root, size="60mm", resolution=36, thickness="3mm").report.mesh.components == 1
 
 

@@ -215,5 +215,6 @@ def test_a_fractal_in_pieces_is_kept_and_thickened() -> None:
     assert (high - low).max() == pytest.approx(41.7, abs=0.5)
     assert report.mesh.components == 1
     reports = [report]
-    reports.append(make_mesh(scene(mandelbulb(), size="40mm"), MeshJob(resolution=48)).report)
+    for fractal in (mandelbulb(), shell(mandelbulb(iterations=6), thickness=0.02)):
+        reports.append(make_mesh(scene(fractal, size="40mm"), MeshJob(resolution=48)).report)
     assert not any("fell to pieces" in note for report in reports for note in report.notes)

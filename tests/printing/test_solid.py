@@ -45,6 +45,7 @@ from fracslice.volume import Drain, Plan, plan, sample_scene
 from fracslice.volume.amount import Sizing
 from fracslice.volume.bricks import from_grid, to_grid
 from fracslice.work import Work
+from tests.examples import stamped
 
 pytestmark = pytest.mark.once
 
@@ -166,14 +167,17 @@ def test_lengths_that_cannot_be_measured() -> None:
         printable(plan(box(), 100), Sizing(SIZE), Print(thickness=0.01))
 
 
-def test_mesh_and_slices_agree() -> None:
+@pytest.mark.parametrize(
+    ("resolution", "layer", "error"), stamped([(64, 0.2, 0.02), (128, 0.1, 0.01)], [(64, 0.2, 0.02)])
+)
+def test_mesh_and_slices_agree(resolution: int, layer: float, error: float) -> None:
     how = Print(bridge=2, thickness=1.2, hollow=1.5, drain=2, base=0.5, raft=1)
     thing = scene(union(PLATE, at(sphere(radius=0.2), 1.5, 0, 0)), size="20mm", printing=how)
-    mesh = make_mesh(thing, MeshJob(resolution=64))
+    mesh = make_mesh(thing, MeshJob(resolution=resolution))
     assert mesh.report.problems == ()
-    stack = plan_stack(thing.root, SliceJob(size=20, layer=0.2, pixel=(0.2, 0.2), printing=how))
+    stack = plan_stack(thing.root, SliceJob(size=20, layer=layer, pixel=(layer, layer), printing=how))
     volume = sum(Slicer(stack).map(lambda layer: layer.area * layer.height))
-    assert volume == pytest.approx(mesh.report.mesh.volume_mm3, rel=0.02)
+    assert volume == pytest.approx(mesh.report.mesh.volume_mm3, rel=error)
     assert mesh.mesh.size == pytest.approx(stack.size, abs=0.3)
 
 
@@ -380,12 +384,12 @@ def test_each_large_part_of_a_hollow_is_drained() -> None:
         assert not solid(1.8 * x, 0, -1 + 3.5 * mm)
 
 
-def test_a_ball_is_drained_along_its_axis() -> None:
-    for resolution in (24, 25):
-        drains = printable(plan(sphere(), resolution), Sizing(SIZE), Print(hollow=2, drain=3))[0].drains
-        assert len(drains) == 2
-        for drain in drains:
-            assert np.hypot(*drain.start[:2]) < 0.1 * 2 / resolution
+@pytest.mark.parametrize("resolution", stamped([24, 25, 40, 41, 64], [24, 25]))
+def test_a_ball_is_drained_along_its_axis(resolution: int) -> None:
+    drains = printable(plan(sphere(), resolution), Sizing(SIZE), Print(hollow=2, drain=3))[0].drains
+    assert len(drains) == 2
+    for drain in drains:
+        assert np.hypot(*drain.start[:2]) < 0.1 * 2 / resolution
 
 
 @pytest.mark.nightly

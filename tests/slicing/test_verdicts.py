@@ -191,7 +191,7 @@ def test_a_ring_on_the_plate_needs_supports_only() -> None:
 @pytest.mark.nightly
 def test_a_drain_hole_that_may_close_is_named() -> None:
     def problems(drain: float) -> list[Problem]:
-        job = SliceJob(size=6, layer=0.3, pixel=(0.3, 0.3), printing=Print(hollow=1, drain=drain))
+        job = SliceJob(size=12, layer=0.3, pixel=(0.3, 0.3), printing=Print(hollow=2, drain=drain))
         coarse = Limits(wall=1, floor=1)  # which need few samples; that of holes is the default
         return check_layers(plan_stack(box(), job), coarse).problems
 
@@ -199,6 +199,7 @@ def test_a_drain_hole_that_may_close_is_named() -> None:
     assert (
         "0.4 mm, narrower than 0.5 mm" in hole.text and hole.count == 2 and hole.mend == (("drain", "3mm"),)
     )
+    assert "holes" not in [p.kind for p in problems(2)]
 
 
 GOOD: list[Family] = [brick, disc, upright_cone, ring, tunnel, ledge, dome, tower, trestle, tree]

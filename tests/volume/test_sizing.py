@@ -55,6 +55,11 @@ def test_the_bore_of_a_ring_is_as_wide_as_stated_whatever_sticks_out() -> None:
     assert bore(scene(ring(), size="24mm"), voxel)[0] < 16.5
 
 
+@pytest.mark.nightly
+def test_the_bore_of_a_ring_is_as_wide_as_stated_in_another_unit() -> None:
+    assert bore(scene(ring(), unit=2), 1.2) == pytest.approx((34.0, 34.0), abs=0.6 / 25)
+
+
 def test_the_bore_in_layers_is_as_wide_as_stated() -> None:
     layer = slice_layers(scene(ring(), unit="1mm"), layer=1, pixel=0.1)[2]
     solid = np.flatnonzero(layer[layer.shape[0] // 2] > 127)
