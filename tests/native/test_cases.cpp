@@ -1,5 +1,4 @@
 // The cases of marching cubes and what is derived from them.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <map>

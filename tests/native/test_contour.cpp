@@ -1,5 +1,4 @@
 // Surfaces of one brick: closed manifolds whatever the samples, crossings and normals; boxes exactly.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <map>

@@ -1,5 +1,4 @@
 // Coverage of pixels by boxes and discs, and runs of solid pixels.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <cmath>

@@ -1,5 +1,4 @@
 // What is deflated is inflated by zlib to the same bytes.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 #include <zlib.h>
 

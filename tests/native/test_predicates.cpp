@@ -1,5 +1,4 @@
 // Signs of predicates against sums of integers.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
 #include <array>
