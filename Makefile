@@ -1,6 +1,7 @@
 # make demo: a shipped scene becomes a printable mesh. make test: tests and linters. make wheel: a wheel that needs no OpenVDB.
 # make docs: the site, in docs/_build.
-# make nightly: the tests with all their cases, 500 random scenes, 200 random hybrids; some hours.
+# make nightly: the tests with all their cases, 500 random scenes, 200 random hybrids; some hours. make newest, which is part of it:
+# the tests on the newest Python that is there.
 # make native-tests: unit tests of the native code. make sanitize: all of it under GCC's sanitizers, some minutes.
 # All of them set up what is missing first: Debian packages (as root or with sudo) and an own .venv. Debian 12, Ubuntu 24.04.
 # Another Python, in a venv of its own: make test PYTHON=python3.13 VENV=.venv-3.13
@@ -21,7 +22,7 @@ NATIVE := CMakeLists.txt $(wildcard cmake/* fracslice/native/* fracslice/native/
 # Compiled modules are kept: tests start hundreds of processes. pip compiles none; few are needed.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test suite native-tests docs nightly sanitize lint wheel peers setup packages clean
+.PHONY: demo test suite native-tests docs nightly newest sanitize lint wheel peers setup packages clean
 
 demo: setup
 	mkdir -p out
@@ -57,6 +58,10 @@ nightly: setup
 	$(BIN)/python -m pytest -n 2 -m nightly
 	$(BIN)/python -m tests.benchmarks stability.random_scenes
 	$(BIN)/python -m tests.benchmarks stability.random_hybrids
+	$(MAKE) --no-print-directory newest
+
+newest:
+	MAKE="$(MAKE)" bash tests/newest.sh
 
 # Memory and undefined behaviour, then races between threads.
 sanitize: setup
