@@ -107,18 +107,25 @@ class Preparation:
 
     def connected(self) -> SolidComponents:
         """Components of samples that resolve connectivity; shared by cavities, bodies and bridges."""
-        from .thin_features import resolve_connectivity
         from .walls import components_of
 
         if self.known is None:
             coarse = self.sampled()
             components = components_of(coarse)
-            unit = max(self.planned.box.size) / self.size
-            bricks = resolve_connectivity(
-                self.root, coarse, THIN * unit**2, len(large_bodies(components)) > 1, self.work
-            )
+            bricks = coarse if self.told(components) else self.resolved(coarse, components)
             self.known = components if bricks is coarse else components_of(bricks)
         return self.known
+
+    def told(self, components: SolidComponents) -> bool:
+        """True if a mesh of these samples would choose its bodies by them: so does a coarser one."""
+        return not self.measured and self.how.whole and components.thin_share < PIECES
+
+    def resolved(self, coarse: Bricks, components: SolidComponents) -> Bricks:
+        """Samples that resolve what these may miss."""
+        from .thin_features import resolve_connectivity
+
+        least = THIN * (max(self.planned.box.size) / self.size) ** 2
+        return resolve_connectivity(self.root, coarse, least, len(large_bodies(components)) > 1, self.work)
 
     def seen(self, length: float) -> Samples:
         """The samples of `sampled` as an interpolated field."""

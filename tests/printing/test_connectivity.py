@@ -218,3 +218,20 @@ def test_a_fractal_in_pieces_is_kept_and_thickened() -> None:
     for fractal in (mandelbulb(), shell(mandelbulb(iterations=6), thickness=0.02)):
         reports.append(make_mesh(scene(fractal, size="40mm"), MeshJob(resolution=48)).report)
     assert not any("fell to pieces" in note for report in reports for note in report.notes)
+
+
+@pytest.mark.parametrize(("voxels", "looks"), [(16, 0), (0, 1)])
+def test_a_coarse_mesh_keeps_the_bodies_that_a_finer_one_would(
+    voxels: int, looks: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Samples as of a mesh of 128 voxels tell bodies from crumbs; layers look for what these miss."""
+    found = []
+    monkeypatch.setattr(
+        connectivity, "thin_features", lambda *those: found.append(those) or thin_features(*those)
+    )
+    root = union(shell(sphere(), thickness=3 * VOXEL), BALL)
+    how = Print(keep="largest")
+    kept, _ = printable(plan(root, voxels or COARSE), Sizing(SIZE), how, measured=not voxels)
+    assert len(found) == looks
+    assert inside(kept, on_sphere(1 - 1.5 * VOXEL)).all()
+    assert not inside(kept, np.array([[1.3, 0, 0], [1.39, 0, 0]])).any()
