@@ -32,6 +32,7 @@ from ..common.arrays import (
     Triangles,
     concatenate,
     count,
+    distinct,
     moved,
 )
 from ..common.files import HEAD, ROWS, Fragment, Text, append, deflate, join, number_rows, open_regular, rows
@@ -118,7 +119,7 @@ class _Groups:
         if printed:
             return cls(len(meshes), printed[0].colours, True)
         shown = [_packed(mesh.colours) for mesh in meshes if mesh.colours is not None]
-        known = np.unique(np.concatenate([np.empty(0, np.int64), *shown]))
+        known = distinct(np.concatenate([np.empty(0, np.int64), *shown]))
         colours = np.stack([known >> 16, known >> 8 & 255, known & 255], 1).astype(np.uint8)
         return cls(len(meshes), colours, False)
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import distinct
 from ..common.memory import available_bytes
 from ..common.messages import significant
 from ..errors import GridError, TooLargeError, VolumeError
@@ -43,7 +44,6 @@ from ..records import PIECES, MeshJob
 from ..scene import Print, Scene
 from ..store import Arrays
 from ..volume.bricks import BRICK
-from ..volume.pruning import distinct
 from ..work import Work, ahead, in_background
 from .report import Clock, Placement
 
@@ -606,7 +606,7 @@ def choose_bodies(
     """
     planned, pieces, shells, unit = surface.planned, surface.pieces, surface.shells, scale**3
     searched = shells.searched(how.cavities == "fill")
-    numbers = np.unique(shells.piece[searched]).tolist()
+    numbers = distinct(shells.piece[searched]).tolist()
     rays = executor.results(Nest(shells, searched, pieces), numbers, "finishing")
     nested, misplaced = shells.nested(searched, dict(zip(numbers, rays, strict=True)))
     sized = replace(nested, volumes=nested.volumes * unit)
@@ -644,7 +644,7 @@ class Checks:
     @property
     def near_bodies(self) -> int:
         """Number of bodies that nearly touch others; cavities are none."""
-        return len(np.unique(np.concatenate([np.empty(0, np.int64), *self.near])))
+        return len(distinct(np.concatenate([np.empty(0, np.int64), *self.near])))
 
     def include(self, other: Checks) -> None:
         """Add the sums over other pieces."""
@@ -720,7 +720,7 @@ class Finish(MeshStep[Checks]):
             return found
         part = pieces.strip(number + 1, HEAD, threads)
         other = part.mesh.vertices, pieces.labels(number + 1)[part.numbers]
-        return np.union1d(found, near.across(pieces.ends[number], own, other, threads))
+        return distinct(np.concatenate([found, near.across(pieces.ends[number], own, other, threads)]))
 
     def checks(self, made: Finished, near: NDArray[np.int64], work: Work) -> Checks:
         """Check a finished piece."""

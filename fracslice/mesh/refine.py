@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import distinct
 from ..fields.field import Field
 from ..work import Work
 from .contouring import anywhere, project
@@ -157,6 +158,12 @@ class Edges(NamedTuple):
         result: NDArray[np.int64] = self.ends[:, 0] << 32 | self.ends[:, 1]
         return result
 
+    def has(self, one: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Whether there are edges between these vertices; arrays that broadcast together."""
+        keys, wanted = self.keys, np.minimum(one, other) << 32 | np.maximum(one, other)
+        place = np.searchsorted(keys, wanted)
+        return np.asarray((place < len(keys)) & (np.append(keys, -1)[place] == wanted))
+
     @property
     def pairs(self) -> NDArray[np.int64]:
         """Sides, 3 * triangle + number, at each edge that two triangles share, int64 [k, 2]."""
@@ -186,7 +193,7 @@ def with_neighbours(mesh: Mesh, some: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Some triangles of a mesh, bool (m,), and those that share a vertex with them."""
     near = np.zeros(len(mesh.vertices), bool)
     near[mesh.triangles[some]] = True
-    return np.asarray(near[mesh.triangles].any(axis=1))
+    return np.asarray(np.logical_or.reduce([near[corner] for corner in mesh.triangles.T]))
 
 
 def with_needles(
@@ -201,7 +208,7 @@ def with_needles(
     needles = np.flatnonzero(own.min(axis=1) < NEEDLE * longest[:, 0])
     sides, long = sides[needles], own[needles] > longest[needles] / 2
     while True:
-        more = np.unique(sides[(split[sides] & long).any(axis=1)[:, None] & long & ~split[sides]])
+        more = distinct(sides[(split[sides] & long).any(axis=1)[:, None] & long & ~split[sides]])
         if not len(more):
             return split
         split = split.copy()
@@ -330,16 +337,15 @@ def _shrinking(
 
     The triangles around it, but for thin ones, face one way, and all do then, and are not thin.
     """
-    keys, (keep, vanish) = edges_of(mesh.triangles).keys, ways.T
-    low, high = ways.min(axis=1), ways.max(axis=1)
-    there = np.isin(low << 32 | high, keys) & np.isin(vanish, uncrowded(mesh.triangles, vanish))
+    mesh = _at(mesh, ways)
+    edges, (keep, vanish) = edges_of(mesh.triangles), ways.T
+    there = edges.has(keep, vanish) & np.isin(vanish, uncrowded(mesh.triangles, vanish))
     ways, keep, vanish = ways[there], keep[there], vanish[there]
     star = stars(mesh.triangles, vanish)
     once = np.diff(star, axis=1, prepend=-1) != 0
     corners = mesh.triangles[star].astype(np.int64)
     both = (corners == keep[:, None, None]).any(axis=2)
-    low, high = np.minimum(corners, keep[:, None, None]), np.maximum(corners, keep[:, None, None])
-    common = np.isin(low << 32 | high, keys) & (corners != vanish[:, None, None]) & once[..., None]
+    common = edges.has(corners, keep[:, None, None]) & (corners != vanish[:, None, None]) & once[..., None]
     moved = np.where(corners == vanish[:, None, None], keep[:, None, None], corners)
     wide, normals = measures(mesh.vertices[corners], thin)
     wider, others = measures(mesh.vertices[moved], thin)
@@ -349,6 +355,13 @@ def _shrinking(
     good = wide.any(axis=1) & (even[0] | ~wide).all(axis=1) & ((even[1] & wider) | both).all(axis=1)
     good &= ((both & once).sum(axis=1) == 2) & (common.sum(axis=(1, 2)) == 4)
     return ways[good], corners.reshape(len(good), 3 * star.shape[1])[good]
+
+
+def _at(mesh: Mesh, some: NDArray[np.int64]) -> Mesh:
+    """The triangles of a mesh at some vertices."""
+    near = np.zeros(len(mesh.vertices), bool)
+    near[some] = True
+    return Mesh(mesh.vertices, mesh.triangles[near[mesh.triangles].any(axis=1)])
 
 
 def measures(corners: NDArray[np.float64], thin: float) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
@@ -444,7 +457,7 @@ def _candidates(
     ends = np.sort(np.stack([c, d], axis=1), axis=1)
     worth = np.where(steep[old].any(axis=1), worth - 2, worth)
     kept = np.flatnonzero((worth < -OBTUSE) & (c != d))
-    kept = kept[~np.isin(ends[kept].astype(np.int64) @ [1 << 32, 1], edges.keys)]
+    kept = kept[~edges.has(*ends[kept].astype(np.int64).T)]
     return Flips(old, new, ends).some(kept), worth[kept]
 
 

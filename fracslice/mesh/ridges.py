@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._native import connected_components, fans
+from ..common.arrays import distinct
 from ..volume import Plan
 from ..volume.bricks import values_at
 from ..work import Work
@@ -145,15 +146,17 @@ def with_ridges(
     made = _Sharpening(planned, whole, tips, work).made()
     if made is None or not made.is_apart(APART * planned.voxel):
         return pieces, tips
-    caps = [Cap(numbers[crumb < 0][cap.old], cap.fan) for cap in made.caps()]
-    for one in np.unique(crumb[crumb >= 0]):
-        _take_in(caps, Cap(numbers[crumb == one], mesh.corners[crumb == one]), WITHIN * planned.voxel)
+    own = numbers[crumb < 0]
+    caps = [Cap(own[cap.old], cap.fan) for cap in made.caps()]
+    crumbs = np.flatnonzero(crumb >= 0)
+    parts = _parted(crumbs, np.unique(crumb[crumbs], return_inverse=True)[1]) if len(crumbs) else []
+    _take_in(caps, [Cap(numbers[part], mesh.vertices[mesh.triangles[part]]) for part in parts], planned.voxel)
     points = np.concatenate([tips, made.marks()])
     result, near = pieces.anew(), planned.voxel / 2
     for first, last in spans(caps, pieces, near):
         part, start = pieces.together(first, last, near), pieces.starts[first]
-        own = [Cap(c.old - start, c.fan) for c in caps if 0 <= c.old[0] - start < len(part.triangles)]
-        part, _, fresh = tips_to_end(replace_by_fans(part, own) if own else part, points)
+        here = [Cap(c.old - start, c.fan) for c in caps if 0 <= c.old[0] - start < len(part.triangles)]
+        part, _, fresh = tips_to_end(replace_by_fans(part, here) if here else part, points)
         result.add(Piece(part, pieces.ends[last - 1]), fresh)
     return result, points
 
@@ -228,14 +231,19 @@ def _crumbs(mesh: Mesh, voxel: float) -> NDArray[np.int64]:
     return np.where(small[of], of, -1).astype(np.int64)
 
 
-def _take_in(caps: list[Cap], crumb: Cap, reach: float) -> None:
-    """Remove a crumb with the nearest of the caps, if that is within reach; the sharp edge holds it then."""
-    middle = crumb.fan.mean(axis=(0, 1))
-    away = [np.linalg.norm(cap.fan.reshape(-1, 3) - middle, axis=1).min() for cap in caps]
-    nearest = int(np.argmin(away))
-    if away[nearest] < reach:
-        old = np.union1d(caps[nearest].old, crumb.old)
-        caps[nearest] = Cap(old, caps[nearest].fan)
+def _take_in(caps: list[Cap], crumbs: list[Cap], voxel: float) -> None:
+    """Remove each crumb with the nearest of the caps, if it is within reach: the sharp edge holds it then."""
+    from scipy.spatial import cKDTree
+
+    if not crumbs:
+        return
+    of = np.repeat(np.arange(len(caps)), [3 * len(cap.fan) for cap in caps])
+    tree = cKDTree(np.concatenate([cap.fan.reshape(-1, 3) for cap in caps]))
+    away, corner = tree.query([crumb.fan.mean(axis=(0, 1)) for crumb in crumbs])
+    for crumb, nearest in zip(crumbs, np.where(away < WITHIN * voxel, of[corner], -1), strict=True):
+        if nearest >= 0:
+            cap = caps[nearest]
+            caps[nearest] = Cap(distinct(np.concatenate([cap.old, crumb.old])), cap.fan)
 
 
 FAN = -2
@@ -324,7 +332,7 @@ class _Missed:
             new = np.linalg.norm(points[kept] - points[k], axis=1).min(initial=math.inf) > apart
             if new and nearest[k] not in nearest[kept]:
                 kept.append(k)
-        return _Added(nearest[kept], points[kept], np.ones(len(kept), bool)), np.unique(vertices[known])
+        return _Added(nearest[kept], points[kept], np.ones(len(kept), bool)), distinct(vertices[known])
 
     def beside(self, mesh: Mesh, edges: Edges) -> tuple[_Added, NDArray[np.int64]]:
         """Points of sharp edges and corners in place of inner vertices that are a little off them, and the
@@ -428,8 +436,9 @@ class _Sharpened:
 
     def new_vertices(self) -> NDArray[np.float64]:
         """Vertices that were added and are used, [k, 3]."""
-        taken = np.unique(self.mesh.triangles)
-        return self.mesh.vertices[taken[taken >= len(self.old.vertices)]]
+        taken = distinct(self.mesh.triangles)
+        new: NDArray[np.float64] = self.mesh.vertices[taken[taken >= len(self.old.vertices)]]
+        return new
 
     def marks(self) -> NDArray[np.float64]:
         """Vertices that all new triangles are at, [k, 3]: those that were added, and one of each triangle
@@ -437,13 +446,16 @@ class _Sharpened:
         """
         new, first = self.mesh.triangles[self.parents < 0], len(self.old.vertices)
         without = new[(new < first).all(axis=1)]
-        return self.mesh.vertices[np.union1d(new[new >= first], without[:, 0])]
+        marked: NDArray[np.float64] = self.mesh.vertices[
+            distinct(np.concatenate([new[new >= first], without[:, 0]]))
+        ]
+        return marked
 
     def is_apart(self, least: float) -> bool:
         """True if no other vertex is as near to a new one: where bodies touch, both have an edge there."""
         from scipy.spatial import cKDTree
 
-        used = self.mesh.vertices[np.unique(self.mesh.triangles)]
+        used = self.mesh.vertices[distinct(self.mesh.triangles)]
         near = cKDTree(used).query_ball_point(self.new_vertices(), least, return_length=True)
         return bool((near <= 1).all())
 
@@ -458,7 +470,7 @@ class _Sharpened:
         """The same with the old triangles in place of the connected parts that some new ones are in."""
         gone, of_old, of_new = self._replaced()
         new = np.flatnonzero(self.parents < 0)
-        bad = np.unique(of_new[np.isin(new, some)])
+        bad = distinct(of_new[np.isin(new, some)])
         keep = np.ones(len(self.parents), bool)
         keep[new[np.isin(of_new, bad)]] = False
         back = gone[np.isin(of_old, bad)]
@@ -471,7 +483,7 @@ class _Sharpened:
     def _replaced(self) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.int32]]:
         """Old triangles that are replaced, their connected parts, and those of the new triangles."""
         new = self.mesh.triangles[self.parents < 0]
-        gone = np.setdiff1d(np.arange(len(self.old.triangles)), self.parents)
+        gone = _without(len(self.old.triangles), self.parents[self.parents >= 0])
         both = np.concatenate([new, self.old.triangles[gone]])
         labels, _ = connected_components(both, len(self.mesh.vertices))
         return gone, labels[self.old.triangles[gone, 0]], labels[new[:, 0]]
@@ -525,7 +537,7 @@ class _Sharpening:
                 return None
             if attempt == RETRIES or (attempt == FEWER and len(given.missed.edges) > MANY):
                 break
-            at = np.unique(result.mesh.triangles[wrong])
+            at = distinct(result.mesh.triangles[wrong])
             new = result.mesh.vertices[at[at >= len(mesh.vertices)]]
             spots = np.concatenate([new, result.mesh.corners[wrong].mean(axis=1)])
             twice = splits & self._reached(given) & ~_away(given.missed.points, spots, FAR * self._voxel)
@@ -563,7 +575,7 @@ class _Sharpening:
         placed = place[old.triangles]
         a, b, c = placed[hosts[splits]].T
         new = [np.stack([p, q, number[splits]], axis=1) for p, q in ((a, b), (b, c), (c, a))]
-        keep = np.setdiff1d(np.arange(len(placed)), hosts[splits])
+        keep = _without(len(placed), hosts[splits])
         triangles = np.concatenate([placed[keep], *new])
         mesh = Mesh(np.concatenate([old.vertices, added.points[which]]), triangles)
         same = (placed[keep] == old.triangles[keep]).all(axis=1)
@@ -604,13 +616,14 @@ class _Sharpening:
                 break
             # the others were tried, and nothing near them has changed
             near = _rings(following.mesh, np.flatnonzero(following.parents == FAN))
-            state, bad = following, np.intersect1d(following.bad(self._voxel), near)
+            bad, state = following.bad(self._voxel), following
+            bad = bad[np.isin(bad, near)]
         return state, fixed
 
     def _contracted(self, state: _Sharpened, fixed: NDArray[np.bool_]) -> _Sharpened:
         """The part without the very short edges of bad triangles."""
         edges, short = edges_of(state.mesh.triangles), SHORT * self._voxel
-        some = np.unique(edges.sides[state.bad(self._voxel)])
+        some = distinct(edges.sides[state.bad(self._voxel)])
         lengths = np.linalg.norm(np.diff(state.mesh.vertices[edges.ends[some]], axis=1)[:, 0], axis=1)
         ends = edges.ends[some[lengths < short]]
         left, triangles = contracted(state.mesh, ends, fixed, short)
@@ -628,7 +641,7 @@ class _Sharpening:
         crossing = self_intersecting_triangles(as_written, threads=threads, among=new)
         crossing |= self_intersecting_triangles(mesh, threads=threads, among=new)
         bad = state.bad(self._voxel, 0.0, 2 * APART)
-        return np.union1d(bad[~self._across(state, bad)], np.flatnonzero(crossing))
+        return distinct(np.concatenate([bad[~self._across(state, bad)], np.flatnonzero(crossing)]))
 
     def _across(self, state: _Sharpened, some: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Whether triangles lie across a sharp edge, close to it, and face as one of its sides does."""
@@ -824,7 +837,15 @@ def _bent(mesh: Mesh, edges: Edges) -> NDArray[np.int64]:
     one, other = edges.beside.T
     bent = edges.sides.ravel()[edges.pairs[:, 0]][(flat[one] * flat[other]).sum(axis=1) < BENT]
     rim = np.bincount(edges.sides.ravel(), minlength=len(edges.ends)) == 1
-    return uncrowded(mesh.triangles, np.setdiff1d(edges.ends[bent], edges.ends[rim]))
+    some = distinct(edges.ends[bent])
+    return uncrowded(mesh.triangles, some[~np.isin(some, edges.ends[rim])])
+
+
+def _without(count: int, some: NDArray[np.integer]) -> NDArray[np.int64]:
+    """Numbers below a count but for some."""
+    left = np.ones(count, bool)
+    left[some] = False
+    return np.flatnonzero(left)
 
 
 def _alone(
@@ -833,13 +854,14 @@ def _alone(
     """Numbers of the vertices that come to lie apart from the others; the first ones have precedence."""
     from scipy.spatial import cKDTree
 
-    used = np.unique(mesh.triangles)
+    used = distinct(mesh.triangles)
     rank = np.full(len(mesh.vertices), -1)
     rank[some] = np.arange(len(some))
     placed = mesh.vertices.copy()
     placed[some] = points
     pairs = rank[used[cKDTree(placed[used]).query_pairs(least, output_type="ndarray")]]
-    return np.setdiff1d(np.arange(len(some)), pairs.max(axis=1, initial=-1))
+    last = pairs.max(axis=1, initial=-1)
+    return _without(len(some), last[last >= 0])
 
 
 def _rings(mesh: Mesh, some: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -15,10 +15,10 @@ from itertools import combinations, permutations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.arrays import distinct
 from ..errors import TooLargeError
 from ..fields.field import Field
 from ..volume.bricks import BRICK, Lattice, values_at
-from ..volume.pruning import distinct
 from ..work import Work
 from .model import Mesh
 from .roots import Segments

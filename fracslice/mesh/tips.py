@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._native import corners_by_vertex, pointed, touching
+from ..common.arrays import distinct
 from ..volume import Plan
 from ..volume.bricks import values_at
 from ..volume.extent import SLANTS, climb
@@ -61,7 +62,7 @@ class Rings:
         `vertices`: integers (n,). Returns int64 (k,).
         """
         corners = [self._corner[self._start[v] : self._start[v + 1]] for v in vertices]
-        return np.unique(np.concatenate(corners) // 3)
+        return distinct(np.concatenate(corners) // 3)
 
     def nearest(self, vertices: NDArray[np.integer], points: NDArray[np.float64]) -> NDArray[np.int64]:
         """Vertices close to points, by greedy descent along edges.
@@ -97,7 +98,7 @@ class Rings:
 
         Returns int32 (k,).
         """
-        return np.unique(self.mesh.triangles[self.around(np.array([vertex]))])
+        return distinct(self.mesh.triangles[self.around(np.array([vertex]))])
 
     def caps(self, vertex: int, tip: NDArray[np.float64]) -> list[Cap]:
         """Candidate caps of a tip.
@@ -129,7 +130,7 @@ class Rings:
             if len(more) == len(seen):
                 rim = _rim(self.mesh.triangles[seen])
                 return None if rim is None else Cap(seen, self._fan(rim, tip))
-            seen, near = more, self.around(np.unique(self.mesh.triangles[more]))
+            seen, near = more, self.around(distinct(self.mesh.triangles[more]))
         return None
 
     def _fan(self, rim: NDArray[np.int32], tip: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -149,7 +150,7 @@ def _rim(triangles: NDArray[np.int32]) -> NDArray[np.int32] | None:
         rim.append((here, following.pop(here)))
         here = rim[-1][1]
     edges = (3 * len(triangles) + len(rim)) // 2
-    disk = here == first and not following and len(np.unique(triangles)) - edges + len(triangles) == 1
+    disk = here == first and not following and len(distinct(triangles)) - edges + len(triangles) == 1
     return np.array(rim, np.int32) if rim and disk else None
 
 
@@ -199,7 +200,7 @@ def replace_by_fans(mesh: Mesh, caps: list[Cap]) -> Mesh:
     gone = np.concatenate([cap.old for cap in caps])
     keep = np.ones(len(mesh.triangles), bool)
     keep[gone] = False
-    known = np.unique(mesh.triangles[gone])
+    known = distinct(mesh.triangles[gone])
     corners = np.concatenate([mesh.vertices[known], *(cap.fan.reshape(-1, 3) for cap in caps)])
     _, first, which = np.unique(rows(corners), return_index=True, return_inverse=True)
     tips = np.sort(first[first >= len(known)])

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._slices import closed_nodes
-from ..common.arrays import triple
+from ..common.arrays import distinct, triple
 from ..common.messages import format_count, place, significant
 from ..errors import VolumeError
 from ..fields.box import Box
@@ -99,7 +99,7 @@ class Drainage:
         flat[1] = [[False, True, False], [True, True, True], [False, True, False]]
         nodes, count = label(empty, flat)
         below, above = nodes[:-1][empty[:-1] & empty[1:]], nodes[1:][empty[:-1] & empty[1:]]
-        pairs = np.unique(below.astype(np.int64) * (count + 1) + above)
+        pairs = distinct(below.astype(np.int64) * (count + 1) + above)
         edges = np.stack(np.divmod(pairs, count + 1), 1) - 1
         layer = np.zeros(count, np.int64)
         level, *_ = np.nonzero(nodes)

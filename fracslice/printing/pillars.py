@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._native import grow_forest
-from ..common.arrays import triple
+from ..common.arrays import distinct, triple
 from ..fields.field import Field, Kernel
 from ..formulas import Node, box, capsule, intersection, plane, transform, union
 from ..volume import Pillars, Supports
@@ -402,13 +402,13 @@ class NearSamples:
     def free(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
         """Those of some samples where a ball of two steps is outside of the solid."""
         ball = numbers[:, None] + np.append(0, 2 * self._steps)
-        new = np.unique(ball[self._known[ball] == 0])
+        new = distinct(ball[self._known[ball] == 0])
         self._known[new] = 1 + (self.of.values(self.points(new)) <= 0)
         return np.asarray(numbers[(self._known[ball] == 1).all(1)])
 
     def _new(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
         entered = self._entered.reshape(-1)
-        new = np.unique(numbers[~entered[numbers]])
+        new = distinct(numbers[~entered[numbers]])
         entered[new] = True
         return new
 

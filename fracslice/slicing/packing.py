@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.arrays import Triangles
+from ..common.arrays import Triangles, distinct
 from ..common.cache import key
 from ..errors import SliceError
 from ..fields.box import Box
@@ -251,7 +251,7 @@ def outline_of_mesh(mesh: Triangles, cell: float) -> Footprint:
     covered = np.zeros((rows, columns), bool)
     longest = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2).max(1)
     parts = np.maximum(np.ceil(2 * longest / cell), 1).astype(int)
-    for count in np.unique(parts):
+    for count in distinct(parts):
         u, v = (grid.ravel() for grid in np.meshgrid(*2 * [np.arange(count + 1) / count]))
         within, of = u + v <= 1 + 1e-9, corners[parts == count]
         weights = np.stack([1 - u - v, u, v], 1)[within]

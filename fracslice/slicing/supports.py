@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._slices import count_pixels
+from ..common.arrays import distinct
 from ..printing.edits import edited_field
 from ..printing.pillars import (
     CARRIED,
@@ -205,7 +206,7 @@ class _Survey:
                 order = np.lexsort([below, above])  # births are numbered in the order of their layers
                 first = np.r_[True, np.diff(above[order]) > 0]
                 names[above[order[first]]] = below[order[first]]
-                for younger in np.unique(below[below != names[above]]).tolist():
+                for younger in distinct(below[below != names[above]]).tolist():
                     self.births[younger].joined = True
             own = np.flatnonzero(names < 0)
             for node, place in zip(own.tolist(), _places(now, own), strict=True):

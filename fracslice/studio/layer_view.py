@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..checks.fitting import misfit
 from ..checks.layer_checks import PrintReport
+from ..common.arrays import distinct
 from ..common.messages import duration, format_count, significant
 from ..mesh.drawing import BEHIND, Size
 from ..slicing import Layer, Slicer, Stack
@@ -125,7 +126,7 @@ class PrintLayers:
 
     def survey(self) -> None:
         """Look at the areas of some layers, by which the volume of all is estimated."""
-        chosen = np.unique(np.linspace(0, len(self) - 1, SPREAD).astype(int)).tolist()
+        chosen = distinct(np.linspace(0, len(self) - 1, SPREAD).astype(int)).tolist()
         self.areas.update(zip(chosen, self.slicer.map(lambda layer: layer.area, chosen), strict=True))
 
     def figures(

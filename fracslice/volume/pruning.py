@@ -150,17 +150,6 @@ def where(test: Callable[[slice], np.ndarray], first: int, end: int, work: Work)
     return np.concatenate([np.empty(0, np.intp), *numbers])
 
 
-def distinct(numbers: np.ndarray) -> np.ndarray:
-    """Sort flat indices and remove duplicates. `numpy.unique` uses hashes, which take five times as long.
-
-    `numbers`: int [n]. Returns int [m].
-    """
-    ordered = np.sort(numbers)
-    fresh = np.ones(len(ordered), bool)
-    fresh[1:] = ordered[1:] != ordered[:-1]
-    return np.asarray(ordered[fresh])
-
-
 ROWS = 1 << 15
 """Bricks per task."""
 

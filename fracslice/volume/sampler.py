@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
+from ..common.arrays import distinct
 from ..errors import EmptyError, VolumeError
 from ..fields.depth import with_depth_advice
 from ..fields.field import Bounds, Kernel
@@ -39,7 +40,6 @@ from .pruning import (
     SignFaces,
     States,
     crossed_bricks,
-    distinct,
 )
 
 if TYPE_CHECKING:

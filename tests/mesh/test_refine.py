@@ -25,7 +25,7 @@ from fracslice.formulas import (
 from fracslice.mesh import Mesh
 from fracslice.mesh.checks import check_mesh
 from fracslice.mesh.contouring import contour
-from fracslice.mesh.refine import refine
+from fracslice.mesh.refine import contracted, edges_of, refine
 from fracslice.scene import scene
 from fracslice.volume import Plan, plan, sample_scene
 
@@ -162,3 +162,29 @@ def test_the_job_takes_it_in_mm() -> None:
     truth = 4000 / 3 * np.pi
     assert fine.printable
     assert abs(fine.volume_mm3 / truth - 1) < abs(plain.volume_mm3 / truth - 1) / 5
+
+
+def test_edges_are_known_by_both_ends() -> None:
+    triangles = np.random.default_rng(0).integers(0, 30, (40, 3), np.int32)
+    edges = edges_of(triangles)
+    pairs = {frozenset(pair) for t in triangles.tolist() for pair in zip(t, t[1:] + t[:1], strict=True)}
+    every = np.arange(32)
+    found = edges.has(every[:, None], every)
+    assert {frozenset(pair) for pair in np.argwhere(found).tolist()} == pairs
+    assert not edges_of(triangles[:0]).has(every, every).any()
+
+
+def test_short_edges_vanish_wherever_they_are_among_others() -> None:
+    """Only the triangles at them are looked at; the rest of the mesh may be large."""
+    x, y = np.meshgrid(np.arange(9.0), np.arange(9.0), indexing="ij")
+    x[4, 4] = 3.01
+    vertices = np.stack([x.ravel(), y.ravel(), np.zeros(81)], axis=1)
+    a = (9 * np.arange(8)[:, None] + np.arange(8)).ravel()
+    triangles = np.concatenate([np.stack([a, a + 9, a + 10], 1), np.stack([a, a + 10, a + 1], 1)]).astype(
+        np.int32
+    )
+    left, found = contracted(Mesh(vertices, triangles), np.array([[31, 40], [0, 1]]), np.zeros(81, bool), 0.1)
+    assert len(found) == len(triangles) - 2 and 40 not in found
+    assert sorted(set(range(len(triangles))) - set(left.tolist())) == sorted(
+        i for i, t in enumerate(triangles.tolist()) if {31, 40} <= set(t)
+    )

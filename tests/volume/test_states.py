@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fracslice.volume.pruning import BORDER, States, distinct
+from fracslice.common.arrays import distinct
+from fracslice.volume.pruning import BORDER, States
 from fracslice.work import Work
 
 pytestmark = pytest.mark.once
