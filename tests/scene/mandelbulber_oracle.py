@@ -187,10 +187,22 @@ def box_fold_bulb(w: Points, c: Points, v: Values, _: int) -> Points:
     return bulb(w, 2) * column((1, 1, -v["boxfold_bulbpow2_z_factor"]))
 
 
+DIAGONAL = about(2, 45) @ about(1, -np.degrees(np.arctan(np.sqrt(0.5))))
+"""Turns the diagonal of a cube to the z axis."""
+
+
+def folded_diagonal(w: Points, scale: Points, limits: Any) -> Points:
+    """Absolute values and a fold into a box in the frame of the diagonal."""
+    return DIAGONAL.T @ box(scale * abs(DIAGONAL @ w), limits)
+
+
 def box_fold_bulb_2(w: Points, c: Points, v: Values, i: int) -> Points:
-    w = box(w, v["transf_addition_constant_111"])
+    if v["transf_start_iterations_B"] <= i:
+        w = box(w, v["transf_addition_constant_111"])
     w = ball(w, v["transf_minR2_p25"], v["transf_maxR2_1"], v["mandelbox_offset"])
     w = v["transf_scale"] * w
+    if v["transf_function_enabledX_false"] and i == 0:
+        w = folded_diagonal(w, column(v["transf_scale3D_333"]), v["transf_addition_constantA_111"])
     if v["transf_start_iterations_A"] <= i < v["transf_stop_iterations_A"]:
         w = bulb(2 * w, 2) * column((1, 1, -v["boxfold_bulbpow2_z_factor"]))
     return w
@@ -207,8 +219,12 @@ def abox_mod_11(w: Points, c: Points, v: Values, i: int) -> Points:
     return rotation(v["transf_rotation"]) @ w if v["transf_rotation_enabled"] else w
 
 
-def amazing_surf_mod_2(w: Points, c: Points, v: Values, _: int) -> Points:
-    w = flat(w, v["transf_addition_constant_111"]) + column(v["transf_addition_constant"])
+def amazing_surf_mod_2(w: Points, c: Points, v: Values, i: int) -> Points:
+    w, a = flat(w, v["transf_addition_constant_111"]), column(v["transf_addition_constant"])
+    if v["transf_function_enabledBx_false"] and i < v["transf_stop_iterations_X"]:
+        w = w - (a**3 / (w**2 + a**2) - 2 * a) * v["transf_scale_1"]
+    else:
+        w = w + a
     w = ball(w, v["transf_minR2_p25"], v["transf_maxR2_1"], v["mandelbox_offset"])
     w = v["mandelbox_scale"] * w
     return rotation(v["mandelbox_rotation_main"]) @ w if v["mandelbox_main_rotation_enabled"] else w
@@ -232,7 +248,17 @@ def abox_mod_15(w: Points, c: Points, v: Values, i: int) -> Points:
         w = (w + o) * v["transf_scaleG_1"] / length2(w + o) + column(v["transf_addition_constant"]) - o
     w = box(w, v["transf_addition_constant_111"]) + column(v["transf_offsetA_000"])
     w = v["transf_scale_2"] * ball(w, v["transf_minR2_p25"], v["transf_maxR2_1"])
-    return rotation(v["transf_rotation2"]) @ (w + column(v["transf_addition_constantA_000"]))
+    w = rotation(v["transf_rotation2"]) @ (w + column(v["transf_addition_constantA_000"]))
+    return crossed(w, v) if v["transf_function_enabledN_false"] and v["transf_start_iterations_N"] <= i else w
+
+
+def crossed(w: Points, v: Values) -> Points:
+    """Reflections of |y| and |x| in the frame of their diagonal, then at two lines."""
+    x, y = abs(w[1]), abs(w[0])
+    u, t = x + y - v["transf_offset_0"], -abs(x - y - v["transf_offsetA_0"])
+    x, y = (u + t) / 2, (u - t) / 2
+    a, b = v["transf_offset_1"], v["transf_offsetA_1"]
+    return np.array([a - abs(x + a), b - abs(y + b), w[2]])
 
 
 def ifs(w: Points, c: Points, v: Values, _: int) -> Points:
@@ -399,8 +425,8 @@ def symmetric(w: Points, c: Points, v: Values, _: int) -> Points:
 
 
 def times_square(w: Points, c: Points, v: Values, i: int) -> Points:
-    w = v["transf_scale"] * (w + column(v["mandelbox_offset"]))
-    r2 = length2(w)
+    first, w = w, v["transf_scale"] * (w + column(v["mandelbox_offset"]))
+    r2 = length2(first if v["transf_function_enabledy_false"] else w)
     k = r2
     if v["transf_function_enabledP_false"] and i < v["transf_stop_iterations_P1"]:
         k = 1 / r2
@@ -479,7 +505,8 @@ def abox_mod_13(w: Points, c: Points, v: Values, i: int) -> Points:
     w = ball(w, v["transf_minR2_p25"], v["transf_maxR2_1"], v["mandelbox_offset"])
     w = v["mandelbox_scale"] * w
     if v["transf_start_iterations_B"] <= i:
-        w = w + column(v["transf_addition_constant"])
+        share = (-v["transf_scale_1"]) ** i if v["transf_function_enabledAx_false"] else 1
+        w = w + share * column(v["transf_addition_constant"])
     return rotation(v["transf_rotation"]) @ w if v["transf_rotation_enabled"] else w
 
 
@@ -491,7 +518,13 @@ def fold_box_mod_1(w: Points, c: Points, v: Values, _: int) -> Points:
 
 
 def mandelbox_menger(w: Points, c: Points, v: Values, i: int) -> Points:
-    return menger(mandelbox(w, c, v, i), v["transf_scale_3"], v["transf_constant_multiplierA_111"])
+    w = mandelbox(w, c, v, i)
+    for _ in range(int(v["transf_int_1"])):
+        w = menger(w, v["transf_scale_3"], v["transf_constant_multiplierA_111"])
+        w = w + column(v["transf_addition_constantA_000"])
+        if v["transf_function_enabledx_false"]:
+            w = w + c[[2, 0, 1]] * column(v["transf_constant_multiplierB_111"])
+    return w
 
 
 def mandalay_box(w: Points, c: Points, v: Values, i: int) -> Points:
@@ -653,11 +686,12 @@ def moved_square(w: Points, c: Points, v: Values, _: int) -> Points:
 
 def squares(w: Points, c: Points, v: Values, _: int) -> Points:
     x, y, z = w
+    sign = -1 if v["transf_function_enabledF_false"] else 1
     m = y * y / (x * x + z * z) - 1
     x, y, z = 2 * x * z * m, 2 * y * np.hypot(x, z), (z * z - x * x) * m
     if v["transf_function_enabledAz_false"]:
         m = 1 - z * z / (x * x + y * y)
-        x, y, z = 2 * x * y * m, (y * y - x * x) * m, 2 * z * np.hypot(x, y)
+        x, y, z = sign * 2 * x * y * m, (y * y - x * x) * m, sign * 2 * z * np.hypot(x, y)
     return np.array([x, y, z])
 
 
@@ -709,6 +743,53 @@ def eiffie(w: Points, c: Points, v: Values, _: int) -> Points:
     w = np.array([(x * x - y * y) * m, 2 * x * y * m * v["transf_scale"], 2 * z * np.hypot(x, y)])
     w = w + column(v["transf_addition_constant"])
     return v["transf_scale_1"] * (1 - v["transf_offset"] / np.sqrt(length2(w))) * w
+
+
+def julia_bulb(w: Points, c: Points, v: Values, i: int, fifth: bool = False) -> Points:
+    """The square of a point folded about x, less along the radius, and a quaternion's square."""
+    if fifth:
+        w = box(w, v["transf_addition_constant"]) if v["transf_function_enabledC_false"] else w
+    more = fifth and v["transf_function_enabledB_false"] and i < v["transf_stop_iterations_B"]
+    k, r = np.pi / (v["transf_int8_Y"] + v["transf_int_1"] * more), np.hypot(w[1], w[2])
+    angle = abs(np.fmod(np.arctan2(w[2], w[1]) + np.pi + k, 2 * k) - k)
+    z = r * np.sin(angle)
+    square, m = (w[0] + 1j * r * np.cos(angle)) ** 2, 1 - z**2 / length2(w)
+    first = square.real * m * (v["transf_scaleB_1"] if fifth else 1)
+    w = np.array([first, square.imag * m * v["transf_scale"], 2 * z * np.sqrt(abs(square))])
+    w = w + column(v["transf_addition_constant_neg100"])
+    if v["transf_addCpixel_enabled_false"]:
+        w = w + np.sign(w) * abs(c) * column(v["transf_constant_multiplier_000"])
+    w = v["transf_scale_1"] * (1 - v["transf_offset"] / np.sqrt(length2(w))) * w
+    if v["transf_function_enabled_false"] and i < v["transf_stop_iterations_A"]:
+        w = quaternion(w, c, v, i)
+        if fifth:
+            w[2] -= c[2] * v["transf_scaleF_1"] + v["transf_offset_0"]
+    return w
+
+
+def julia_bulb_5(w: Points, c: Points, v: Values, i: int) -> Points:
+    return julia_bulb(w, c, v, i, True)
+
+
+def riemann_sphere(w: Points, c: Points, v: Values, _: int) -> Points:
+    r = np.sqrt(length2(w))
+    u = v["transf_scale"] * w / r
+    plane = u[:2] / (1 - u[2])
+    w = np.array([*plane, (r - 1.5) * (1 + length2(plane))])
+    w = rotation(v["transf_rotation"]) @ w
+    w[:2] -= np.floor(w[:2] + 0.5)
+    return w * column(v["transf_constant_multiplier_441"]) + column(v["transf_addition_constant"])
+
+
+def riemann_sphere_2(w: Points, c: Points, v: Values, _: int) -> Points:
+    r = np.sqrt(length2(w))
+    x, y, z = v["transf_scale_08"] * w / r
+    x, z = (
+        np.tan(4 * v[f"transf_scale{name}_1"] * np.arctan2(2 * p / (y - 1), (p / (y - 1)) ** 2 - 1))
+        for name, p in (("A", x), ("B", z))
+    )
+    s = x * x + z * z
+    return r**4 / (s + 1) * np.array([2 * x, s - 1, 2 * z]) + column(v["transf_offset_010"])
 
 
 def dot_fold(w: Points, c: Points, v: Values, _: int) -> Points:
@@ -769,8 +850,11 @@ def sine_or_cosine(w: Points, c: Points, v: Values, _: int) -> Points:
 
 def platonic(w: Points, c: Points, v: Values, _: int) -> Points:
     x, y, z = v["platonic_solid_frequency"] * w
-    waves = np.cos(x) * np.sin(y) + np.cos(y) * np.sin(z) + np.cos(z) * np.sin(x)
-    return w * (waves * v["platonic_solid_amplitude"] + length2(w) ** 0.25 * v["platonic_solid_rhoMul"])
+    waves, r = np.cos(x) * np.sin(y) + np.cos(y) * np.sin(z) + np.cos(z) * np.sin(x), np.sqrt(length2(w))
+    if v["transf_function_enabled_false"]:
+        radial = r**0.5 + (r - r**0.5) * v["transf_scale_1"]
+        return w * (abs(waves) * v["platonic_solid_amplitude"] + radial * v["platonic_solid_rhoMul"])
+    return w * (waves * v["platonic_solid_amplitude"] + r**0.5 * v["platonic_solid_rhoMul"])
 
 
 FORMULAS: dict[int, Formula] = {
@@ -871,6 +955,10 @@ FORMULAS: dict[int, Formula] = {
     224: amazing_surf_klein_2,
     233: amazing_surf_m3d,
     49: lkmitch,
+    71: riemann_sphere,
+    139: riemann_sphere_2,
+    218: julia_bulb,
+    219: julia_bulb_5,
     1082: sine_or_cosine,
     56: platonic,
 }

@@ -23,12 +23,13 @@ from fracslice.scene.mandelbulber.settings import SettingsSection, default_of, p
 from fracslice.scene.mandelbulber.step_text import ADDED, FORMULAS, OWN_SOLID, SWAPPED
 from tests.examples import stamped
 
-from . import mandelbulber_solids
+from . import mandelbulber_loops, mandelbulber_solids
 from .mandelbulber_oracle import FORMULAS as ESCAPES
 from .mandelbulber_oracle import rotation as oracle_rotation
-from .mandelbulber_solids import FOURS, SOLIDS
+from .mandelbulber_solids import FIRST, FOURS, VARIANTS
 
-ORACLE = {**ESCAPES, **mandelbulber_solids.FORMULAS}
+ORACLE = {**ESCAPES, **mandelbulber_solids.FORMULAS, **mandelbulber_loops.FORMULAS}
+SOLIDS = {**mandelbulber_solids.SOLIDS, **mandelbulber_loops.SOLIDS}
 
 pytestmark = pytest.mark.once
 
@@ -129,10 +130,20 @@ VALUES = {  # of formulas whose defaults leave much out
     1135: "transf_constant_multiplier_111 0.1 0.2 0.3",
     1146: "transf_scaleA_1 0.4; transf_scaleB_1 0.8",
     1150: "transf_addition_constantA_000 0.1 0 0; transf_offset_222 1.5 1 1",
+    71: "transf_rotation_enabled true; transf_rotation 10 0 20; transf_addition_constant 0.1 0 0; "
+    "transf_scale 0.9",
+    139: "transf_offset_010 0.1 1.3 0; transf_scaleA_1 0.25; transf_scaleB_1 0.5",
+    218: "transf_addCpixel_enabled_false true; transf_constant_multiplier_000 0.2 0.1 0; transf_offset -0.2; "
+    "transf_function_enabled_false true; transf_stop_iterations_A 1",
+    219: "transf_addition_constant 0.5 0.6 0.7; transf_function_enabledC_false true; transf_int_1 3; "
+    "transf_function_enabledB_false true; transf_stop_iterations_B 1; transf_scaleB_1 0.8; transf_scale 1.1; "
+    "transf_function_enabled_false true; transf_stop_iterations_A 1; transf_scaleF_1 0.2; "
+    "transf_offset_0 0.1",
     1152: "transf_offset_000 0.1 0 0; transf_offsetA_000 0.5 0.4 0.3",
     1155: "transf_scale 0.9; mandelbox_offset 0.2 0 0; transf_function_enabledP_false true",
     1158: "transf_addition_constant_0555 0.5 0.4 0.3; transf_offsetA_000 -0.2 0 0; transf_scale_1 1.5",
     **mandelbulber_solids.VALUES,
+    **mandelbulber_loops.VALUES,
 }
 
 
@@ -201,8 +212,13 @@ def test_steps_are_those_of_the_oracle(number: int) -> None:
     agrees(number, 1000)
 
 
-def agrees(number: int, count: int) -> None:
-    source = text(f"formula_1 {number}; N 3", VALUES.get(number, ""))
+@pytest.mark.parametrize(("number", "values"), VARIANTS, ids=[str(n) for n, _ in VARIANTS])
+def test_steps_with_other_switches_are_those_of_the_oracle(number: int, values: str) -> None:
+    agrees(number, 1000, values)
+
+
+def agrees(number: int, count: int, values: str | None = None) -> None:
+    source = text(f"formula_1 {number}; N 3", VALUES.get(number, "") if values is None else values)
     points = np.random.default_rng(number).uniform(-1.6, 1.6, (3, count))
     ours, expected = own_images(orbit_nodes(source), points), oracle_images(number, source, points, 3)
     if number == 7:  # a sponge alone is written with a reflection: signs differ, which it does not notice
@@ -221,12 +237,16 @@ def agrees(number: int, count: int) -> None:
 @pytest.mark.parametrize("number", sorted(SOLIDS))
 def test_distances_are_those_of_the_oracle(number: int) -> None:
     """Formulas with a distance of their own measure each point with that solid."""
-    source = text(f"formula_1 {number}; N 3", VALUES.get(number, ""))
+    source = text(f"formula_1 {number}; N 1", VALUES.get(number, "") + FIRST.get(number, ""))
     orbit = orbits(parse_settings(source, "x.fract"))[0]
     kind, points = distance_of(orbit), np.random.default_rng(number).uniform(-1.6, 1.6, (3, 1000))
     node = surface(orbit, kind, "") if kind != OWN_SOLID else own_solid(orbit, steps_of(orbit), 0, "")
     expected = SOLIDS[number](points, Values(parse_settings(source, "x").fractals[0]))
-    assert abs(node.distance(points.T) - expected).max() < 1e-6
+    found = node.distance(points.T)
+    if number in mandelbulber_loops.SIGNS:
+        assert ((found < 0) == (expected < 0)).all() and (expected < 0).any()
+    else:
+        assert abs(found - expected).max() < 1e-6
 
 
 def test_solids_within_a_round_are_behind_the_steps_before_them(tmp_path: Path) -> None:
