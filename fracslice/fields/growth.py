@@ -42,8 +42,9 @@ def escape_radius(
     radius: float,
     outer: float,
     end: float | None,
+    most: float = math.inf,
 ) -> float:
-    """Enlarge a radius until no orbit comes back from beyond it.
+    """Enlarge a radius until no orbit comes back from beyond it, or it is larger than `most`.
 
     `outer`: radius where orbits stop.
     """
@@ -55,7 +56,7 @@ def escape_radius(
         far = np.where(_nearest(lo, hi) < outer, _farthest(lo, hi), 0.0)
         if (far > radius).sum() > MOST:
             radius = float(np.partition(far, -MOST)[-MOST])
-        beyond: np.ndarray = far > radius
+        beyond: np.ndarray = far > (radius if radius <= most else math.inf)
         return beyond
 
     def proved(lo: Corners, hi: Corners) -> np.ndarray:
@@ -428,9 +429,8 @@ def _search(steps: Round, given: tuple[Given, ...], iterations: int) -> Growth |
     powers, factors = zip(*rates, strict=True)
     bound = Growth(powers, factors, (*escapes, radius), stretch=constant_stretch(steps, given))
     bound = _prove_growth(steps, bound, given, size)
-    if not bound.proved:
-        bound = replace(bound, escapes=widened_escapes(images, bound.escapes, size))
-        bound = _prove_growth(steps, bound, given, size)
+    if not bound.proved and (wider := widened_escapes(images, bound.escapes, size)) != bound.escapes:
+        bound = _prove_growth(steps, replace(bound, escapes=wider), given, size)
     reach, thick = (
         sampled_radius(whole, points, n, bound.escape) for n in (iterations, min(iterations, THICK))
     )
@@ -442,22 +442,20 @@ def _search(steps: Round, given: tuple[Given, ...], iterations: int) -> Growth |
 def _prove_growth(steps: Round, bound: Growth, given: Sequence[Given], size: float) -> Growth:
     """Growth with radii of escape that are proved; the same if they cannot be."""
     tried, constants = bound, None if size and bound.by_power else size
-    for _ in range(TRIES if bound.fits else 0):
+    for left in reversed(range(TRIES if bound.fits else 0)):
         stops = [own[0] for own in numbers(tried)]
-        radii = [
-            escape_radius(
-                least_size(steps, first, given, stops, constants),
-                tried.escapes[first - 1],
-                math.sqrt(stops[first - 1]),
-                None if constants is None and first == 0 else tried.surface,
-            )
-            for first in range(len(steps))
-        ]
+        radii: list[float] = []
+        for first in range(len(steps)):
+            least = least_size(steps, first, given, stops, constants)
+            outer = math.sqrt(stops[first - 1])
+            end = None if constants is None and first == 0 else tried.surface
+            most = LARGER * bound.escapes[first - 1] if left else tried.escapes[first - 1]
+            radii.append(escape_radius(least, tried.escapes[first - 1], outer, end, most))
+            if radii[-1] > most:
+                return bound
         if (*radii[1:], radii[0]) == tried.escapes:
             return replace(tried, proved=True)
         tried = replace(tried, escapes=(*radii[1:], radii[0]))
-        if any(new > LARGER * old for new, old in zip(tried.escapes, bound.escapes, strict=True)):
-            break
     return bound
 
 
