@@ -408,7 +408,7 @@ def of_octahedron(w: Points, v: Values) -> np.ndarray:
     k = v["transf_scale_1"] * ((p.sum(axis=0) - v["transf_offset_1"]) / 3) ** 2
     t = np.minimum(p - k, 0).sum(axis=0) / 2
     m = np.linalg.norm(p - np.clip(p - k + t, 0, v["transf_offsetA_1"]), axis=0) - v["transf_offset_0005"]
-    m = np.maximum(m, of_box(w, column(v["transf_addition_constant_0555"])))
+    m = np.maximum(m / v["transf_scaleA_1"], of_box(w, column(v["transf_addition_constant_0555"])))
     return np.minimum(m, np.sqrt(length2(w)) - v["transf_scale_08"])
 
 

@@ -267,7 +267,12 @@ def test_solids_within_a_round_are_behind_the_steps_before_them(tmp_path: Path) 
             w, stretch = ORACLE[606](w, points, torus, k), 2 * stretch
         else:
             parts.append(SOLIDS[1604](w, ball) / stretch)
-    assert made.scene.root.distance(points.T) == pytest.approx(np.min(parts, axis=0), abs=1e-6)
+    cut = next(node for node in made.scene.root.walk() if node.formula.name == "bounds")
+    expected = np.min(parts, axis=0)
+    assert cut.fields[0].distance(points.T) == pytest.approx(expected, abs=1e-6)
+    low, high = (np.array(cut[name])[:, None] for name in ("min", "max"))
+    outside = ((points < low) | (points > high)).any(axis=0)
+    assert not (outside & (expected < 0)).any() and outside.any()
 
 
 def test_orbits_without_a_solid_or_of_four_dimensions_in_a_hybrid_are_refused(tmp_path: Path) -> None:

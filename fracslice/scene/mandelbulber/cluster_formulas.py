@@ -149,7 +149,7 @@ def sphere_cluster(s: FormulaStep) -> None:
     s.refuse(
         "transf_function_enabledO_false", "transf_function_enabledSw_false", "transf_function_enabledT_false"
     )
-    d = s.measure(first=True, last=s.on("transf_function_enabledX_false"), slope=4)
+    d = s.measure(first=True, last=s.on("transf_function_enabledX_false"), slope=6)
     pentagons = s.on("transf_function_enabledD_false")
     balls, whole = packing(s, pentagons), s.on("transf_function_enabledK_false")
     count = s.values.whole("transf_int8_X")
@@ -189,7 +189,8 @@ def later_cluster(s: FormulaStep) -> FormulaStep:
     """Loop of the second and third kind, in which each iteration has a polyhedron of its own."""
     once(s)
     s.refuse("transf_function_enabledO_false", "transf_function_enabledA_false")
-    d = s.measure(first=True, last=s.on("transf_function_enabledX_false"), slope=4)
+    mixed = s.on("transf_function_enabledM_false")
+    d = s.measure(first=True, last=s.on("transf_function_enabledX_false"), slope=9 if mixed else 6)
     count = s.values.whole("transf_int_16")
     five, three = packing(s, True), packing(s, False)
     triangles = lettered(s, count, "A")
@@ -209,7 +210,7 @@ def later_cluster(s: FormulaStep) -> FormulaStep:
             reflect(inner, five, "n", 2, either(triangles, "0", "on"))
         if triangles is not None:
             reflect(inner, three, "m", 3, either(triangles, "on", "0"))
-        invert_at_face(inner, f"i > {count - 1.5}", s.on("transf_function_enabledM_false"))
+        invert_at_face(inner, f"i > {count - 1.5}", mixed)
         back_to_middle(inner, count)
         inner.write(f"k = where(on > 0.5, {inner.number('transf_scale_1')} * k, k)")
         enlarge_all(inner, "on > 0.5", inner.number("transf_scaleF_1"))

@@ -109,7 +109,7 @@ def reflected(d: FormulaStep) -> None:
 
 def sponge_coil(s: FormulaStep, pitched: bool, twisted: bool, count: str) -> None:
     """A sponge in coordinates wound about the z axis; g is the stretch."""
-    d = s.measure(slope=2)
+    d = s.measure()
     d.write("g = 1")
     with moved(s, d) as t:
         if s.on("transf_function_enabledF_false") and not pitched:

@@ -566,7 +566,7 @@ def octahedron_2(s: FormulaStep) -> None:
     box, ball = (s.on(f"transf_function_enabled{letter}_false") for letter in "DE")
     if s.index:
         s.refuse("transf_function_enabledD_false", "transf_function_enabledE_false")
-    d = s.measure(first=True)
+    d = s.measure(first=True, slope=3 if s.on("transf_function_enabledA_false") else 1)
     d.write("p, q, r = x, y, z")
     into_octant(d)
     octahedron(d)
@@ -612,6 +612,7 @@ def octahedron(d: FormulaStep) -> None:
         start = f"absolute({p})" if not less else f"{p}{less}"
         d.write(f"{q} = {p} - minimum(maximum({start} + t, 0), {most})")
     d.write(f"m = where(k < 0, -1, 1) * sqrt(a * a + b * b + c * c) - {d.number('transf_offset_0005')}")
+    d.write(f"m = m / {d.number('transf_scaleA_1')}")
 
 
 def tube_folds(s: FormulaStep, letter: str, name: str, switches: Sequence[str]) -> None:
@@ -631,7 +632,8 @@ def tube_folds(s: FormulaStep, letter: str, name: str, switches: Sequence[str]) 
 def tube(s: FormulaStep) -> None:
     """A tube along y whose section is a square, a circle or a triangle."""
     tube_folds(s, "T", "transf_offsetA_000", ("x_false", "y_false", "A_false"))
-    d = s.measure()
+    triangle = any(s.on(f"transf_function_enabled{letter}_false") for letter in "EF")
+    d = s.measure(slope=1.5 if triangle else 1)
     for letter, swap in (("S", "x, y = y, x"), ("M", "x, z = z, x")):
         if switched(s, f"{letter}_false", letter):
             d.write(swap)
