@@ -473,16 +473,36 @@ def refusal(path: Path, begin: str) -> str:
     return ""
 
 
-@pytest.mark.parametrize("count", [20, pytest.param(200, marks=pytest.mark.nightly)])
-def test_mutated_files_are_imported_or_refused(tmp_path: Path, count: int) -> None:
+@pytest.mark.parametrize(
+    ("formula", "values", "count"),
+    [
+        (5, "transf_scale_3 3", 20),
+        *(
+            pytest.param(number, values, 50, marks=pytest.mark.nightly)
+            for number, values in (
+                (5, "transf_scale_3 3"),
+                (271, "transf_int8_X 3; analyticDE_enabled_false true"),
+                (1638, "transf_int_16 2; transf_rotation 20 0 10"),
+                (1643, "transf_function_enabledA_false true"),
+            )
+        ),
+    ],
+)
+def test_mutated_files_are_imported_or_refused(tmp_path: Path, formula: int, values: str, count: int) -> None:
     source = text(
-        "formula_1 5; N 4; camera 0 -3 1; julia_mode true; julia_c -0.2 0.6 0; light1_color ffff 0 0",
-        "transf_scale_3 3",
+        f"formula_1 {formula}; N 4; camera 0 -3 1; julia_mode true; julia_c -0.2 0.6 0; "
+        "light1_color ffff 0 0",
+        values,
     ).encode()
     rng, path = random.Random(7), tmp_path / "x.fract"
     for _ in range(count):
         path.write_bytes(mutated(source, rng))
         assert "\n" not in refusal(path, str(path))
+
+
+def test_a_winding_without_a_thickness_is_a_surface(tmp_path: Path) -> None:
+    made = imported(tmp_path, text("formula_1 1636; N 1", "transf_offset_0005 0"))
+    assert any("a surface without an inside" in note for note in made.notes)
 
 
 def test_objects_are_placed_and_joined(tmp_path: Path) -> None:

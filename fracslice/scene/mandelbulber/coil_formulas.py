@@ -72,6 +72,11 @@ def sponge(d: FormulaStep) -> None:
     d.write(f"g = {s} * g")
 
 
+def is_thin(s: FormulaStep) -> bool:
+    """True if what is measured has no inside: distances outside a box, without a thickness."""
+    return s.value("transf_offset_0005") <= 0
+
+
 def outside(d: FormulaStep) -> None:
     """Coordinates p, q, s outside a box."""
     names = ("transf_offsetA_1", "transf_offset_01", "transf_offset_p1")
@@ -109,7 +114,7 @@ def reflected(d: FormulaStep) -> None:
 
 def sponge_coil(s: FormulaStep, pitched: bool, twisted: bool, count: str) -> None:
     """A sponge in coordinates wound about the z axis; g is the stretch."""
-    d = s.measure()
+    d = s.measure(thin=is_thin(s))
     d.write("g = 1")
     with moved(s, d) as t:
         if s.on("transf_function_enabledF_false") and not pitched:
@@ -153,7 +158,7 @@ def helix_2(s: FormulaStep) -> None:
     clipped = s.on("transf_function_enabledJ_false")
     if clipped and s.index:
         s.refuse("transf_function_enabledJ_false")
-    d = s.measure(first=clipped, last=s.on("analyticDE_enabled_false"), slope=2)
+    d = s.measure(clipped, s.on("analyticDE_enabled_false"), is_thin(s), slope=2)
     if clipped:
         s.refuse("transf_function_enabledZc_false")
         e, h = d.number("transf_offsetE_0"), d.number("transf_offset_2")
