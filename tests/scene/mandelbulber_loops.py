@@ -311,3 +311,6 @@ SOLIDS = {
 
 SIGNS = {1636, 1638, 1640}
 """Formulas whose distance we divide by more than the oracle: their signs are compared."""
+
+SLOW = {267, 268, 271, 275}
+"""Solids of loops that are written here for one point at a time."""

@@ -23,12 +23,17 @@ from fracslice.scene.mandelbulber.settings import SettingsSection, default_of, p
 from fracslice.scene.mandelbulber.step_text import ADDED, FORMULAS, OWN_SOLID, SWAPPED
 from tests.examples import stamped
 
-from . import mandelbulber_loops, mandelbulber_solids
+from . import mandelbulber_loops, mandelbulber_solids, mandelbulber_transforms
 from .mandelbulber_oracle import FORMULAS as ESCAPES
 from .mandelbulber_oracle import rotation as oracle_rotation
 from .mandelbulber_solids import FIRST, FOURS, VARIANTS
 
-ORACLE = {**ESCAPES, **mandelbulber_solids.FORMULAS, **mandelbulber_loops.FORMULAS}
+ORACLE = {
+    **ESCAPES,
+    **mandelbulber_transforms.FORMULAS,
+    **mandelbulber_solids.FORMULAS,
+    **mandelbulber_loops.FORMULAS,
+}
 SOLIDS = {**mandelbulber_solids.SOLIDS, **mandelbulber_loops.SOLIDS}
 
 pytestmark = pytest.mark.once
@@ -239,7 +244,8 @@ def test_distances_are_those_of_the_oracle(number: int) -> None:
     """Formulas with a distance of their own measure each point with that solid."""
     source = text(f"formula_1 {number}; N 1", VALUES.get(number, "") + FIRST.get(number, ""))
     orbit = orbits(parse_settings(source, "x.fract"))[0]
-    kind, points = distance_of(orbit), np.random.default_rng(number).uniform(-1.6, 1.6, (3, 1000))
+    count = 150 if number in mandelbulber_loops.SLOW else 1000
+    kind, points = distance_of(orbit), np.random.default_rng(number).uniform(-1.6, 1.6, (3, count))
     node = surface(orbit, kind, "") if kind != OWN_SOLID else own_solid(orbit, steps_of(orbit), 0, "")
     expected = SOLIDS[number](points, Values(parse_settings(source, "x").fractals[0]))
     found = node.distance(points.T)
