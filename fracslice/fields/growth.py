@@ -42,8 +42,9 @@ def escape_radius(
     radius: float,
     outer: float,
     end: float | None,
+    most: float = math.inf,
 ) -> float:
-    """Enlarge a radius until no orbit comes back from beyond it.
+    """Enlarge a radius until no orbit comes back from beyond it, or it is larger than `most`.
 
     `outer`: radius where orbits stop.
     """
@@ -55,7 +56,7 @@ def escape_radius(
         far = np.where(_nearest(lo, hi) < outer, _farthest(lo, hi), 0.0)
         if (far > radius).sum() > MOST:
             radius = float(np.partition(far, -MOST)[-MOST])
-        beyond: np.ndarray = far > radius
+        beyond: np.ndarray = far > (radius if radius <= most else math.inf)
         return beyond
 
     def proved(lo: Corners, hi: Corners) -> np.ndarray:
@@ -409,28 +410,10 @@ def _read(text: str) -> Growth | None:
 
 def _search(steps: Round, given: tuple[Given, ...], iterations: int) -> Growth | None:
     """Growth of an orbit by samples, proved where it can be."""
-    images = [image(steps, place, given) for place in range(len(steps))]
-    whole = compose_steps(images)
-    rays, origin = directions(), np.zeros(3)
-    if not norm(whole(rays * 1e4, origin)).min() > 1.02e4:
+    bound = escapes(steps, given)
+    if bound is None:
         return None
-    rates = [step_power(step, rays, origin) for step in images]
-    points = (rays[:, :, None] * RADII).reshape(3, -1)
-    fixed = all(stage.is_fixed for stage in stages(steps))
-    radius = bounded = sampled_radius(whole, points, ROUNDS, FARTHEST)
-    for _ in range(2):  # thin tips of the solid fall between samples; that of a few rounds has thicker ones
-        radius = max(sampled_escape(whole, points, 0.0 if fixed else bounded), 0.0 if fixed else bounded)
-        bounded = max(bounded, sampled_radius(whole, points, FEW, radius))
-    size = 0.0 if fixed else bounded
-    escapes = [
-        sampled_escape(compose_steps([*images[k:], *images[:k]]), points, size) for k in range(1, len(steps))
-    ]
-    powers, factors = zip(*rates, strict=True)
-    bound = Growth(powers, factors, (*escapes, radius), stretch=constant_stretch(steps, given))
-    bound = _prove_growth(steps, bound, given, size)
-    if not bound.proved:
-        bound = replace(bound, escapes=widened_escapes(images, bound.escapes, size))
-        bound = _prove_growth(steps, bound, given, size)
+    whole, points = whole_round(steps, given)
     reach, thick = (
         sampled_radius(whole, points, n, bound.escape) for n in (iterations, min(iterations, THICK))
     )
@@ -439,25 +422,55 @@ def _search(steps: Round, given: tuple[Given, ...], iterations: int) -> Growth |
     return replace(bound, half=_half(steps, bound, given, iterations)) if bound.fits else bound
 
 
+def whole_round(steps: Round, given: Sequence[Given]) -> tuple[Image, np.ndarray]:
+    """Image of a round, and points [3, n] along rays."""
+    points = (directions()[:, :, None] * RADII).reshape(3, -1)
+    return compose_steps([image(steps, place, given) for place in range(len(steps))]), points
+
+
+@lru_cache(maxsize=64)
+def escapes(steps: Round, given: tuple[Given, ...]) -> Growth | None:
+    """Growth of all numbers of rounds, without a box; None if orbits do not escape."""
+    images = [image(steps, place, given) for place in range(len(steps))]
+    whole, points = whole_round(steps, given)
+    rays, origin = directions(), np.zeros(3)
+    if not norm(whole(rays * 1e4, origin)).min() > 1.02e4:
+        return None
+    rates = [step_power(step, rays, origin) for step in images]
+    fixed = all(stage.is_fixed for stage in stages(steps))
+    radius = bounded = sampled_radius(whole, points, ROUNDS, FARTHEST)
+    for _ in range(2):  # thin tips of the solid fall between samples; that of a few rounds has thicker ones
+        radius = max(sampled_escape(whole, points, 0.0 if fixed else bounded), 0.0 if fixed else bounded)
+        bounded = max(bounded, sampled_radius(whole, points, FEW, radius))
+    size = 0.0 if fixed else bounded
+    radii = [
+        sampled_escape(compose_steps([*images[k:], *images[:k]]), points, size) for k in range(1, len(steps))
+    ]
+    powers, factors = zip(*rates, strict=True)
+    bound = Growth(powers, factors, (*radii, radius), stretch=constant_stretch(steps, given))
+    bound = _prove_growth(steps, bound, given, size)
+    if not bound.proved and (wider := widened_escapes(images, bound.escapes, size)) != bound.escapes:
+        bound = _prove_growth(steps, replace(bound, escapes=wider), given, size)
+    return bound
+
+
 def _prove_growth(steps: Round, bound: Growth, given: Sequence[Given], size: float) -> Growth:
     """Growth with radii of escape that are proved; the same if they cannot be."""
     tried, constants = bound, None if size and bound.by_power else size
-    for _ in range(TRIES if bound.fits else 0):
+    for left in reversed(range(TRIES if bound.fits else 0)):
         stops = [own[0] for own in numbers(tried)]
-        radii = [
-            escape_radius(
-                least_size(steps, first, given, stops, constants),
-                tried.escapes[first - 1],
-                math.sqrt(stops[first - 1]),
-                None if constants is None and first == 0 else tried.surface,
-            )
-            for first in range(len(steps))
-        ]
+        radii: list[float] = []
+        for first in range(len(steps)):
+            least = least_size(steps, first, given, stops, constants)
+            outer = math.sqrt(stops[first - 1])
+            end = None if constants is None and first == 0 else tried.surface
+            most = LARGER * bound.escapes[first - 1] if left else tried.escapes[first - 1]
+            radii.append(escape_radius(least, tried.escapes[first - 1], outer, end, most))
+            if radii[-1] > most:
+                return bound
         if (*radii[1:], radii[0]) == tried.escapes:
             return replace(tried, proved=True)
         tried = replace(tried, escapes=(*radii[1:], radii[0]))
-        if any(new > LARGER * old for new, old in zip(tried.escapes, bound.escapes, strict=True)):
-            break
     return bound
 
 

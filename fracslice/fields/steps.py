@@ -849,10 +849,20 @@ class _Follower(graph.Evaluator):
             raise MismatchError(f"{name!r} is not in the language of steps")
         if name == "where" and isinstance(given[1], Vector3) and isinstance(given[2], Vector3):
             pairs = zip(given[1].parts, given[2].parts, strict=True)
-            return Vector3(tuple(self.intrinsic(name, [given[0], p, q]) for p, q in pairs))
+            parts = tuple(self.intrinsic(name, [given[0], p, q]) for p, q in pairs)
+            return Vector3(parts, self.stretch_chosen(*given))
         if not all(isinstance(v, Scalar) for v in given):
             raise MismatchError("expected numbers, found a point")
         return self.tape.intrinsic(name, given)
+
+    def stretch_chosen(self, mask: Value, first: Vector3, second: Vector3) -> Stretch | None:
+        """Stretch of the one of two points that is taken, where both are known."""
+        if first.stretch is None or second.stretch is None or not isinstance(mask, Scalar):
+            return None
+        by_w, by_c = (
+            self.tape.chosen(mask.term, a, b) for a, b in zip(first.stretch, second.stretch, strict=True)
+        )
+        return by_w, by_c
 
     def majorant(self, verb: Verb, given: list[Value]) -> Majorant | None:
         """Majorant of a verb's image."""

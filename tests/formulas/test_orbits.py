@@ -64,6 +64,11 @@ def triplex(w, c):  # type: ignore[no-untyped-def]
     return power(positive(w), 3.0) + c
 
 
+def either(w, c):  # type: ignore[no-untyped-def]
+    x, y, z = w
+    return np.where(x > y, 2.0 * ball(w, 0.5), turn(w, (0.0, 0.6, 0.8), 35.0)) + c
+
+
 def traced(step, sizes: dict[str, int]):  # type: ignore[no-untyped-def]
     """Code of a step, and a function of points and constants that returns its images and stretches."""
     made = trace(step, sizes, {})
@@ -116,6 +121,13 @@ def test_verbs_need_no_derivatives() -> None:
     used = {made.terms[place].op for place in made.needed([*made.point, *made.stretch])}
     assert used.isdisjoint({"sqrt", "where"})
     assert made.terms[made.stretch[1]] == Term("constant", data=1.0)
+
+
+def test_a_choice_of_two_points_has_the_stretch_of_the_one_that_is_taken() -> None:
+    made, run = traced(either, {})
+    assert "sqrt" not in {made.terms[place].op for place in made.needed([*made.stretch])}
+    points = np.array([(0.1, 0.2, 0.0), (0.2, 0.1, 0.0)]).T
+    assert run(*points, *points)[1].tolist() == [1, 8]
 
 
 def test_zeros_and_constants_leave_no_code() -> None:

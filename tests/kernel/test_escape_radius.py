@@ -13,6 +13,7 @@ from fracslice.fields.growth import (
     _prove_growth,
     compose_steps,
     constant_stretch,
+    escape_radius,
     image,
     least_size,
     norm,
@@ -189,3 +190,18 @@ def test_search_of_a_hybrid_is_made_once(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(growth_module, "_search", None)
     growth_module.growth.cache_clear()
     assert growth_of(hybrid) == first
+
+
+def test_a_search_ends_where_the_radius_is_too_large() -> None:
+    """What comes back from everywhere is known to be too large before its cells are small."""
+    levels = []
+
+    def comes_back(lo: np.ndarray, hi: np.ndarray, far: np.ndarray) -> np.ndarray:
+        levels.append(len(far))
+        return np.zeros_like(far)
+
+    assert escape_radius(comes_back, 1.0, 4.0, None) > 3.9
+    cells = sum(levels)
+    levels.clear()
+    assert escape_radius(comes_back, 1.0, 4.0, None, 1.5) > 1.5
+    assert sum(levels) < cells / 2

@@ -187,10 +187,22 @@ def box_fold_bulb(w: Points, c: Points, v: Values, _: int) -> Points:
     return bulb(w, 2) * column((1, 1, -v["boxfold_bulbpow2_z_factor"]))
 
 
+DIAGONAL = about(2, 45) @ about(1, -np.degrees(np.arctan(np.sqrt(0.5))))
+"""Turns the diagonal of a cube to the z axis."""
+
+
+def folded_diagonal(w: Points, scale: Points, limits: Any) -> Points:
+    """Absolute values and a fold into a box in the frame of the diagonal."""
+    return DIAGONAL.T @ box(scale * abs(DIAGONAL @ w), limits)
+
+
 def box_fold_bulb_2(w: Points, c: Points, v: Values, i: int) -> Points:
-    w = box(w, v["transf_addition_constant_111"])
+    if v["transf_start_iterations_B"] <= i:
+        w = box(w, v["transf_addition_constant_111"])
     w = ball(w, v["transf_minR2_p25"], v["transf_maxR2_1"], v["mandelbox_offset"])
     w = v["transf_scale"] * w
+    if v["transf_function_enabledX_false"] and i == 0:
+        w = folded_diagonal(w, column(v["transf_scale3D_333"]), v["transf_addition_constantA_111"])
     if v["transf_start_iterations_A"] <= i < v["transf_stop_iterations_A"]:
         w = bulb(2 * w, 2) * column((1, 1, -v["boxfold_bulbpow2_z_factor"]))
     return w
@@ -207,8 +219,12 @@ def abox_mod_11(w: Points, c: Points, v: Values, i: int) -> Points:
     return rotation(v["transf_rotation"]) @ w if v["transf_rotation_enabled"] else w
 
 
-def amazing_surf_mod_2(w: Points, c: Points, v: Values, _: int) -> Points:
-    w = flat(w, v["transf_addition_constant_111"]) + column(v["transf_addition_constant"])
+def amazing_surf_mod_2(w: Points, c: Points, v: Values, i: int) -> Points:
+    w, a = flat(w, v["transf_addition_constant_111"]), column(v["transf_addition_constant"])
+    if v["transf_function_enabledBx_false"] and i < v["transf_stop_iterations_X"]:
+        w = w - (a**3 / (w**2 + a**2) - 2 * a) * v["transf_scale_1"]
+    else:
+        w = w + a
     w = ball(w, v["transf_minR2_p25"], v["transf_maxR2_1"], v["mandelbox_offset"])
     w = v["mandelbox_scale"] * w
     return rotation(v["mandelbox_rotation_main"]) @ w if v["mandelbox_main_rotation_enabled"] else w
@@ -232,7 +248,17 @@ def abox_mod_15(w: Points, c: Points, v: Values, i: int) -> Points:
         w = (w + o) * v["transf_scaleG_1"] / length2(w + o) + column(v["transf_addition_constant"]) - o
     w = box(w, v["transf_addition_constant_111"]) + column(v["transf_offsetA_000"])
     w = v["transf_scale_2"] * ball(w, v["transf_minR2_p25"], v["transf_maxR2_1"])
-    return rotation(v["transf_rotation2"]) @ (w + column(v["transf_addition_constantA_000"]))
+    w = rotation(v["transf_rotation2"]) @ (w + column(v["transf_addition_constantA_000"]))
+    return crossed(w, v) if v["transf_function_enabledN_false"] and v["transf_start_iterations_N"] <= i else w
+
+
+def crossed(w: Points, v: Values) -> Points:
+    """Reflections of |y| and |x| in the frame of their diagonal, then at two lines."""
+    x, y = abs(w[1]), abs(w[0])
+    u, t = x + y - v["transf_offset_0"], -abs(x - y - v["transf_offsetA_0"])
+    x, y = (u + t) / 2, (u - t) / 2
+    a, b = v["transf_offset_1"], v["transf_offsetA_1"]
+    return np.array([a - abs(x + a), b - abs(y + b), w[2]])
 
 
 def ifs(w: Points, c: Points, v: Values, _: int) -> Points:
@@ -251,126 +277,9 @@ def koch_ifs(w: Points, c: Points, v: Values, _: int) -> Points:
     return v["transf_scale_2"] * (w - o) + o
 
 
-def add_constant(w: Points, c: Points, v: Values, _: int) -> Points:
-    return w + column(v["transf_addition_constant"]) + column(v["transf_addition_constantA_000"])
-
-
-def turned(w: Points, c: Points, v: Values, _: int) -> Points:
-    return rotation(v["transf_rotation"]) @ w
-
-
 def turned_back(w: Points, c: Points, v: Values, _: int) -> Points:
     x, y, z = v["transf_rotationXYZ"]
     return about(0, x) @ about(1, y) @ about(2, z) @ w
-
-
-def turned_more(w: Points, c: Points, v: Values, i: int) -> Points:
-    start, stop = v["transf_start_iterations_250"], v["transf_stop_iterations"]
-    share = 0.0 if i < start else min((i - start) / (stop - start), 1)
-    return rotation(np.array(v["transf_rotation"]) + share * np.array(v["transf_offset_000"])) @ w
-
-
-def scaled(w: Points, c: Points, v: Values, _: int) -> Points:
-    return v["transf_scale"] * w
-
-
-def scaled_3d(w: Points, c: Points, v: Values, _: int) -> Points:
-    return column(v["transf_scale3D_111"]) * w
-
-
-def box_offset(w: Points, c: Points, v: Values, _: int) -> Points:
-    return w + np.sign(w) * column(v["transf_addition_constant"])
-
-
-def radial_offset(w: Points, c: Points, v: Values, _: int) -> Points:
-    return v["transf_scale"] * (1 - v["transf_offset"] / np.sqrt(length2(w))) * w
-
-
-def add_start(w: Points, c: Points, v: Values, _: int) -> Points:
-    return w + c * column(v["transf_constant_multiplier_111"])
-
-
-def box_fold(w: Points, c: Points, v: Values, _: int) -> Points:
-    return box(w, v["mandelbox_folding_limit"], v["mandelbox_folding_value"])
-
-
-def spherical_fold(w: Points, c: Points, v: Values, _: int) -> Points:
-    r2, o = length2(w), column(v["mandelbox_offset"])
-    m, f = v["mandelbox_folding_min_radius"] ** 2, v["mandelbox_folding_fixed_radius"] ** 2
-    k = np.where(r2 < m, f / m, np.where(r2 < f, f / r2, 1))
-    return k * v["transf_scale"] * (w + o) - o
-
-
-def zyx(w: Points, c: Points, v: Values, _: int) -> Points:
-    return w[::-1]
-
-
-def absolute_between(w: Points, c: Points, v: Values, _: int) -> Points:
-    return abs(w + column(v["transf_addition_constant"])) + column(v["transf_offsetA_000"])
-
-
-def absolute_at(w: Points, c: Points, v: Values, _: int) -> Points:
-    w = abs(w + column(v["transf_addition_constant"])) + column(v["transf_offset_000"])
-    a = column(v["transf_offsetA_000"])
-    return a - abs(a - w)
-
-
-def tglad(w: Points, c: Points, v: Values, _: int) -> Points:
-    a = column(v["transf_addition_constant"])
-    return abs(w + a) - abs(w - a) - w
-
-
-def radial_power(w: Points, c: Points, v: Values, _: int) -> Points:
-    return np.sqrt(length2(w)) ** (v["power"] - 1) * w
-
-
-def radial_cube(w: Points, c: Points, v: Values, _: int) -> Points:
-    return v["transf_scale"] * length2(w) * w
-
-
-def menger_fold(w: Points, c: Points, v: Values, _: int) -> Points:
-    return menger(w, v["transf_scale_3"], v["transf_constant_multiplier_111"])
-
-
-def inverted(w: Points, c: Points, v: Values, _: int) -> Points:
-    w = v["transf_scale"] * (w + column(v["mandelbox_offset"]))
-    return w / length2(w) - column(v["mandelbox_offset"]) - column(v["transf_addition_constant"])
-
-
-def turned_folds(w: Points, c: Points, v: Values, _: int) -> Points:
-    o = column(v["transf_offset_000"])
-    w = abs(rotation(v["transf_rotation"]) @ w + o) - o
-    return rotation(v["transf_rotation2"]) @ w
-
-
-def absolute_conditional(w: Points, c: Points, v: Values, _: int) -> Points:
-    a, b = column(v["transf_offset_111"]), column(v["transf_scale3D_000"])
-    return np.sign(w) * (a - abs(w) + b * abs(w))
-
-
-def sectors(w: Points, c: Points, v: Values, _: int) -> Points:
-    n = v["transf_int_6"]
-    number = np.trunc(-n / (2 * np.pi) * np.arctan(w[0] / w[1]))
-    a = number * 2 * np.pi / n
-    x, y = w[0] * np.cos(a) - w[1] * np.sin(a), w[0] * np.sin(a) + w[1] * np.cos(a)
-    y = np.where(number % 2 == 1, -y, y)
-    return np.array([x + v["transf_offset_0"], y + v["transf_offsetA_0"], w[2]])
-
-
-def polygon(w: Points, c: Points, v: Values, _: int) -> Points:
-    x, y, k = abs(w[0]), w[1], np.pi / v["transf_int8_X"]
-    angle = abs(np.fmod(np.arctan2(y, x) + k, 2 * k) - k)
-    r = np.hypot(x, y)
-    return np.array([r * np.cos(angle), r * np.sin(angle), w[2]]) + column(v["transf_addition_constant"])
-
-
-def diagonal(w: Points, c: Points, v: Values, _: int) -> Points:
-    return np.array([np.minimum(w[0], w[1]), np.maximum(w[0], w[1]), w[2]])
-
-
-def scale_about(w: Points, c: Points, v: Values, _: int) -> Points:
-    a = column(v["transf_addition_constant"])
-    return v["transf_scale_1"] * (w - a) + a
 
 
 def mandalay(w: Points, c: Points, v: Values, _: int) -> Points:
@@ -384,52 +293,12 @@ def mandalay(w: Points, c: Points, v: Values, _: int) -> Points:
     return np.sign(w) * q
 
 
-def add_inverse(w: Points, c: Points, v: Values, _: int) -> Points:
-    d, r = 1 / length2(w), 1 / np.sqrt(length2(w))
-    d = r + (d - r) * v["transf_scaleA_1"]
-    return v["transf_scaleB_1"] * (w + w * column(v["transf_scale3D_111"]) * d)
-
-
 def symmetric(w: Points, c: Points, v: Values, _: int) -> Points:
     w = abs(w)
     for k, (i, j) in enumerate(((0, 2), (0, 1), (1, 2))):
         t = v["transf_addition_constant_0555"][k] * (w[i] - w[j] - abs(w[i] - w[j]))
         w[i], w[j] = w[i] - t, w[j] + t
     return v["transf_scale_1"] * (w + column(v["transf_offsetA_000"]))
-
-
-def times_square(w: Points, c: Points, v: Values, i: int) -> Points:
-    w = v["transf_scale"] * (w + column(v["mandelbox_offset"]))
-    r2 = length2(w)
-    k = r2
-    if v["transf_function_enabledP_false"] and i < v["transf_stop_iterations_P1"]:
-        k = 1 / r2
-        w = k * w
-    o = column(v["transf_offset_000"])
-    if i < v["transf_stop_iterations_C1"]:
-        w = (w + o) / k - o
-    return w - column(v["mandelbox_offset"]) - column(v["transf_addition_constant"])
-
-
-def tiled(w: Points, c: Points, v: Values, _: int) -> Points:
-    size = v["transf_offset_222"][0]
-    w = w - column(v["transf_addition_constantA_000"])
-    w[0] = w[0] - v["transf_offset_000"][0]
-    w[0] = w[0] - size * np.floor(w[0] / size + 0.5)
-    return w
-
-
-def add_start_inverted(w: Points, c: Points, v: Values, _: int) -> Points:
-    return w + column(v["transf_constant_multiplier_111"]) / c
-
-
-def sine_cosine(w: Points, c: Points, v: Values, _: int) -> Points:
-    x = 2 * np.pi * w[0]
-    s = v["transf_scaleA_1"] * np.sin(x / v["transf_constant_multiplierA_111"][0])
-    t = v["transf_scaleB_1"] * np.cos(x / v["transf_constant_multiplierB_111"][0])
-    w = w.copy()
-    w[0] = np.maximum(np.maximum(s, t), v["transf_scaleC_1"] * s * t)
-    return v["transf_scale"] * w
 
 
 def kali(w: Points, c: Points, v: Values, _: int) -> Points:
@@ -479,7 +348,8 @@ def abox_mod_13(w: Points, c: Points, v: Values, i: int) -> Points:
     w = ball(w, v["transf_minR2_p25"], v["transf_maxR2_1"], v["mandelbox_offset"])
     w = v["mandelbox_scale"] * w
     if v["transf_start_iterations_B"] <= i:
-        w = w + column(v["transf_addition_constant"])
+        share = (-v["transf_scale_1"]) ** i if v["transf_function_enabledAx_false"] else 1
+        w = w + share * column(v["transf_addition_constant"])
     return rotation(v["transf_rotation"]) @ w if v["transf_rotation_enabled"] else w
 
 
@@ -491,7 +361,13 @@ def fold_box_mod_1(w: Points, c: Points, v: Values, _: int) -> Points:
 
 
 def mandelbox_menger(w: Points, c: Points, v: Values, i: int) -> Points:
-    return menger(mandelbox(w, c, v, i), v["transf_scale_3"], v["transf_constant_multiplierA_111"])
+    w = mandelbox(w, c, v, i)
+    for _ in range(int(v["transf_int_1"])):
+        w = menger(w, v["transf_scale_3"], v["transf_constant_multiplierA_111"])
+        w = w + column(v["transf_addition_constantA_000"])
+        if v["transf_function_enabledx_false"]:
+            w = w + c[[2, 0, 1]] * column(v["transf_constant_multiplierB_111"])
+    return w
 
 
 def mandalay_box(w: Points, c: Points, v: Values, i: int) -> Points:
@@ -598,27 +474,6 @@ def mandalay_box_2(w: Points, c: Points, v: Values, i: int) -> Points:
     return v["transf_scale_2"] * ball(mandalay(w, c, v, i), v["transf_minR2_p25"], v["transf_maxR2_1"])
 
 
-def polygon_mixed(w: Points, c: Points, v: Values, i: int) -> Points:
-    if i >= v["transf_stop_iterations_D1"]:
-        return w + column(v["transf_addition_constant"])
-    x, y, z = np.array([abs(w[0]), abs(w[1]), w[2]]) + column(v["transf_offset_000"])
-    k = np.pi / v["transf_int8_X"]
-    angle, r = abs(np.fmod(np.arctan2(y, x) + k, 2 * k) - k), np.hypot(x, y)
-    p, q = r * np.cos(angle), r * np.sin(angle)
-    mixed = [q + (p - q) * v["transf_scaleF_1"], p + (q - p) * v["transf_scaleG_1"], z]
-    return np.array(mixed) + column(v["transf_addition_constant"])
-
-
-def menger_fold_2(w: Points, c: Points, v: Values, _: int) -> Points:
-    w, o, scale = abs(w) + column(v["transf_offset_000"]), v["transf_offset_1105"], v["transf_scale_3"]
-    for k, (i, j) in enumerate(((0, 2), (0, 1), (1, 2))):
-        t = v["transf_addition_constant_0555"][k] * (w[i] - w[j] - abs(w[i] - w[j]))
-        w[i], w[j] = w[i] - t, w[j] + t
-    middle = o[2] * (scale - 1) / scale
-    w[2] = middle - abs(w[2] - middle)
-    return scale * w - column((o[0], o[1], 0)) * (scale - 1) + column(v["transf_addition_constantA_000"])
-
-
 def mandelbar(w: Points, c: Points, v: Values, _: int) -> Points:
     x, y, z = w
     m = 1 - z * z / (x * x + y * y)
@@ -653,11 +508,12 @@ def moved_square(w: Points, c: Points, v: Values, _: int) -> Points:
 
 def squares(w: Points, c: Points, v: Values, _: int) -> Points:
     x, y, z = w
+    sign = -1 if v["transf_function_enabledF_false"] else 1
     m = y * y / (x * x + z * z) - 1
     x, y, z = 2 * x * z * m, 2 * y * np.hypot(x, z), (z * z - x * x) * m
     if v["transf_function_enabledAz_false"]:
         m = 1 - z * z / (x * x + y * y)
-        x, y, z = 2 * x * y * m, (y * y - x * x) * m, 2 * z * np.hypot(x, y)
+        x, y, z = sign * 2 * x * y * m, (y * y - x * x) * m, sign * 2 * z * np.hypot(x, y)
     return np.array([x, y, z])
 
 
@@ -711,36 +567,51 @@ def eiffie(w: Points, c: Points, v: Values, _: int) -> Points:
     return v["transf_scale_1"] * (1 - v["transf_offset"] / np.sqrt(length2(w))) * w
 
 
-def dot_fold(w: Points, c: Points, v: Values, _: int) -> Points:
-    a, b = np.radians(v["transf_angle_deg_A"]), np.radians(v["transf_angle_deg_B"])
-    n = np.array([np.cos(a) * np.sin(b), np.sin(a), np.cos(a) * np.cos(b)]) + v["transf_offset_000"]
-    n /= np.linalg.norm(n)
-    return rotation(v["transf_rotation"]) @ (w - 2 * n[:, None] * np.maximum(n @ w, 0))
-
-
-def octo_fold(w: Points, c: Points, v: Values, _: int) -> Points:
-    for j, sign in ((1, -1), (2, -1), (1, 1), (2, 1)):
-        low = w[0] < sign * w[j]
-        w = w.copy()
-        w[0], w[j] = np.where(low, sign * w[j], w[0]), np.where(low, sign * w[0], w[j])
-    w[0] = abs(w[0])
-    return v["transf_scale_2"] * w - (v["transf_scale_2"] - 1) * column(v["transf_offset_100"])
-
-
-def folding_planes(w: Points, c: Points, v: Values, _: int) -> Points:
-    limit, value = v["mandelbox_folding_limit"], v["mandelbox_folding_value"]
-    for k in range(3):
-        back, forth = (rotation(v[f"mandelbox_rotation_{s}_{k + 1}"]) for s in ("neg", "pos"))
-        above, below = back @ w, forth @ w
-        first, second = above[k] > limit, below[k] < -limit
-        above[k], below[k] = value - above[k], -value - below[k]
-        w = np.where(first, back.T @ above, np.where(second, forth.T @ below, w))
+def julia_bulb(w: Points, c: Points, v: Values, i: int, fifth: bool = False) -> Points:
+    """The square of a point folded about x, less along the radius, and a quaternion's square."""
+    if fifth:
+        w = box(w, v["transf_addition_constant"]) if v["transf_function_enabledC_false"] else w
+    more = fifth and v["transf_function_enabledB_false"] and i < v["transf_stop_iterations_B"]
+    k, r = np.pi / (v["transf_int8_Y"] + v["transf_int_1"] * more), np.hypot(w[1], w[2])
+    angle = abs(np.fmod(np.arctan2(w[2], w[1]) + np.pi + k, 2 * k) - k)
+    z = r * np.sin(angle)
+    square, m = (w[0] + 1j * r * np.cos(angle)) ** 2, 1 - z**2 / length2(w)
+    first = square.real * m * (v["transf_scaleB_1"] if fifth else 1)
+    w = np.array([first, square.imag * m * v["transf_scale"], 2 * z * np.sqrt(abs(square))])
+    w = w + column(v["transf_addition_constant_neg100"])
+    if v["transf_addCpixel_enabled_false"]:
+        w = w + np.sign(w) * abs(c) * column(v["transf_constant_multiplier_000"])
+    w = v["transf_scale_1"] * (1 - v["transf_offset"] / np.sqrt(length2(w))) * w
+    if v["transf_function_enabled_false"] and i < v["transf_stop_iterations_A"]:
+        w = quaternion(w, c, v, i)
+        if fifth:
+            w[2] -= c[2] * v["transf_scaleF_1"] + v["transf_offset_0"]
     return w
 
 
-def absolute_differences(w: Points, c: Points, v: Values, _: int) -> Points:
-    a, b = column(v["transf_addition_constant"]), column(v["transf_offset_000"])
-    return abs(w + a) - abs(w - b) - column(v["transf_scale3D_111"]) * w + column(v["transf_offsetA_000"])
+def julia_bulb_5(w: Points, c: Points, v: Values, i: int) -> Points:
+    return julia_bulb(w, c, v, i, True)
+
+
+def riemann_sphere(w: Points, c: Points, v: Values, _: int) -> Points:
+    r = np.sqrt(length2(w))
+    u = v["transf_scale"] * w / r
+    plane = u[:2] / (1 - u[2])
+    w = np.array([*plane, (r - 1.5) * (1 + length2(plane))])
+    w = rotation(v["transf_rotation"]) @ w
+    w[:2] -= np.floor(w[:2] + 0.5)
+    return w * column(v["transf_constant_multiplier_441"]) + column(v["transf_addition_constant"])
+
+
+def riemann_sphere_2(w: Points, c: Points, v: Values, _: int) -> Points:
+    r = np.sqrt(length2(w))
+    x, y, z = v["transf_scale_08"] * w / r
+    x, z = (
+        np.tan(4 * v[f"transf_scale{name}_1"] * np.arctan2(2 * p / (y - 1), (p / (y - 1)) ** 2 - 1))
+        for name, p in (("A", x), ("B", z))
+    )
+    s = x * x + z * z
+    return r**4 / (s + 1) * np.array([2 * x, s - 1, 2 * z]) + column(v["transf_offset_010"])
 
 
 def amazing_surf_klein_2(w: Points, c: Points, v: Values, i: int) -> Points:
@@ -760,17 +631,6 @@ def amazing_surf_m3d(w: Points, c: Points, v: Values, _: int) -> Points:
 def lkmitch(w: Points, c: Points, v: Values, _: int) -> Points:
     x, y, z = w
     return np.array([x * x - 2 * y * z, z * z + 2 * x * y, y * y - 2 * x * z])
-
-
-def sine_or_cosine(w: Points, c: Points, v: Values, _: int) -> Points:
-    u = w * column(v["transf_constant_multiplierC_111"])
-    return v["transf_scale"] * np.array([np.cos(u[0]), np.sin(u[1]), np.sin(u[2])])
-
-
-def platonic(w: Points, c: Points, v: Values, _: int) -> Points:
-    x, y, z = v["platonic_solid_frequency"] * w
-    waves = np.cos(x) * np.sin(y) + np.cos(y) * np.sin(z) + np.cos(z) * np.sin(x)
-    return w * (waves * v["platonic_solid_amplitude"] + length2(w) ** 0.25 * v["platonic_solid_rhoMul"])
 
 
 FORMULAS: dict[int, Formula] = {
@@ -797,39 +657,6 @@ FORMULAS: dict[int, Formula] = {
     226: abox_mod_15,
     228: ifs,
     279: koch_ifs,
-    1001: add_constant,
-    1002: turned,
-    1003: scaled,
-    1004: scaled_3d,
-    1005: box_offset,
-    1006: radial_offset,
-    1007: add_start,
-    1020: box_fold,
-    1021: spherical_fold,
-    1022: zyx,
-    1023: absolute_between,
-    1025: tglad,
-    1027: radial_power,
-    1036: turned_more,
-    1052: menger_fold,
-    1054: radial_cube,
-    1055: inverted,
-    1064: turned_folds,
-    1065: absolute_conditional,
-    1068: radial_offset,
-    1080: sectors,
-    1084: sine_cosine,
-    1098: diagonal,
-    1100: polygon,
-    1105: scale_about,
-    1108: mandalay,
-    1129: turned_back,
-    1135: add_start_inverted,
-    1146: add_inverse,
-    1150: tiled,
-    1152: absolute_at,
-    1155: times_square,
-    1158: symmetric,
     20: benesi,
     59: fold_box_mod_1,
     60: kali,
@@ -851,8 +678,6 @@ FORMULAS: dict[int, Formula] = {
     266: pupuku,
     222: abox_klein,
     199: mandalay_box_2,
-    1140: polygon_mixed,
-    1145: menger_fold_2,
     282: mandelbar,
     259: mandelnest_full,
     92: kali_bulb,
@@ -864,13 +689,11 @@ FORMULAS: dict[int, Formula] = {
     13: three_planes,
     14: two_planes,
     70: eiffie,
-    1151: dot_fold,
-    1059: octo_fold,
-    1048: folding_planes,
-    1029: absolute_differences,
     224: amazing_surf_klein_2,
     233: amazing_surf_m3d,
     49: lkmitch,
-    1082: sine_or_cosine,
-    56: platonic,
+    71: riemann_sphere,
+    139: riemann_sphere_2,
+    218: julia_bulb,
+    219: julia_bulb_5,
 }

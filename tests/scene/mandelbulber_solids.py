@@ -9,6 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from .mandelbulber_oracle import (
+    DIAGONAL,
     Formula,
     Points,
     Values,
@@ -16,6 +17,7 @@ from .mandelbulber_oracle import (
     ball,
     box,
     column,
+    folded_diagonal,
     koch_ifs,
     length2,
     menger,
@@ -67,11 +69,90 @@ VALUES = {
     1639: "transf_offset_110 1 0.8 0.1",
     1627: "transf_function_enabledM_false true; transf_function_enabledO_false true; transf_offset_05 0.3; "
     "transf_function_enabledP_false true; transf_offset_p01 0.1",
+    104: "transf_function_enabledAy_false true; transf_function_enabledK_false true; transf_scaleB_1 1.2; "
+    "transf_function_enabledN_false true; transf_addition_constant 0.1 0 0.2; "
+    "transf_function_enabledM_false true; transf_start_iterations_M 1; transf_addition_constantA_000 0 0.1 0",
+    225: "transf_sphere_inversion_enabled_false true; transf_offset_000 1 0 -0.1; transf_offset 0.1; "
+    "transf_addition_constant 0 0 -1; transf_folding_value 1.97; transf_function_enabledP_false true; "
+    "transf_function_enabledI_false true; transf_function_enabledz false; transf_scaleA_1 0.8",
+    230: "transf_folding_value 1.9; transf_function_enabledAw_false true; "
+    "transf_function_enabledN_false true; transf_function_enabledX_false true; transf_offset 0.1; "
+    "transf_offset_02 0.1; transf_offset_2 1; transf_function_enabledE_false true; transf_scale_0 -0.5; "
+    "transf_function_enabledK_false true; transf_scale_vary_0 0.05; transf_function_enabledT_false true; "
+    "transf_start_iterations_T 1",
+    610: "donut_factor 2; donut_number 5; donut_ring_thickness 0.2",
+    82: "donut_factor 2.5; donut_number 6; donut_ring_thickness 0.15",
+    1628: "transf_function_enabledM_false true; transf_function_enabledO_false true; transf_offset_p01 0.1; "
+    "transf_rotation -13 0 0; transf_scale_1 0.9; transf_offset_000 0 0.1 0.2; transf_offset_05 0.3; "
+    "transf_function_enabledZc_false true; transf_stop_iterations_Zc 2; transf_function_enabledP_false true",
+    1629: "transf_function_enabledCz_false true; transf_int_32 8; transf_offset_000 0 0 0.3; "
+    "transf_function_enabledK_false true; transf_int_1 3; transf_offset_p01 0.1; transf_scale_1 1.2; "
+    "transf_rotation 0 20 0",
+    1637: "transf_function_enabledE_false true; transf_function_enabledZc_false true; "
+    "transf_offset_000 0 0.5 0; transf_offset_110 1 1 0.2; transf_offsetA_000 -0.1 0.4 0; "
+    "transf_offsetC_0 0.2; transf_radius_1 0.8; transf_function_enabledF_false true; transf_scaleB_1 0.2; "
+    "transf_scaleD_1 0.8; transf_offset_01 0.4; transf_function_enabled_false true; transf_scaleA_1 0.7",
+    1643: "transf_scaleA_1 1.2; transf_function_enabledF_false true; transf_offsetF_000 0.1 0.2 0; "
+    "transf_function_enabledA_false true; transf_offset_000 0.1 0 0",
+    1645: "transf_function_enabledCx false; transf_function_enabledD_false true; transf_offsetA_1 0.5; "
+    "transf_function_enabledE_false true; transf_function_enabledK_false true; transf_offset_p01 0.1; "
+    "transf_function_enabledS_false true; transf_offsetF_000 0.5 0.2 0; transf_function_enabledT_false true; "
+    "transf_scale_1 1.5; transf_offsetA_000 0.1 0.2 0",
+    1646: "transf_angle_deg_A 22; transf_function_enabledJ_false true; transf_function_enabledC_false true; "
+    "transf_function_enabledT_false true; transf_offset_000 0.4 0 0; transf_scale_1 1.3; "
+    "transf_offset_0005 0.1",
     1632: "transf_scaleB_0 0.7; transf_scaleA_0 0.2; transf_function_enabledA_false true; "
     "transf_function_enabledAx_false true; transf_offset_000 0.1 0 0; transf_scaleC_1 0.8",
     1633: "transf_function_enabledCx_false true; transf_int8_X 5; transf_scale_1 1.5; transf_offset_p01 0.1; "
     "transf_offsetA_p01 0.2; transf_offsetB_p01 0.15; transf_function_enabledD_false true",
 }
+
+
+FIRST = {
+    1636: "; transf_function_enabledJ_false true; transf_offset_2 0.5; transf_offsetE_0 0.2",
+    1643: "; transf_function_enabledD_false true; transf_function_enabledE_false true; transf_scale_08 0.6; "
+    "transf_function_enabledJ_false true",
+}
+"""Values of solids that are about the start point, and so of the first iteration alone."""
+
+VARIANTS = [
+    (37, "mandelbox_generalized_fold_type fold_dodeca; mandelbox_scale -1.7"),
+    (37, "mandelbox_generalized_fold_type fold_cube; mandelbox_scale -1.7"),
+    (37, "mandelbox_generalized_fold_type fold_box5; mandelbox_scale -1.7"),
+    (37, "mandelbox_generalized_fold_type fold_box6; mandelbox_solid 0.8"),
+    (
+        56,
+        "transf_function_enabled_false true; transf_function_enabledAx_false true; transf_scale_1 0.4; "
+        "transf_function_enabledy_false true; transf_function_enabledAz_false true",
+    ),
+    (
+        91,
+        "transf_function_enabledx_false true; transf_int_1 2; transf_constant_multiplierB_111 1 0.5 0.2; "
+        "transf_addition_constantA_000 0.1 0 0; mandelbulbMulti_order_of_xyz_C zxy",
+    ),
+    (117, "transf_function_enabledx_false true; transf_scale3D_333 2.6 3 3"),
+    (126, "transf_function_enabledX_false true; transf_start_iterations_B 1"),
+    (127, "transf_function_enabledAx_false true; transf_addition_constant 0 0.1 2; transf_scale_1 -0.6"),
+    (
+        132,
+        "transf_function_enabledBx_false true; transf_function_enabledBz_false true; transf_scale_1 0.2; "
+        "transf_addition_constant 0.1 -0.3 -0.1; transf_stop_iterations_X 2",
+    ),
+    (
+        226,
+        "transf_function_enabledN_false true; transf_function_enabledA_false true; "
+        "transf_function_enabledAx_false true; transf_start_iterations_N 1; transf_offset_0 0.1",
+    ),
+    (
+        262,
+        "transf_function_enabledF_false true; transf_function_enabledE_false true; "
+        "transf_function_enabledAz_false true; transf_function_enabledA_false true",
+    ),
+    (1155, "transf_scale 0.9; mandelbox_offset 0.2 0 0; transf_function_enabledy_false true"),
+    (1633, "transf_function_enabledZc_false true; transf_offset_p01 0.3; transf_offsetC_111 2 1 1.5"),
+    (1639, "transf_function_enabledZc_false true; transf_offset_110 1 0.8 0.1"),
+]
+"""Formulas with switches beside those of `VALUES`."""
 
 
 def inverse(w: Points, centre: Points, radius2: float, back: Points) -> Points:
@@ -115,8 +196,7 @@ def pseudo_kleinian(w: Points, c: Points, v: Values, i: int) -> Points:
 
 def diagonal_scale(w: Points, scale: Points, back: Points) -> Points:
     """Absolute values in a frame about the diagonal."""
-    frame = about(2, 45) @ about(1, -np.degrees(np.arctan(np.sqrt(0.5))))
-    return frame.T @ (scale * abs(frame @ w)) - back
+    return DIAGONAL.T @ (scale * abs(DIAGONAL @ w)) - back
 
 
 def pushed(w: Points, limit: Points, share: Points) -> Points:
@@ -126,6 +206,9 @@ def pushed(w: Points, limit: Points, share: Points) -> Points:
 
 
 def pseudo_kleinian_2(w: Points, c: Points, v: Values, i: int) -> Points:
+    if v["transf_function_enabledx_false"]:
+        start = folded_diagonal(w, column(v["transf_scale3D_333"]), v["transf_addition_constant_111"])
+        return out_of_ball(w if i else start, v)
     w = v["transf_scale_1"] * ball(w, v["transf_minR2_p25"], v["transf_maxR2_1"])
     if i == 0:
         w = diagonal_scale(w, column(v["transf_scale3D_222"]), column(v["transf_offset_200"]))
@@ -252,9 +335,15 @@ def scaled(w: Points, c: Points, v: Values, _: int) -> Points:
 
 
 def framed(w: Points, c: Points, v: Values, i: int) -> Points:
+    if v["transf_function_enabledZc_false"]:
+        return abs(v["transf_scale_1"] * w) - column(v["transf_offsetC_111"])
     if v["transf_start_iterations_A"] <= i < v["transf_stop_iterations_A"]:
         w = polygon(np.array([w[0], abs(w[1]), w[2]]), int(v["transf_int8_X"]))
     return v["transf_scale_1"] * abs(w - column(v["transf_offset_000"]))
+
+
+def board(w: Points, c: Points, v: Values, _: int) -> Points:
+    return abs(w) - column(v["transf_offset_110"]) if v["transf_function_enabledZc_false"] else w
 
 
 def moved(w: Points, c: Points, v: Values, _: int) -> Points:
@@ -275,10 +364,145 @@ def newton(w: Points, c: Points, v: Values, _: int) -> Points:
     return v["transf_scaleB_1"] * triplex(w, -1) + column(v["transf_offset_000"])
 
 
+def globe_2(w: Points, c: Points, v: Values, i: int) -> Points:
+    w = rotation(v["transf_rotation"]) @ (v["transf_scale_1"] * (w + column(v["transf_offset_000"])))
+    return lunes(w, int(v["transf_int8_Z"])) if i < v["transf_stop_iterations_Zc"] else w
+
+
+def globe_3(w: Points, c: Points, v: Values, _: int) -> Points:
+    w = polygon(np.array([w[0], abs(w[1]), w[2]]), int(v["transf_int_32"]))
+    z, x, y = polygon(np.array([w[2], abs(w[0]), w[1]]), int(v["transf_int8_Z"]))
+    w = v["transf_scale_1"] * (np.array([x, y, z]) + column(v["transf_offset_000"]))
+    return rotation(v["transf_rotation"]) @ w[[2, 0, 1]]
+
+
+def cayley(w: Points, c: Points, v: Values, i: int) -> Points:
+    if i == 0:
+        w = about(2, 45) @ w
+    x, y, z = np.array([abs(w[0]), abs(w[1]), w[2]]) + column(v["transf_offset_000"])
+    x, y, z = v["transf_scale_1"] * np.array([x, y, z])
+    square = (x + 1j * y) ** 2
+    m = v["transf_scaleA_2"] * x**2 * y**2 + x**4 + y**4
+    n = m + v["transf_scale_4"] * x * y + 1
+    image = np.array([v["transf_scale_2"] * (m - 1) / n, -2 * square.real / n, v["transf_scaleA_1"] * z])
+    return abs(image) - column(v["transf_offset_110"])
+
+
+def of_cayley(w: Points, v: Values) -> np.ndarray:
+    to_planes = (w + column(v["transf_offset_110"]) - column(v["transf_addition_constant"])).min(axis=0)
+    first = np.maximum(np.linalg.norm(np.maximum(w, 0), axis=0), to_planes) - v["transf_offsetC_0"]
+    r, h = np.hypot(w[0], w[1]) - v["transf_radius_1"], abs(w[2]) - v["transf_offset_01"]
+    a, b, d = v["transf_offsetA_000"]
+    corner = np.hypot(np.maximum(r - a, -b), np.maximum(h - d, 0))
+    second = np.maximum(np.minimum(np.maximum(r, h), 0) + corner, to_planes) - v["transf_offsetD_0"]
+    return first + (second - first) * v["transf_scaleD_1"] - v["transf_offsetA_0"]
+
+
+def octant(w: Points, c: Points, v: Values, _: int) -> Points:
+    h = column(v["transf_offsetF_000"])
+    return abs(v["transf_scaleA_1"] * (w - np.clip(w, -h, h))) - column(v["transf_offset_000"])
+
+
+def of_octahedron(w: Points, v: Values) -> np.ndarray:
+    p = octant(w, w, v, 0)
+    k = v["transf_scale_1"] * ((p.sum(axis=0) - v["transf_offset_1"]) / 3) ** 2
+    t = np.minimum(p - k, 0).sum(axis=0) / 2
+    m = np.linalg.norm(p - np.clip(p - k + t, 0, v["transf_offsetA_1"]), axis=0) - v["transf_offset_0005"]
+    m = np.maximum(m / v["transf_scaleA_1"], of_box(w, column(v["transf_addition_constant_0555"])))
+    return np.minimum(m, np.sqrt(length2(w)) - v["transf_scale_08"])
+
+
+def tube(w: Points, c: Points, v: Values, _: int) -> Points:
+    return v["transf_scale_1"] * w - column(v["transf_offsetA_000"])
+
+
+def of_tube_2(w: Points, v: Values) -> np.ndarray:
+    y, x, z = w
+    a, b, _ = v["transf_offsetF_000"]
+    z = abs(z) - b
+    t = np.hypot(abs(x) - a, z)
+    t = np.maximum(0.75**0.5 * t + z / 2, -z) - v["transf_offset_02"]
+    return capped(np.maximum(t, abs(t) - v["transf_offset_p01"]), abs(y) - v["transf_offsetA_1"])
+
+
+def torus_4(w: Points, c: Points, v: Values, _: int) -> Points:
+    turn = about(2, v["transf_angle_deg_A"])
+    w = turn @ (v["transf_scale_1"] * w - column(v["transf_offset_000"]))
+    return turn @ np.array([abs(w[0]), w[1], w[2]])
+
+
+def of_half_torus(w: Points, v: Values) -> np.ndarray:
+    e = v["transf_offset_0005"]
+    wall = abs(torus(w, v["transf_radius_1"], v["transf_offset_02"], square=True) + e) - e
+    return np.maximum(wall, -w[1])
+
+
+def donuts(w: Points, c: Points, v: Values, _: int) -> Points:
+    radius, k = v["donut_ring_radius"], 2 * np.pi / v["donut_number"]
+    m = (radius - np.hypot(w[0], w[1])) ** 2 + w[2] ** 2 - v["donut_ring_thickness"] ** 2
+    number = np.exp(-1j * k * np.rint(np.arctan2(w[1], w[0]) / k)) * (w[0] + 1j * w[1])
+    small = v["donut_factor"] * np.array([number.real - radius, w[2], number.imag])
+    return np.where(m > 0.03, small, w / m)
+
+
+def pseudo_kleinian_1(w: Points, c: Points, v: Values, i: int) -> Points:
+    w = box(w, v["transf_addition_constant_0777"]) + (1 - v["transf_scaleB_1"]) * w
+    w = flipped(w * np.maximum(v["transf_minimum_radius_05"] / length2(w), 1), 2)
+    w = flipped(out_of_ball(w, v), 0) + column(v["transf_addition_constant"])
+    if i >= v["transf_start_iterations_M"]:
+        w = menger(abs(w), v["transf_scale_3"]) + column(v["transf_addition_constantA_000"])
+    return w
+
+
+def group(w: Points, v: Values, scale: float, swing: float, tiled: bool) -> Points:
+    """Translations in a box, a half turn of the upper side, and an inversion; z is the height."""
+    a, b, size = v["transf_folding_value"], v["transf_offset"], v["transf_offset_111"]
+    x, y = [(p + s) % (2 * s) - s if tiled else p for p, s in zip(w[:2], size[:2], strict=True)]
+    z = (w[2] + size[2] - 1) % (a * size[2]) - size[2] + 1
+    up = z >= a * (0.5 + swing * np.sin(np.sign(b) * np.pi * (x + b / 2) / size[0]))
+    w = scale * np.where(up, [-b - x, y, a - z], [x, y, z])
+    return w / length2(w) * column((1, -1, -1)) + column((-b, 0, a))
+
+
+def jos_kleinian_3(w: Points, c: Points, v: Values, i: int) -> Points:
+    if i == 0:
+        w = polygon(np.array([abs(w[0]), abs(w[1]), w[2]]), int(v["transf_int8_X"]))
+        back = column(v["transf_addition_constant"])
+        w = v["transf_scaleA_1"] * inverse(w, column(v["transf_offset_000"]), v["transf_maxR2_1"], back)
+    return group(w, v, v["transf_scale_1"], 0.2, True)
+
+
+def jos_kleinian_4(w: Points, c: Points, v: Values, i: int) -> Points:
+    size = np.array((v["transf_offset_2"], v["transf_offsetA_2"]))[:, None]
+    w = np.array([*(w[:2] - size * np.rint(w[:2] / size)), w[2]])
+    added = 0.0
+    for _ in range(i):
+        added = v["transf_scale_vary_0"] * (abs(added) + 1)
+    x, y, z = group(w, v, v["transf_scale_1"] - added, v["transf_offset_02"], False)
+    y = np.sign(y) * (v["transf_offset_1"] + (v["transf_scale_0"] - 1) * abs(y))
+    return np.array([x, y, np.minimum(z, v["transf_folding_value"] - z) if i else z])
+
+
+def of_heights(w: Points, v: Values) -> np.ndarray:
+    height = np.minimum(w[2], v["transf_folding_value"] - w[2])
+    return np.minimum(height + v["analyticDE_offset_0"], v["analyticDE_tweak_005"])
+
+
 FORMULAS: dict[int, Formula] = {
+    82: donuts,
+    104: pseudo_kleinian_1,
+    225: jos_kleinian_3,
+    230: jos_kleinian_4,
+    610: donuts,
+    1628: globe_2,
+    1629: globe_3,
+    1637: cayley,
+    1643: octant,
+    1645: tube,
+    1646: torus_4,
     250: newton,
     1625: moved,
-    1639: same,
+    1639: board,
     103: pseudo_kleinian,
     117: pseudo_kleinian_2,
     101: pseudo_kleinian_std,
@@ -363,11 +587,22 @@ def of_prism(w: Points, v: Values) -> np.ndarray:
     return np.maximum(abs(w[0]) - v["transf_offset_1"], shell)
 
 
+def lunes(w: Points, count: int) -> Points:
+    """Angle from the y axis, folded into half of a sector."""
+    x, y, z = polygon(np.array([w[1], abs(w[0]), w[2]]), count)
+    return np.array([y, x, z])
+
+
 def of_globe(w: Points, v: Values) -> np.ndarray:
+    return rings_of_globe(lunes(w, int(v["transf_int8_Z"])), v, 0)
+
+
+def rings_of_globe(w: Points, v: Values, axis: int) -> np.ndarray:
+    """A ring about an axis, an equator and two circles of latitude of square tubes."""
     r, h = v["transf_offsetR_1"], v["transf_offset_05"]
     circle = np.array([w[0], w[1], abs(w[2]) - h])
     parts = (
-        torus(w, r, v["transf_offset_p01"], axis=0),
+        torus(w, r, v["transf_offset_p01"], axis=axis),
         torus(w, r, v["transf_offsetA_p01"]),
         torus(circle, np.sqrt(r * r - h * h), v["transf_offsetB_p01"], square=True),
     )
@@ -415,6 +650,15 @@ def of_hexagon(w: Points, v: Values) -> np.ndarray:
 
 
 SOLIDS: dict[int, Distance] = {
+    225: of_heights,
+    230: of_heights,
+    610: lambda w, v: torus(w, v["donut_ring_radius"], v["donut_ring_thickness"]),
+    1628: lambda w, v: rings_of_globe(w, v, 0),
+    1629: lambda w, v: torus(lunes(w, int(v["transf_int_1"])), v["transf_offsetR_1"], v["transf_offset_p01"]),
+    1637: of_cayley,
+    1643: of_octahedron,
+    1645: of_tube_2,
+    1646: of_half_torus,
     1625: of_hexagon,
     1639: lambda w, v: (abs(w) - column(v["transf_offset_110"])).max(axis=0),
     101: lambda w, v: np.hypot(w[0], w[1]),
@@ -442,7 +686,7 @@ SOLIDS: dict[int, Distance] = {
     1632: of_helix,
     1633: of_frame,
 }
-"""Distances of formulas that have one of their own; of 117 and 217 that of 103."""
+"""Distances of formulas that have one of their own; of 104, 117 and 217 that of 103."""
 
 
 def hypercomplex(q: np.ndarray, c: np.ndarray, k: int, v: Values) -> tuple[np.ndarray, np.ndarray]:

@@ -23,12 +23,18 @@ from fracslice.scene.mandelbulber.settings import SettingsSection, default_of, p
 from fracslice.scene.mandelbulber.step_text import ADDED, FORMULAS, OWN_SOLID, SWAPPED
 from tests.examples import stamped
 
-from . import mandelbulber_solids
+from . import mandelbulber_loops, mandelbulber_solids, mandelbulber_transforms
 from .mandelbulber_oracle import FORMULAS as ESCAPES
 from .mandelbulber_oracle import rotation as oracle_rotation
-from .mandelbulber_solids import FOURS, SOLIDS
+from .mandelbulber_solids import FIRST, FOURS, VARIANTS
 
-ORACLE = {**ESCAPES, **mandelbulber_solids.FORMULAS}
+ORACLE = {
+    **ESCAPES,
+    **mandelbulber_transforms.FORMULAS,
+    **mandelbulber_solids.FORMULAS,
+    **mandelbulber_loops.FORMULAS,
+}
+SOLIDS = {**mandelbulber_solids.SOLIDS, **mandelbulber_loops.SOLIDS}
 
 pytestmark = pytest.mark.once
 
@@ -129,10 +135,20 @@ VALUES = {  # of formulas whose defaults leave much out
     1135: "transf_constant_multiplier_111 0.1 0.2 0.3",
     1146: "transf_scaleA_1 0.4; transf_scaleB_1 0.8",
     1150: "transf_addition_constantA_000 0.1 0 0; transf_offset_222 1.5 1 1",
+    71: "transf_rotation_enabled true; transf_rotation 10 0 20; transf_addition_constant 0.1 0 0; "
+    "transf_scale 0.9",
+    139: "transf_offset_010 0.1 1.3 0; transf_scaleA_1 0.25; transf_scaleB_1 0.5",
+    218: "transf_addCpixel_enabled_false true; transf_constant_multiplier_000 0.2 0.1 0; transf_offset -0.2; "
+    "transf_function_enabled_false true; transf_stop_iterations_A 1",
+    219: "transf_addition_constant 0.5 0.6 0.7; transf_function_enabledC_false true; transf_int_1 3; "
+    "transf_function_enabledB_false true; transf_stop_iterations_B 1; transf_scaleB_1 0.8; transf_scale 1.1; "
+    "transf_function_enabled_false true; transf_stop_iterations_A 1; transf_scaleF_1 0.2; "
+    "transf_offset_0 0.1",
     1152: "transf_offset_000 0.1 0 0; transf_offsetA_000 0.5 0.4 0.3",
     1155: "transf_scale 0.9; mandelbox_offset 0.2 0 0; transf_function_enabledP_false true",
     1158: "transf_addition_constant_0555 0.5 0.4 0.3; transf_offsetA_000 -0.2 0 0; transf_scale_1 1.5",
     **mandelbulber_solids.VALUES,
+    **mandelbulber_loops.VALUES,
 }
 
 
@@ -201,8 +217,13 @@ def test_steps_are_those_of_the_oracle(number: int) -> None:
     agrees(number, 1000)
 
 
-def agrees(number: int, count: int) -> None:
-    source = text(f"formula_1 {number}; N 3", VALUES.get(number, ""))
+@pytest.mark.parametrize(("number", "values"), VARIANTS, ids=[str(n) for n, _ in VARIANTS])
+def test_steps_with_other_switches_are_those_of_the_oracle(number: int, values: str) -> None:
+    agrees(number, 1000, values)
+
+
+def agrees(number: int, count: int, values: str | None = None) -> None:
+    source = text(f"formula_1 {number}; N 3", VALUES.get(number, "") if values is None else values)
     points = np.random.default_rng(number).uniform(-1.6, 1.6, (3, count))
     ours, expected = own_images(orbit_nodes(source), points), oracle_images(number, source, points, 3)
     if number == 7:  # a sponge alone is written with a reflection: signs differ, which it does not notice
@@ -221,12 +242,17 @@ def agrees(number: int, count: int) -> None:
 @pytest.mark.parametrize("number", sorted(SOLIDS))
 def test_distances_are_those_of_the_oracle(number: int) -> None:
     """Formulas with a distance of their own measure each point with that solid."""
-    source = text(f"formula_1 {number}; N 3", VALUES.get(number, ""))
+    source = text(f"formula_1 {number}; N 1", VALUES.get(number, "") + FIRST.get(number, ""))
     orbit = orbits(parse_settings(source, "x.fract"))[0]
-    kind, points = distance_of(orbit), np.random.default_rng(number).uniform(-1.6, 1.6, (3, 1000))
+    count = 150 if number in mandelbulber_loops.SLOW else 1000
+    kind, points = distance_of(orbit), np.random.default_rng(number).uniform(-1.6, 1.6, (3, count))
     node = surface(orbit, kind, "") if kind != OWN_SOLID else own_solid(orbit, steps_of(orbit), 0, "")
     expected = SOLIDS[number](points, Values(parse_settings(source, "x").fractals[0]))
-    assert abs(node.distance(points.T) - expected).max() < 1e-6
+    found = node.distance(points.T)
+    if number in mandelbulber_loops.SIGNS:
+        assert ((found < 0) == (expected < 0)).all() and (expected < 0).any()
+    else:
+        assert abs(found - expected).max() < 1e-6
 
 
 def test_solids_within_a_round_are_behind_the_steps_before_them(tmp_path: Path) -> None:
@@ -247,7 +273,12 @@ def test_solids_within_a_round_are_behind_the_steps_before_them(tmp_path: Path) 
             w, stretch = ORACLE[606](w, points, torus, k), 2 * stretch
         else:
             parts.append(SOLIDS[1604](w, ball) / stretch)
-    assert made.scene.root.distance(points.T) == pytest.approx(np.min(parts, axis=0), abs=1e-6)
+    cut = next(node for node in made.scene.root.walk() if node.formula.name == "bounds")
+    expected = np.min(parts, axis=0)
+    assert cut.fields[0].distance(points.T) == pytest.approx(expected, abs=1e-6)
+    low, high = (np.array(cut[name])[:, None] for name in ("min", "max"))
+    outside = ((points < low) | (points > high)).any(axis=0)
+    assert not (outside & (expected < 0)).any() and outside.any()
 
 
 def test_orbits_without_a_solid_or_of_four_dimensions_in_a_hybrid_are_refused(tmp_path: Path) -> None:
@@ -448,16 +479,36 @@ def refusal(path: Path, begin: str) -> str:
     return ""
 
 
-@pytest.mark.parametrize("count", [20, pytest.param(200, marks=pytest.mark.nightly)])
-def test_mutated_files_are_imported_or_refused(tmp_path: Path, count: int) -> None:
+@pytest.mark.parametrize(
+    ("formula", "values", "count"),
+    [
+        (5, "transf_scale_3 3", 20),
+        *(
+            pytest.param(number, values, 50, marks=pytest.mark.nightly)
+            for number, values in (
+                (5, "transf_scale_3 3"),
+                (271, "transf_int8_X 3; analyticDE_enabled_false true"),
+                (1638, "transf_int_16 2; transf_rotation 20 0 10"),
+                (1643, "transf_function_enabledA_false true"),
+            )
+        ),
+    ],
+)
+def test_mutated_files_are_imported_or_refused(tmp_path: Path, formula: int, values: str, count: int) -> None:
     source = text(
-        "formula_1 5; N 4; camera 0 -3 1; julia_mode true; julia_c -0.2 0.6 0; light1_color ffff 0 0",
-        "transf_scale_3 3",
+        f"formula_1 {formula}; N 4; camera 0 -3 1; julia_mode true; julia_c -0.2 0.6 0; "
+        "light1_color ffff 0 0",
+        values,
     ).encode()
     rng, path = random.Random(7), tmp_path / "x.fract"
     for _ in range(count):
         path.write_bytes(mutated(source, rng))
         assert "\n" not in refusal(path, str(path))
+
+
+def test_a_winding_without_a_thickness_is_a_surface(tmp_path: Path) -> None:
+    made = imported(tmp_path, text("formula_1 1636; N 1", "transf_offset_0005 0"))
+    assert any("a surface without an inside" in note for note in made.notes)
 
 
 def test_objects_are_placed_and_joined(tmp_path: Path) -> None:

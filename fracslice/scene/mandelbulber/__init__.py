@@ -3,7 +3,10 @@
 from . import (  # noqa: F401
     box_formulas,
     bulb_formulas,
+    cluster_formulas,
+    coil_formulas,
     kleinian_formulas,
+    polyhedron_formulas,
     solid_formulas,
     sponge_formulas,
     transform_formulas,

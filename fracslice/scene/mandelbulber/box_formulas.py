@@ -4,7 +4,17 @@ from __future__ import annotations
 
 import math
 
-from .folds import absolute, absolute_of, bulge, differences, mandalay, polygon
+from .folds import (
+    absolute,
+    absolute_of,
+    alternating,
+    bulge,
+    crossed,
+    diagonal_scale,
+    differences,
+    mandalay,
+    polygon,
+)
 from .step_text import CYLINDER, LEFT_OUT, ORDERS, SQUARE, SWAPPED, FormulaStep, UnknownError, known
 
 LOWE = "Lowe 2010, fractalforums.com: Amazing Fractal"
@@ -191,8 +201,9 @@ def amazing_surf_mod_2(s: FormulaStep) -> None:
         s.write(f"w = fold_to(w, (1e6, 1e6, {s.parameter('transf_addition_constant_111_z', z)}))")
     swap(s, "transf_function_enabledSw_false", "(y, x, z)")
     if s.on("transf_function_enabledBz_false") and s.within("X"):
-        s.refuse("transf_function_enabledBx_false", "transf_function_enabledBy_false")
-    s.add("transf_addition_constant")
+        soft_offset(s)
+    else:
+        s.add("transf_addition_constant")
     if s.on("transf_function_enabledAy") and s.within("M"):
         weight = f"(1 - {s.number('transf_scaleB_1')})" if s.on("transf_function_enabled_false") else "1"
         square = SQUARE if weight == "1" else f"{CYLINDER} + {weight} * z * z"
@@ -205,6 +216,19 @@ def amazing_surf_mod_2(s: FormulaStep) -> None:
         scale_by(s, scale)
     if s.on("mandelbox_main_rotation_enabled") and s.within("R"):
         s.turn("mandelbox_rotation_main")
+
+
+def soft_offset(s: FormulaStep) -> None:
+    """Add 2 a less a^3 / (x^2 + a^2) of a vector, or less a^2 / (x^2 + a^2)."""
+    cubes, squares = (s.on(f"transf_function_enabledB{axis}_false") for axis in "xy")
+    if not (cubes or squares):
+        return
+    k = s.number("transf_scale_1")
+    s.write(f"a, b, d = {s.point('transf_addition_constant')}", "x, y, z = w")
+    for p, q in zip("xyz", "abd", strict=True):
+        s.write(f"t = {q} * {q} / maximum({p} * {p} + {q} * {q}, 1e-18)")
+        s.write(f"{p} = {p} + {k} * (2 * {q} - {f'{q} * t' if cubes else 't'})")
+    s.write("w = (x, y, z)")
 
 
 def add_inverse(s: FormulaStep, alternates: str) -> None:
@@ -309,8 +333,8 @@ def abox_mod_15(s: FormulaStep) -> None:
         s.add("transf_addition_constantA_000")
     if s.within("R"):
         s.turn("transf_rotation2")
-    if s.within("N"):
-        s.refuse("transf_function_enabledN_false")
+    if s.on("transf_function_enabledN_false") and s.within("N"):
+        crossed(s)
 
 
 @known(77, "Amazing Surf - Mod 1", "Kali 2011 after Lowe 2010, fractalforums.com")
@@ -374,8 +398,10 @@ def box_fold_bulb_3(s: FormulaStep) -> None:
     """As the second kind, with an inversion, a tetrahedron's fold and a sponge's."""
     inversion(s, "transf_start_iterations", "transf_stop_iterations_1")
     box_ball_scale(s)
-    if s.during("transf_start_iterationsTM", "transf_stop_iterationsTM_1"):
-        s.refuse("transf_function_enabledX_false")
+    if s.on("transf_function_enabledX_false") and s.during(
+        "transf_start_iterationsTM", "transf_stop_iterationsTM_1"
+    ):
+        diagonal_scale(s, "transf_scale3D_333", "transf_addition_constantA_111")
     if s.on("transf_function_enabledD_false") and s.within("D"):
         s.write("w = mirror(w, (1, 1, 0))", "w = mirror(w, (1, 0, 1))")
         s.write(
@@ -528,8 +554,10 @@ def abox_mod_13(s: FormulaStep) -> None:
     scale = add_vary(s, "mandelbox_scale", "transf_scaleB_1", vary, s.on("transf_function_enabledM_false"))
     scale_by(s, scale if vary else scale - added)
     if s.within("B"):
-        s.refuse("transf_function_enabledAx_false")
-        s.add("transf_addition_constant")
+        if s.on("transf_function_enabledAx_false"):
+            alternating(s, "transf_addition_constant", "transf_scale_1", -1)
+        else:
+            s.add("transf_addition_constant")
     if s.on("transf_addCpixel_enabled_false") and s.within("C"):
         s.add_constant(
             "mandelbulbMulti_order_of_xyz", "transf_constant_multiplier_111", "transf_alternate_enabled_false"
@@ -558,9 +586,7 @@ def fold_box_mod_1(s: FormulaStep) -> None:
 @known(91, "Mandelbox - Menger", "Lowe 2010 and Menger 1926")
 def mandelbox_menger(s: FormulaStep) -> None:
     """A Mandelbox and a sponge in each step."""
-    s.refuse(
-        "mandelbox_rotations_enabled", "transf_addCpixel_enabled_false", "transf_function_enabledx_false"
-    )
+    s.refuse("mandelbox_rotations_enabled", "transf_addCpixel_enabled_false")
     if s.within("A"):
         if s.value("transf_scale_1") != 1:
             raise UnknownError(f"{s.values.place('transf_scale_1')}: transf_scale_1")
@@ -575,7 +601,9 @@ def mandelbox_menger(s: FormulaStep) -> None:
         for _ in range(min(s.values.whole("transf_int_1"), 4)):
             s.write("w = positive(w)")
             s.menger("transf_scale_3", "transf_constant_multiplierA_111")
-    s.add("transf_addition_constantA_000")
+            s.add("transf_addition_constantA_000")
+            if s.on("transf_function_enabledx_false"):
+                s.add_constant("mandelbulbMulti_order_of_xyz_C", "transf_constant_multiplierB_111")
 
 
 @known(198, "Mandalay Box V1", "Knighty and DarkBeam 2015, fractalforums.com")

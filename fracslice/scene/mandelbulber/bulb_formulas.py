@@ -145,20 +145,103 @@ def msltoe_sym_4(s: FormulaStep) -> None:
     if s.on("transf_function_enabledB_false") and s.within("B"):
         n += s.values.whole("transf_int_1")
     sector(s, "yz", s.parameter("transf_int8_Y", max(n, 1)), PI)
-    a, b = s.number("transf_scaleB_1"), s.number("transf_scale")
-    s.write(
-        "x, y, z = w",
-        "s = maximum(x * x + y * y, 1e-30)",
-        "m = 1 - z * z / maximum(s + z * z, 1e-30)",
-        f"w = ((x * x - y * y) * m * {a}, 2 * x * y * m * {b}, 2 * z * sqrt(s))",
-    )
+    flattened_square(s, s.number("transf_scaleB_1"))
     s.add("transf_addition_constant_neg100")
     if s.within("C"):
         s.refuse("transf_addCpixel_enabled_false")
+    move_along(s)
+
+
+def flattened_square(s: FormulaStep, factor: str = "1") -> None:
+    """A square whose first two parts are less, the farther the point is from their plane."""
+    s.write("x, y, z = w", "s = maximum(x * x + y * y, 1e-30)", "m = 1 - z * z / maximum(s + z * z, 1e-30)")
+    first = "(x * x - y * y) * m" if factor == "1" else f"(x * x - y * y) * m * {factor}"
+    s.write(f"w = ({first}, 2 * x * y * m * {s.number('transf_scale')}, 2 * z * sqrt(s))")
+
+
+def move_along(s: FormulaStep) -> None:
+    """Move towards the origin, then scale."""
     if s.value("transf_offset"):
         s.write("x, y, z = w", "r = sqrt(maximum(x * x + y * y + z * z, 1e-30))")
         s.write(f"w = (1 - {s.number('transf_offset')} / r) * w")
     s.scale("transf_scale_1")
+
+
+JULIA_BULB = "Msltoe 2011, fractalforums.com: Julia bulb"
+
+
+@known(218, "Msltoe - Julia Bulb Mod4", JULIA_BULB, LEFT_OUT)
+def julia_bulb_4(s: FormulaStep) -> None:
+    """A polygon's fold about x, a square, and a quaternion's square in some iterations."""
+    sector(s, "yz", s.parameter("transf_int8_Y", max(s.values.whole("transf_int8_Y"), 1)), PI)
+    flattened_square(s)
+    s.add("transf_addition_constant_neg100")
+    if s.on("transf_addCpixel_enabled_false"):
+        add_away(s)
+    move_along(s)
+    if s.on("transf_function_enabled_false") and s.within("A"):
+        s.write("x, y, z = w", "w = (x * x - y * y - z * z, 2 * x * y, 2 * x * z)")
+
+
+@known(219, "Msltoe - Julia Bulb Mod5", JULIA_BULB, LEFT_OUT)
+def julia_bulb_5(s: FormulaStep) -> None:
+    """As the fourth, with more sides in some iterations, and less z after a quaternion's square."""
+    if s.on("transf_function_enabledC_false") and s.within("D"):
+        s.fold("transf_addition_constant")
+    more = s.on("transf_function_enabledB_false") and s.within("B")
+    sides = s.values.whole("transf_int8_Y") + (s.values.whole("transf_int_1") if more else 0)
+    sector(s, "yz", s.parameter("transf_int8_Y", max(sides, 1)), PI)
+    flattened_square(s, s.number("transf_scaleB_1"))
+    s.add("transf_addition_constant_neg100")
+    if s.on("transf_addCpixel_enabled_false") and s.within("C"):
+        add_away(s)
+    move_along(s)
+    if s.on("transf_function_enabled_false") and s.within("A"):
+        f, o = s.number("transf_scaleF_1"), s.number("transf_offset_0")
+        s.write("x, y, z = w", "cx, cy, cz = c")
+        s.write(f"w = (x * x - y * y - z * z, 2 * x * y, 2 * x * z - {f} * cz - {o})")
+
+
+def add_away(s: FormulaStep) -> None:
+    """Add the absolute start point, times a vector, away from the planes of the axes."""
+    s.write(f"u, v, s = {s.point('transf_constant_multiplier_000')}", "x, y, z = w", "cx, cy, cz = c")
+    for p, k in zip("xyz", "uvs", strict=True):
+        own = f"absolute(c{p})" if s.on(f"transf_function_enabled{p}") else f"c{p}"
+        s.write(f"{p} = {p} + where({p} < 0, -{k}, {k}) * {own}")
+    s.write("w = (x, y, z)")
+
+
+@known(71, "Riemann - Sphere Msltoe V1", "Msltoe 2011, fractalforums.com: Riemann sphere", LEFT_OUT)
+def riemann_sphere(s: FormulaStep) -> None:
+    """Project from the pole to a plane, which is tiled; the radius less 1.5 is the height."""
+    s.write(
+        "x, y, z = w",
+        "r = sqrt(maximum(x * x + y * y + z * z, 1e-30))",
+        f"k = {s.number('transf_scale')} / r",
+    )
+    s.write("q = 1 - k * z", "q = k / where(absolute(q) < 1e-9, 1e-9, q)", "x, y = q * x, q * y")
+    s.write("w = (x, y, (r - 1.5) * (1 + x * x + y * y))")
+    if s.on("transf_rotation_enabled"):
+        s.turn("transf_rotation")
+    s.write("x, y, z = w", "x, y = x - floor(x + 0.5), y - floor(y + 0.5)")
+    s.write(f"a, b, d = {s.point('transf_constant_multiplier_441')}", "w = (a * x, b * y, d * z)")
+    s.add("transf_addition_constant")
+
+
+@known(139, "Riemann - Sphere Msltoe V2", "Msltoe 2012, fractalforums.com: Riemann sphere", LEFT_OUT)
+def riemann_sphere_2(s: FormulaStep) -> None:
+    """Powers of both coordinates of the plane that the sphere is projected to, and of the radius."""
+    if s.on("transf_rotation_enabled"):
+        s.turn("transf_rotation")
+    s.write("x, y, z = w", "r = sqrt(maximum(x * x + y * y + z * z, 1e-30))")
+    s.write(
+        f"k = {s.number('transf_scale_08')} / r", "q = k * y - 1", "q = where(absolute(q) < 1e-9, -1e-9, q)"
+    )
+    for p, factor in (("x", "transf_scaleA_1"), ("z", "transf_scaleB_1")):
+        s.write(f"{p} = k * {p} / q", f"t = 8 * {s.number(factor)} * atan2(2 * {p}, {p} * {p} - 1)")
+        s.write(f"{p} = sin(t) / maximum(1 + cos(t), 1e-12)")
+    s.write("s = x * x + z * z", "m = r ** 4 / (s + 1)", "w = (2 * m * x, m * (s - 1), 2 * m * z)")
+    s.add("transf_offset_010")
 
 
 @known(266, "Mandelbulb Pupuku", "Pupukuusikko 2021, fractalforums.org")
@@ -303,15 +386,23 @@ def mandelbulb_pow2_1(s: FormulaStep) -> None:
     """Squares about y and about z, each in its iterations."""
     if s.on("transf_function_enabledAx_false") and s.within("A"):
         absolute(s, *(f"transf_function_enabledC{axis}_false" for axis in "xyz"))
-    s.refuse("transf_function_enabledD_false", "transf_function_enabledF_false")
     if s.on("transf_function_enabledAy") and s.within("B"):
         sign = "-" if s.on("transf_function_enabledB_false") else ""
         s.write("x, y, z = w", "s = maximum(x * x + z * z, 1e-30)", "m = y * y / s - 1")
-        s.write(f"w = ({sign}2 * x * z * m, 2 * sqrt(s) * y, (z * z - x * x) * m)")
+        s.write(f"w = ({sign}2 * x * z * m, {alternate(s, 'D', 'C')}2 * sqrt(s) * y, (z * z - x * x) * m)")
     if s.on("transf_function_enabledAz_false") and s.within("C"):
         sign = "-" if s.on("transf_function_enabledA_false") else ""
         s.write("x, y, z = w", "s = maximum(x * x + y * y, 1e-30)", "m = 1 - z * z / s")
-        s.write(f"w = ({sign}2 * x * y * m, (y * y - x * x) * m, 2 * sqrt(s) * z)")
+        s.write(f"w = ({sign}2 * x * y * m, (y * y - x * x) * m, {alternate(s, 'F', 'E')}2 * sqrt(s) * z)")
+
+
+def alternate(s: FormulaStep, on: str, stays: str) -> str:
+    """A minus each other time, or the opposite each time, if a switch is on."""
+    if not s.on(f"transf_function_enabled{on}_false"):
+        return ""
+    sign = s.state.get("sign", 1.0) * (-1 if s.on(f"transf_function_enabled{stays}_false") else 1)
+    s.state["sign"] = -sign
+    return "-" if sign < 0 else ""
 
 
 @known(41, "Buffalo", "Kali 2011, fractalforums.com")
@@ -389,17 +480,9 @@ def eiffie_msltoe(s: FormulaStep) -> None:
     """An octagon's fold about x, a square, and an offset along the radius."""
     s.refuse("transf_addCpixel_enabled_false")
     sector(s, "yz", "8", PI)
-    s.write(
-        "x, y, z = w",
-        "s = maximum(x * x + y * y, 1e-30)",
-        "m = 1 - z * z / maximum(s + z * z, 1e-30)",
-        f"w = ((x * x - y * y) * m, 2 * x * y * m * {s.number('transf_scale')}, 2 * z * sqrt(s))",
-    )
+    flattened_square(s)
     s.add("transf_addition_constant")
-    if s.value("transf_offset"):
-        s.write("x, y, z = w", "r = sqrt(maximum(x * x + y * y + z * z, 1e-30))")
-        s.write(f"w = (1 - {s.number('transf_offset')} / r) * w")
-    s.scale("transf_scale_1")
+    move_along(s)
 
 
 @known(49, "Lkmitch", "Mitchell 2009, fractalforums.com")

@@ -9,6 +9,11 @@ from .step_text import FormulaStep
 PI = "3.141592653589793"
 
 
+def switched(s: FormulaStep, name: str, letter: str) -> bool:
+    """True if a switch is on in the iterations of a letter."""
+    return s.on(f"transf_function_enabled{name}") and s.within(letter)
+
+
 def absolute(s: FormulaStep, *switches: str) -> None:
     """Absolute value of the coordinates whose switches are on."""
     absolute_of(s, [s.on(switch) for switch in switches])
@@ -42,11 +47,15 @@ def polygon(s: FormulaStep, axes: str, count: str) -> None:
 
 
 def sector(s: FormulaStep, axes: str, count: str, turn: str) -> None:
-    """Fold an angle in a plane, which is turned before, into half of a sector: |fmod(angle + k, 2 k) - k|."""
+    """Fold an angle in a plane, which is turned before, into half of a sector."""
+    s.write("x, y, z = w", *sector_lines(axes, count, turn), "w = (x, y, z)")
+
+
+def sector_lines(axes: str, count: str, turn: str = "0") -> Sequence[str]:
+    """Statements for |fmod(angle + k, 2 k) - k| of an angle in a plane."""
     first, second = axes[0], axes[1]
     start = f"atan2({second}, {first})" if turn == "0" else f"atan2({second}, {first}) + {turn}"
-    s.write(
-        "x, y, z = w",
+    return (
         f"k = {PI} / {count}",
         f"t = {start} + k",
         "t = t - 2 * k * where(t < 0, -floor(-t / (2 * k)), floor(t / (2 * k)))",
@@ -54,7 +63,6 @@ def sector(s: FormulaStep, axes: str, count: str, turn: str) -> None:
         f"r = sqrt(maximum({first} * {first} + {second} * {second}, 1e-30))",
         f"{first} = r * cos(t)",
         f"{second} = r * sin(t)",
-        "w = (x, y, z)",
     )
 
 
@@ -100,4 +108,62 @@ def bulge(s: FormulaStep, limits: str, shares: str) -> None:
         s.write(f"t, q = absolute({p}), 2 * absolute({a}) - absolute({p})")
         s.write(f"m = where(t < {a}, t * t, where((t > {a}) & (q > 0), q * q, 0)) / maximum(2 * {a}, 1e-18)")
         s.write(f"{p} = {p} - where({p} < 0, -1, 1) * {k} * m")
+    s.write("w = (x, y, z)")
+
+
+def diagonal_scale(s: FormulaStep, scale: str, limits: str = "") -> None:
+    """Turn to the diagonal of a cube, take absolute values, scale, fold into a box, and turn back."""
+    to_diagonal(s)
+    s.write("w = positive(w)")
+    s.multiply(scale)
+    if limits:
+        s.fold(limits)
+    from_diagonal(s)
+
+
+THIRD, TWO_THIRDS, HALF = "0.5773502691896258", "0.816496580927726", "0.7071067811865476"
+"""Square roots of 1/3, 2/3 and 1/2."""
+
+
+def to_diagonal(s: FormulaStep) -> None:
+    """Turn the x axis about y, then z: Benesi's frame."""
+    s.write("x, y, z = w", f"t = {TWO_THIRDS} * x - {THIRD} * z")
+    s.write(f"w = ({HALF} * (t - y), {HALF} * (t + y), {THIRD} * x + {TWO_THIRDS} * z)")
+
+
+def from_diagonal(s: FormulaStep) -> None:
+    """Undo `to_diagonal`."""
+    s.write("x, y, z = w", f"t = {HALF} * (x + y)")
+    s.write(f"w = ({THIRD} * z + {TWO_THIRDS} * t, {HALF} * (y - x), {TWO_THIRDS} * z - {THIRD} * t)")
+
+
+def alternating(s: FormulaStep, name: str, factor: str, sign_of: int = 1) -> None:
+    """Add a vector whose factor changes with each time."""
+    sign = s.state.get("sign", 1.0)
+    s.state["sign"] = sign_of * sign * s.value(factor)
+    x, y, z = s.vector(name)
+    s.write(f"w = w + {s.parameter(name, (sign * x, sign * y, sign * z))}")
+
+
+def crossed(s: FormulaStep) -> None:
+    """Turn the absolute values of x and y by an eighth, reflect, and turn back."""
+    a, b = s.number("transf_offset_0"), s.number("transf_offsetA_0")
+    sides = "y, x" if s.on("transf_function_enabledA_false") else "x, y"
+    s.write("x, y, z = w", f"{sides} = absolute(x), absolute(y)")
+    s.write(f"x, y = x + y - {a}, x - y - {b}")
+    if s.on("transf_function_enabledBx_false") and s.within("O"):
+        s.write("x = -absolute(x)")
+    if s.on("transf_function_enabledBx") and s.within("P"):
+        s.write("y = -absolute(y)")
+    s.write("x, y = 0.5 * (x + y), 0.5 * (x - y)")
+    for switch, letter, axis, name in (
+        ("Ax", "R", "x", "transf_offset_1"),
+        ("Ax_false", "RV", "y", "transf_offsetA_1"),
+    ):
+        if s.on(f"transf_function_enabled{switch}") and s.within(letter):
+            o = s.number(name)
+            s.write(f"{axis} = {o} - absolute({axis} + {o})")
+    for axis in "xyz":
+        if s.on(f"transf_function_enabled{axis}_false"):
+            s.write(f"{axis} = -{axis}")
     s.write("w = (x, y, z)")

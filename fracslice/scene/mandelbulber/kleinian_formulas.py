@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .box_formulas import fold_with_height
-from .folds import PI, bulge, differences
+from .folds import PI, absolute, alternating, bulge, crossed, diagonal_scale, differences, polygon
 from .step_text import JOS, KLEINIAN, LEFT_OUT, OWN_SOLID, SQUARE, FormulaStep, known
 
 KNIGHTY = "Knighty 2011, fractalforums.com: pseudo-Kleinian"
@@ -94,34 +94,14 @@ def pseudo_kleinian_2(s: FormulaStep) -> None:
 
 
 def benesi(s: FormulaStep, start: str) -> None:
-    """A turn to the diagonal of a cube, absolute values, a scale, and the turn back."""
+    """In the frame of a cube's diagonal: absolute values and a scale; then the same with a fold."""
+    if s.on("transf_benesi_T1_enabled_false") and s.during(start, "transf_stop_iterationsT_1"):
+        diagonal_scale(s, "transf_scale3D_222")
+        s.add("transf_offset_200", "-")
     if s.on("transf_function_enabledx_false") and s.during(
         "transf_start_iterations_D", "transf_stop_iterationsTM_1"
     ):
-        s.refuse("transf_function_enabledx_false")
-    if not (s.on("transf_benesi_T1_enabled_false") and s.during(start, "transf_stop_iterationsT_1")):
-        return
-    to_diagonal(s)
-    s.write("w = positive(w)")
-    s.multiply("transf_scale3D_222")
-    from_diagonal(s)
-    s.add("transf_offset_200", "-")
-
-
-THIRD, TWO_THIRDS, HALF = "0.5773502691896258", "0.816496580927726", "0.7071067811865476"
-"""Square roots of 1/3, 2/3 and 1/2."""
-
-
-def to_diagonal(s: FormulaStep) -> None:
-    """Turn the x axis about y, then z: Benesi's frame."""
-    s.write("x, y, z = w", f"t = {TWO_THIRDS} * x - {THIRD} * z")
-    s.write(f"w = ({HALF} * (t - y), {HALF} * (t + y), {THIRD} * x + {TWO_THIRDS} * z)")
-
-
-def from_diagonal(s: FormulaStep) -> None:
-    """Undo `to_diagonal`."""
-    s.write("x, y, z = w", f"t = {HALF} * (x + y)")
-    s.write(f"w = ({THIRD} * z + {TWO_THIRDS} * t, {HALF} * (y - x), {TWO_THIRDS} * z - {THIRD} * t)")
+        diagonal_scale(s, "transf_scale3D_333", "transf_addition_constant_111")
 
 
 def box_and_balls(s: FormulaStep, first: str) -> None:
@@ -135,11 +115,7 @@ def box_and_balls(s: FormulaStep, first: str) -> None:
 @known(101, "Pseudo Kleinian - StdDE", KNIGHTY, LEFT_OUT, distance=OWN_SOLID)
 def pseudo_kleinian_std(s: FormulaStep) -> None:
     """The group measured with the z axis, and a sponge's folds before it."""
-    prism(s)
-    turned(s)
-    benesi(s, "transf_start_iterations")
-    if s.on("transf_function_enabledF_false") and s.within("F"):
-        shifted_differences(s)
+    before_folds(s)
     if s.on("transf_function_enabled") and s.within("M"):
         s.write("w = positive(w)")
         s.menger("transf_scale_3", "transf_constant_multiplierA_111")
@@ -151,6 +127,15 @@ def pseudo_kleinian_std(s: FormulaStep) -> None:
     box_and_balls(s, "transf_function_enabledAw")
     s.add("transf_addition_constant")
     s.measure(last=True, thin=True).write("return sqrt(maximum(x * x + y * y, 1e-30))")
+
+
+def before_folds(s: FormulaStep) -> None:
+    """A cross in a prism, a turn, folds in the frame of a diagonal, and differences, where they are on."""
+    prism(s)
+    turned(s)
+    benesi(s, "transf_start_iterations")
+    if s.on("transf_function_enabledF_false") and s.within("F"):
+        shifted_differences(s)
 
 
 def shifted_differences(s: FormulaStep) -> None:
@@ -177,38 +162,6 @@ def pseudo_kleinian_4(s: FormulaStep) -> None:
         crossed(s)
 
 
-def alternating(s: FormulaStep, name: str, factor: str) -> None:
-    """Add a vector whose factor changes with each time."""
-    sign = s.state.get("sign", 1.0)
-    s.state["sign"] = sign * s.value(factor)
-    x, y, z = s.vector(name)
-    s.write(f"w = w + {s.parameter(name, (sign * x, sign * y, sign * z))}")
-
-
-def crossed(s: FormulaStep) -> None:
-    """Turn the absolute values of x and y by an eighth, reflect, and turn back."""
-    a, b = s.number("transf_offset_0"), s.number("transf_offsetA_0")
-    sides = "y, x" if s.on("transf_function_enabledA_false") else "x, y"
-    s.write("x, y, z = w", f"{sides} = absolute(x), absolute(y)")
-    s.write(f"x, y = x + y - {a}, x - y - {b}")
-    if s.on("transf_function_enabledBx_false") and s.within("O"):
-        s.write("x = -absolute(x)")
-    if s.on("transf_function_enabledBx") and s.within("P"):
-        s.write("y = -absolute(y)")
-    s.write("x, y = 0.5 * (x + y), 0.5 * (x - y)")
-    for switch, letter, axis, name in (
-        ("Ax", "R", "x", "transf_offset_1"),
-        ("Ax_false", "RV", "y", "transf_offsetA_1"),
-    ):
-        if s.on(f"transf_function_enabled{switch}") and s.within(letter):
-            o = s.number(name)
-            s.write(f"{axis} = {o} - absolute({axis} + {o})")
-    for axis in "xyz":
-        if s.on(f"transf_function_enabled{axis}_false"):
-            s.write(f"{axis} = -{axis}")
-    s.write("w = (x, y, z)")
-
-
 @known(122, "Jos Kleinian", LEYS, LEFT_OUT, distance=JOS)
 def jos_kleinian(s: FormulaStep) -> None:
     """A group of translations and an inversion between planes; y is the height."""
@@ -224,3 +177,134 @@ def jos_kleinian(s: FormulaStep) -> None:
     s.write(f"m = {a} * (0.5 + 0.2 * sin({side} * {PI} * (x + 0.5 * {b}) / u))", "above = y >= m")
     s.write(f"x, y, z = where(above, -{b} - x, x), where(above, {a} - y, y), where(above, -z, z)")
     s.write(f"r = maximum({SQUARE}, 1e-18)", f"w = (x / r - {b}, {a} - y / r, -z / r)")
+
+
+@known(104, "Pseudo Kleinian - Mod 1", KNIGHTY, LEFT_OUT, distance=KLEINIAN)
+def pseudo_kleinian_1(s: FormulaStep) -> None:
+    """Two folds of the group in a row, with other folds before and a sponge's behind."""
+    before_folds(s)
+    if s.on("transf_function_enabledAw") and s.within("C"):
+        if s.value("transf_scaleB_1") == 1:
+            s.fold("transf_addition_constant_0777")
+        else:
+            s.write("before = w")
+            s.fold("transf_addition_constant_0777")
+            s.write(f"w = w + (1 - {s.number('transf_scaleB_1')}) * before")
+        spread(s)
+        if s.on("transf_function_enabledN_false"):
+            s.write("x, y, z = w", "w = (x, y, -z)")
+    if s.on("transf_function_enabledAy_false") and s.within("B"):
+        fold_into_box(s)
+        if s.on("transf_function_enabledK_false"):
+            s.write("x, y, z = w", "w = (-x, y, z)")
+    s.add("transf_addition_constant")
+    if s.on("transf_function_enabledM_false") and s.within("M"):
+        s.write("w = positive(w)")
+        s.menger("transf_scale_3", "transf_constant_multiplierA_111")
+        s.add("transf_addition_constantA_000")
+
+
+def jos_inversion(s: FormulaStep, after: bool) -> None:
+    """Invert in a sphere and scale, before the polygons or after them."""
+    now = s.during("transf_start_iterations_D", "transf_stop_iterations_D1")
+    if (
+        s.on("transf_sphere_inversion_enabled_false")
+        and s.on("transf_function_enabledI_false") == after
+        and now
+    ):
+        s.invert("transf_offset_000", "transf_maxR2_1", "transf_addition_constant")
+        s.scale("transf_scaleA_1")
+
+
+def jos_polygons(s: FormulaStep) -> None:
+    """A turn, absolute values and polygons' folds, in their iterations."""
+    if s.on("transf_function_enabledP_false") and s.during(
+        "transf_start_iterations_P", "transf_stop_iterations_P1"
+    ):
+        s.turn("transf_rotation")
+        absolute(s, *(f"transf_function_enabled{axis}" for axis in "xyz"))
+        for switch, axes in (("Cx", "xy"), ("Cy_false", "yz"), ("Cz_false", "zx")):
+            if s.on(f"transf_function_enabled{switch}"):
+                polygon(s, axes, f"transf_int8_{switch[1].upper()}")
+        s.add("transf_offsetF_000")
+
+
+def jos_options(s: FormulaStep) -> None:
+    """A reflection of x and y, and their largest or their root, in their iterations."""
+    if s.on("transf_function_enabledC_false") and s.during(
+        "transf_start_iterations_C", "transf_stop_iterations_C1"
+    ):
+        s.write("w = mirror(w, (1, -1, 0))")
+    if s.on("transf_function_enabled_false") and s.during(
+        "transf_start_iterations", "transf_stop_iterations_1"
+    ):
+        s.write("x, y, z = w")
+        if s.on("transf_function_enabledBx"):
+            s.write("x = maximum(absolute(x), absolute(y))")
+        if s.on("transf_function_enabledO_false"):
+            s.write("x = sqrt(maximum(x * x + y * y, 1e-30))")
+        s.write("w = (x, y, z)")
+
+
+def jos_step(s: FormulaStep, wave: str, tiled: bool) -> None:
+    """Translations of x, y and z, the higher of two sides, a scale, and an inversion; z is the height."""
+    a, b = s.number("transf_folding_value"), s.number("transf_offset")
+    side = (s.value("transf_offset") > 0) - (s.value("transf_offset") < 0)
+    s.write(f"u, v, s = {s.point('transf_offset_111')}", "x, y, z = w")
+    if tiled:
+        s.write("x = x - 2 * u * floor(0.5 * u * (x + u))", "y = y - 2 * v * floor(0.5 * v * (y + v))")
+    s.write(f"z = z - {a} * s * floor((z + s - 1) * s / {a})")
+    s.write(f"m = {a} * (0.5 + {wave} * sin({side} * {PI} * (x + 0.5 * {b}) / u))", "above = z >= m")
+    s.write(f"x, z = where(above, -{b} - x, x), where(above, {a} - z, z)")
+    added = s.state.get("added", 0.0)
+    if s.on("transf_function_enabledK_false"):
+        s.state["added"] = s.value("transf_scale_vary_0") * (abs(added) + 1)
+    scale = s.parameter("transf_scale_1", s.value("transf_scale_1") - added)
+    s.write(f"r = {scale} * maximum({SQUARE}, 1e-18)", f"w = (x / r - {b}, -y / r, {a} - z / r)")
+
+
+def jos_end(s: FormulaStep, doubled: bool) -> None:
+    """Turn y about, and measure with a plane or the space between two."""
+    if s.on("transf_function_enabledE_false") and s.within("E"):
+        a, b = s.number("transf_offset_1"), s.number("transf_scale_0")
+        s.write("x, y, z = w", f"t = {a} + ({b} - 1) * absolute(y)", "w = (x, where(y < 0, -t, t), z)")
+    a = s.number("transf_folding_value")
+    kept = s.on("transf_function_enabledT_false") and s.within("T")
+    if kept and doubled:
+        s.write("x, y, z = w", f"w = (x, y, minimum(z, {a} - z))")
+    if s.index >= s.values.whole("transf_start_iterations_G"):
+        d = s.measure(last=True)
+        height = f"minimum(z, {d.number('transf_folding_value')} - z)" if doubled and not kept else "z"
+        more, most = d.number("analyticDE_offset_0"), d.number("analyticDE_tweak_005")
+        d.write(f"return minimum({height} + {more}, {most})")
+
+
+@known(225, "JosLeys-Kleinian V3", LEYS, LEFT_OUT, distance=OWN_SOLID)
+def jos_kleinian_3(s: FormulaStep) -> None:
+    """The group with z as the height, and polygons' folds before."""
+    jos_inversion(s, False)
+    jos_polygons(s)
+    jos_inversion(s, True)
+    jos_options(s)
+    if s.within("F"):
+        jos_step(s, "0.2", True)
+    jos_end(s, s.on("transf_spheres_enabled"))
+
+
+@known(230, "JosLeys-Kleinian V4", LEYS, LEFT_OUT, distance=OWN_SOLID)
+def jos_kleinian_4(s: FormulaStep) -> None:
+    """As the third, with translations before the polygons and a wave of another height."""
+    jos_inversion(s, False)
+    if s.on("transf_function_enabledN_false") and s.within("O"):
+        s.write("x, y, z = w")
+        for axis, switch, name in (("x", "Aw_false", "transf_offset_2"), ("y", "Aw", "transf_offsetA_2")):
+            if s.on(f"transf_function_enabled{switch}"):
+                k = s.number(name)
+                s.write(f"{axis} = {axis} - {k} * floor({axis} / {k} + 0.5)")
+        s.write("w = (x, y, z)")
+    jos_polygons(s)
+    jos_inversion(s, True)
+    jos_options(s)
+    if s.within("F"):
+        jos_step(s, s.number("transf_offset_02"), not s.on("transf_function_enabledX_false"))
+    jos_end(s, s.on("transf_spheres_enabled") and s.within("A"))

@@ -10,6 +10,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
+from ...fields.box import Box, possible_cells
 from ...formulas import Node, get
 from .sequences import (
     Orbit,
@@ -31,6 +34,9 @@ ROUNDS, UNROLLED = 12, 12
 
 FAR = 4.0
 """Radius beyond which no orbit of the formulas of four dimensions comes back."""
+
+CELLS = 1 << 15
+"""Most cells of the search for the part of a box that a solid is in."""
 
 WALL = 0.01
 """Thickness on each side of what is a surface without an inside."""
@@ -191,6 +197,19 @@ def confined(orbit: Orbit, node: Node) -> Node:
     main = orbit.settings.main
     eye, target = main.vector("camera", "3 -6 2"), main.vector("target", "0 0 0")
     half = max(1.5 * math.dist(eye, target), 2.0)
-    low, high = (tuple(float(f"{t + s * half:.6g}") for t in target) for s in (-1, 1))
+    low, high = (np.array(target) + s * half for s in (-1, 1))
+    if not orbit.settings.keyframes:
+        low, high = occupied(node, low, high)
     orbit.notes.append(f"{main.path}: the solid is endless: cut around what the camera looks at (<bounds>)")
-    return get("bounds")(node, min=low, max=high)
+    first, last = (tuple(float(f"{v:.6g}") for v in corner) for corner in (low, high))
+    return get("bounds")(node, min=first, max=last)
+
+
+def occupied(node: Node, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Corners of the part of a box where a solid may be, with a cell around it; all of it for none."""
+    box = Box(tuple(low.tolist()), tuple(high.tolist()))
+    centres, _, step = possible_cells(lambda p: node.distance(p.T), node.bounds.lipschitz, box, CELLS)
+    if not centres.size:
+        return low, high
+    first, last = centres.min(axis=1) - 1.5 * step, centres.max(axis=1) + 1.5 * step
+    return np.maximum(low, first), np.minimum(high, last)

@@ -2,8 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from .box_formulas import add_vary, scale_by
-from .folds import absolute_of, polygon
+from .distances import (
+    box_distance,
+    enlarge_by,
+    frame,
+    globe,
+    hexagons,
+    meridians,
+    move,
+    moved,
+    ring,
+    rounded_cylinder,
+    turn,
+)
+from .folds import absolute_of, polygon, switched
 from .kleinian_formulas import SLOPE, inverted_first
 from .sponge_formulas import koch
 from .step_text import LEFT_OUT, OWN_SOLID, FormulaStep, known
@@ -12,11 +27,6 @@ IFS = "Knighty 2010 and McLaren 2018, fractalforums.org: distances in iterations
 
 
 # Folds that the family has in common.
-
-
-def switched(s: FormulaStep, name: str, letter: str) -> bool:
-    """True if a switch is on in the iterations of a letter."""
-    return s.on(f"transf_function_enabled{name}") and s.within(letter)
 
 
 def absolutes(s: FormulaStep, x: bool, y: bool, z: str) -> None:
@@ -71,26 +81,6 @@ def enlarge(s: FormulaStep, x: str, y: str) -> None:
 
 
 # Distances.
-
-
-def box_distance(d: FormulaStep, size: tuple[str, str, str], round_: str = "0") -> None:
-    """Distance to a box of half sizes."""
-    a, b, c = size
-    d.write(f"x, y, z = absolute(x) - {a}, absolute(y) - {b}, absolute(z) - {c}")
-    d.write(
-        "m = minimum(maximum(x, maximum(y, z)), 0)", "x, y, z = maximum(x, 0), maximum(y, 0), maximum(z, 0)"
-    )
-    d.write(f"return sqrt(x * x + y * y + z * z) + m - {round_}")
-
-
-def ring(d: FormulaStep, radius: str, tube: str, square: bool, axes: str = "xyz") -> str:
-    """Distance to a torus about the last of the axes; the tube may be square."""
-    x, y, z = tuple(axes)
-    t = f"sqrt({x} * {x} + {y} * {y}) - {radius}"
-    if square:
-        return f"maximum(absolute({t}), absolute({z})) - {tube}"
-    d.write(f"t = {t}")
-    return f"sqrt(t * t + {z} * {z}) - {tube}"
 
 
 def sides(s: FormulaStep, d: FormulaStep, shear: bool = True) -> tuple[str, str, str]:
@@ -184,31 +174,20 @@ def tower_folds(s: FormulaStep, move: str, flat: str, whole: str) -> None:
 def cylinder(s: FormulaStep) -> None:
     """Folds of x and y, and a cylinder or a cone."""
     tower_folds(s, "transf_addition_constant_111", "Bx_false", "By_false")
-    if not s.during("transf_start_iterations", "transf_stop_iterations"):
+    whole = s.during("transf_start_iterations", "transf_stop_iterations")
+    ringed = switched(s, "I_false", "I")
+    if not whole and not ringed:
         return
-    s.refuse(*(f"transf_function_enabled{k}_false" for k in "I" if s.within(k)))
     d = s.measure(first=True, slope=2 if s.value("transf_scale_0") else 1)
-    if s.on("transf_function_enabledSw_false"):
+    if whole and s.on("transf_function_enabledSw_false"):
         d.write("x, z = z, x")
-    rounded_cylinder(s, d, "transf_radius_1")
-
-
-def rounded_cylinder(s: FormulaStep, d: FormulaStep, radius: str, tube: bool = False) -> None:
-    """A cylinder or a tube whose radius falls with the height or its square."""
-    height = "z" if switched(s, "M_false", "M") else "absolute(z)"
-    d.write(f"t, h = {height}, absolute(z) - {d.number('transf_offsetA_1')}")
-    if switched(s, "T_false", "T"):
-        d.write("t = t * t")
-    d.write("r = sqrt(x * x + y * y)", f"k = r - {d.number(radius)}")
-    if tube:
-        d.write(f"k = absolute(k) - {d.number('transf_offset_0')}")
-    d.write(f"k = k + {d.number('transf_scale_0')} * t")
-    beyond = "r" if switched(s, "N_false", "N") else "maximum(k, 0)"
-    d.write(f"m = minimum(maximum(k, h) - {d.number('transf_offsetR_0')}, 0)")
-    if switched(s, "O_false", "O"):
-        d.write("return sqrt(k * k + h * h) + m")
-    else:
-        d.write(f"u, h = {beyond}, maximum(h, 0)", "return sqrt(u * u + h * h) + m")
+    if ringed:
+        axes = "zyx" if s.on("transf_function_enabledJ_false") else "xyz"
+        own = ring(d, d.number("transf_offsetT_1"), d.number("transf_offset_05"), False, axes)
+        d.write(f"return {own}" if not whole else f"round = {own}")
+    if whole:
+        capped = rounded_cylinder(d, "transf_radius_1")
+        d.write(f"return minimum(round, {capped})" if ringed else f"return {capped}")
 
 
 @known(604, "DIFS - Sphere", IFS, LEFT_OUT, distance=OWN_SOLID)
@@ -234,16 +213,6 @@ def torus(s: FormulaStep) -> None:
         d = s.measure(first=True)
         axes = "zyx" if s.on("transf_function_enabledSw_false") else "xyz"
         d.write(f"return {ring(d, d.number('transf_offsetT_1'), d.number('transf_offset_05'), False, axes)}")
-
-
-def hexagons(d: FormulaStep, square: bool) -> None:
-    """Distance to a grid of hexagons, in the plane of x and y, of square or round wires."""
-    a = d.number("transf_scale_1")
-    d.write(f"z = z / {d.number('transf_scaleF_1')}", f"v = absolute(y - {a} * floor(y / {a} + 0.5))")
-    d.write(f"k = 1.5 * {a} / {SLOPE}", "u = absolute(x - k * floor(x / k + 0.5))")
-    d.write(f"t = minimum(maximum(v, u * {SLOPE} + 0.5 * v) - 0.5 * {a}, v)")
-    wire = "maximum(absolute(t), absolute(z))" if square else "sqrt(t * t + z * z)"
-    d.write(f"return {wire} - {d.number('transf_offset_0005')}")
 
 
 @known(608, "DIFS - Hextgrid2", IFS, LEFT_OUT, distance=OWN_SOLID)
@@ -344,23 +313,63 @@ def prism_here(s: FormulaStep) -> None:
 
 @known(1627, "T>DIFS Sphere Grid", IFS, LEFT_OUT, distance=OWN_SOLID)
 def sphere_grid(s: FormulaStep) -> None:
-    """A meridian of a globe, with an equator and two circles of latitude."""
-    s.refuse(
-        "transf_function_enabled_false", "transf_rotation2_enabled_false", "transf_function_enabledC_false"
-    )
+    """Meridians of a globe, with an equator and two circles of latitude."""
+    s.refuse("transf_function_enabledC_false")
     d = s.measure(last=not s.on("analyticDE_enabled_false"))
-    r = d.number("transf_offsetR_1")
-    square = s.on("transf_function_enabledJ_false")
-    d.write(f"m = {ring(d, r, d.number('transf_offset_p01'), square, 'yzx')}")
-    if s.on("transf_function_enabledM_false"):
-        square = s.on("transf_function_enabledN_false")
-        d.write(f"m = minimum(m, {ring(d, r, d.number('transf_offsetA_p01'), square)})")
-    if s.on("transf_function_enabledO_false"):
-        h = d.number("transf_offset_05")
-        d.write(f"z = absolute(z) - {h}", f"r = sqrt(maximum({r} * {r} - {h} * {h}, 0))")
-        square = s.on("transf_function_enabledP_false")
-        d.write(f"m = minimum(m, {ring(d, 'r', d.number('transf_offsetB_p01'), square)})")
-    d.write("return m")
+    with moved(s, d) as t:
+        if s.on("transf_function_enabled_false"):
+            s.refuse("transf_function_enabledD_false")
+            move(t, "transf_offset_000")
+            enlarge_by(t, "transf_scale_1")
+            turn(t, "transf_rotation")
+        meridians(t, "transf_int8_Z")
+        if s.on("transf_rotation2_enabled_false"):
+            turn(t, "transf_rotation2")
+    globe(d, "yzx")
+
+
+@known(1628, "T>DIFS Sphere Grid V2", IFS, LEFT_OUT, distance=OWN_SOLID)
+def sphere_grid_2(s: FormulaStep) -> None:
+    """As the first, moved, scaled and turned."""
+    s.add("transf_offset_000")
+    s.scale("transf_scale_1")
+    s.turn("transf_rotation")
+    d = s.measure(last=s.on("analyticDE_enabled_false"))
+    with moved(s, d) as t:
+        meridians(t, "transf_int8_Z")
+        if s.on("transf_rotation2_enabled_false"):
+            turn(t, "transf_rotation2")
+    globe(d, "yzx")
+
+
+@known(1629, "T>DIFS Sphere Grid V3", IFS, LEFT_OUT, distance=OWN_SOLID)
+def sphere_grid_3(s: FormulaStep) -> None:
+    """Circles about z after folds of polygons, in other coordinates."""
+    for switch, letter, axes, name in (
+        ("Cx", "A", "xy", "transf_int_32"),
+        ("Cy_false", "B", "yz", "transf_int8_Y"),
+        ("Cz_false", "C", "zx", "transf_int8_Z"),
+    ):
+        if switched(s, switch, letter):
+            absolute_polygon(s, axes, name)
+    s.add("transf_offset_000")
+    s.scale("transf_scale_1")
+    s.write("x, y, z = w", "w = (z, x, y)")
+    s.turn("transf_rotation")
+    d = s.measure(last=s.on("analyticDE_enabled_false"))
+    with moved(s, d) as t:
+        if s.on("transf_function_enabledK_false"):
+            meridians(t, "transf_int_1")
+        if s.on("transf_rotation2_enabled_false"):
+            turn(t, "transf_rotation2")
+    globe(d, "xyz")
+
+
+def absolute_polygon(s: FormulaStep, axes: str, name: str) -> None:
+    """A polygon's fold of the angle in a plane, from the first axis on, after an absolute value."""
+    second = axes[1]
+    s.write("x, y, z = w", f"{second} = absolute({second})", "w = (x, y, z)")
+    polygon(s, axes, name)
 
 
 @known(1633, "T>DIFS Box Frame", IFS, LEFT_OUT, distance=OWN_SOLID)
@@ -372,9 +381,7 @@ def box_frame(s: FormulaStep) -> None:
         ("Cz", "C", "zx", "Z"),
     ):
         if switched(s, f"{switch}_false", letter):
-            second = axes[1]
-            s.write("x, y, z = w", f"{second} = absolute({second})", "w = (x, y, z)")
-            polygon(s, axes, f"transf_int8_{name}")
+            absolute_polygon(s, axes, f"transf_int8_{name}")
     if switched(s, "D_false", "D"):
         s.add("transf_offset_000", "-")
         s.write("w = positive(w)")
@@ -385,38 +392,30 @@ def box_frame(s: FormulaStep) -> None:
     if switched(s, "R_false", "R"):
         s.turn("transf_rotation")
     s.refuse_values("transf_rotation2")
-    if s.within("Zc"):
-        s.refuse("transf_function_enabledZc_false")
+    shifted = switched(s, "Zc_false", "Zc")
+    if shifted:
+        s.write(f"w = positive(w) - {s.point('transf_offsetC_111')}")
     d = s.measure(last=not s.within("G"))
+    if not shifted:
+        d.write(f"a, b, c = {d.point('transf_offsetC_111')}")
+        d.write("x, y, z = absolute(x) - a, absolute(y) - b, absolute(z) - c")
     frame(d, s.on("transf_function_enabledSw_false"))
-
-
-def frame(d: FormulaStep, hollow: bool) -> None:
-    """Distance to the edges of a box, with a thickness along each axis."""
-    d.write(f"a, b, c = {d.point('transf_offsetC_111')}")
-    d.write("x, y, z = absolute(x) - a, absolute(y) - b, absolute(z) - c")
-    for p, q, name in (("x", "u", "p01"), ("y", "v", "A_p01"), ("z", "s", "B_p01")):
-        e = d.number(f"transf_offset{'_' if name == 'p01' else ''}{name}")
-        d.write(f"{q} = absolute({p}) - {e}" if hollow else f"{q} = absolute({p} + {e}) - {e}")
-    parts = []
-    for k, (p, q, r) in enumerate((("x", "v", "s"), ("u", "y", "s"), ("u", "v", "z"))):
-        d.write(f"l, m, n = maximum({p}, 0), maximum({q}, 0), maximum({r}, 0)")
-        d.write(f"d{k} = sqrt(l * l + m * m + n * n) + minimum(maximum({p}, maximum({q}, {r})), 0)")
-        parts.append(f"d{k}")
-    d.write(f"return minimum(minimum({parts[0]}, {parts[1]}), {parts[2]})")
 
 
 @known(1639, "T>DIFS Chessboard", IFS, LEFT_OUT, distance=OWN_SOLID)
 def chessboard(s: FormulaStep) -> None:
     """A board, or a plane."""
-    if s.within("Zc"):
-        s.refuse("transf_function_enabledZc_false")
+    plane, shifted = s.on("transf_function_enabled_false"), switched(s, "Zc_false", "Zc")
+    if shifted and not plane:
+        s.write(f"w = positive(w) - {s.point('transf_offset_110')}")
     d = s.measure(last=s.on("transf_function_enabledD_false"))
-    if s.on("transf_function_enabled_false"):
+    if plane:
         d.write("return z + 0 * x")
         return
-    d.write(f"a, b, c = {d.point('transf_offset_110')}")
-    d.write("return maximum(maximum(absolute(x) - a, absolute(y) - b), absolute(z) - c)")
+    if not shifted:
+        d.write(f"a, b, c = {d.point('transf_offset_110')}")
+        d.write("x, y, z = absolute(x) - a, absolute(y) - b, absolute(z) - c")
+    d.write("return maximum(maximum(x, y), z)")
 
 
 @known(1625, "T>DIFS Hexprism V2", IFS, LEFT_OUT, distance=OWN_SOLID)
@@ -457,9 +456,13 @@ def hexagon_prism(s: FormulaStep) -> None:
 @known(1632, "T>DIFS Helix", IFS, LEFT_OUT, distance=OWN_SOLID)
 def helix(s: FormulaStep) -> None:
     """A cylinder in coordinates that turn with height and radius."""
-    s.refuse("transf_function_enabledZc_false", "transf_rotation_enabled_false")
+    s.refuse("transf_function_enabledZc_false", "transf_function_enabled_auxC_false")
     d = s.measure(slope=2)
     d.write(f"a, b, c = {d.point('transf_scale3D_111')}", "x, y, z = a * x, b * y, c * z")
+    if s.on("transf_rotation_enabled_false") and s.during(
+        "transf_start_iterations_R", "transf_stop_iterations_R1"
+    ):
+        turn(d, "transf_rotation")
     if s.during("transf_start_iterations_C", "transf_stop_iterations_C1"):
         d.write(
             f"t = sqrt(x * x + y * y) * {d.number('transf_scaleA_0')} + z * {d.number('transf_scaleB_0')}"
@@ -473,7 +476,8 @@ def helix(s: FormulaStep) -> None:
                 d.write(f"{p} = absolute({p})")
         d.write(f"a, b, c = {d.point('transf_offset_000')}", "x, y, z = x + a, y + b, z + c")
     d.write(f"y = y * sqrt({d.number('transf_scale_1')})")
-    rounded_cylinder(s, d, "transf_offset_01", s.on("transf_function_enabled_false"))
+    tube = s.on("transf_function_enabled_false")
+    d.write(f"return {rounded_cylinder(d, 'transf_offset_01', tube)}")
 
 
 @known(
@@ -502,3 +506,215 @@ def koch_5(s: FormulaStep) -> None:
     if s.within("J"):
         s.refuse("transf_function_enabledT_false")
     d.write("return m")
+
+
+@known(
+    1637, "T>DIFS Cayley2", "McLaren 2021, fractalforums.org, after Cayley 1846", LEFT_OUT, distance=OWN_SOLID
+)
+def cayley_2(s: FormulaStep) -> None:
+    """The square of Cayley's transform of x and y, measured with a mean of a box and a cylinder."""
+    if s.on("transf_function_enabled_false") and s.during(
+        "transf_start_iterations", "transf_stop_iterations_1"
+    ):
+        s.write("w = turn(w, (0, 0, 1), 45)")
+    if s.on("transf_function_enabledM"):
+        absolute_of(s, [s.on(f"transf_function_enabled{switch}") for switch in ("Ax", "Ay", "Az_false")])
+    s.add("transf_offset_000")
+    if s.on("transf_rotation_enabled_false") and s.during(
+        "transf_start_iterations_R", "transf_stop_iterations_R1"
+    ):
+        s.turn("transf_rotation")
+    s.scale("transf_scale_1")
+    s.refuse("transf_function_enabledT_false")
+    thin = s.state.get("thin", 1.0)
+    s.state["thin"] = thin * s.value("transf_scaleB_1")
+    d = s.measure(slope=4)
+    with moved(s, d) as t:
+        cayley_square(t)
+        t.write(f"a, b, c = {t.point('transf_offset_110')}")
+        t.write("x, y, z = absolute(x) - a, absolute(y) - b, absolute(z) - c")
+    box_and_cylinder(d, thin)
+
+
+def cayley_square(d: FormulaStep) -> None:
+    """(u^2 + 1) / (u^2 - 1) of u = x + i y, up to factors."""
+    d.write("u, v = x * x, y * y", f"m = {d.number('transf_scaleA_2')} * u * v + u * u + v * v")
+    d.write(f"n = m + {d.number('transf_scale_4')} * x * y + 1", f"k = {d.number('transf_scale_2')}")
+    whole = d.on("transf_function_enabledB_false")
+    d.write(f"x, y = k * (m - 1){'' if whole else ' / n'}, 2 * (v - u) / n")
+    d.write(f"z = {d.number('transf_scaleA_1')} * z")
+
+
+def box_and_cylinder(d: FormulaStep, thin: float) -> None:
+    """A mean of the distances to a box, whose faces x, y and z count from, and to a cylinder."""
+    d.write(f"a, b, c = {d.point('transf_offset_110')}", f"e, f, g = {d.point('transf_addition_constant')}")
+    d.write("k = minimum(minimum(x + a - e, y + b - f), z + c - g)")
+    d.write("u, v, r = maximum(x, 0), maximum(y, 0), maximum(z, 0)", "m = sqrt(u * u + v * v + r * r)")
+    h = f"{d.number('transf_offset_01')} * {d.parameter('thin', thin)}"
+    d.write(f"r, h = sqrt(x * x + y * y) - {d.number('transf_radius_1')}, absolute(z) - {h}")
+    d.write(f"a, b, c = {d.point('transf_offsetA_000')}", "u, v = maximum(r - a, -b), maximum(h - c, 0)")
+    d.write("n = minimum(maximum(r, h), 0) + sqrt(u * u + v * v)")
+    for p, letter, name in (("m", "E", "transf_offsetC_0"), ("n", "F", "transf_offsetD_0")):
+        if d.on(f"transf_function_enabled{letter}_false"):
+            d.write(f"{p} = maximum(k, {p}) - {d.number(name)}")
+    d.write(f"return m + (n - m) * {d.number('transf_scaleD_1')} - {d.number('transf_offsetA_0')}")
+
+
+@known(1643, "T>DIFS Octahedron V2", "Quilez, iquilezles.org: octahedron", LEFT_OUT, distance=OWN_SOLID)
+def octahedron_2(s: FormulaStep) -> None:
+    """An octahedron, with a box or a ball about the start point."""
+    box, ball = (s.on(f"transf_function_enabled{letter}_false") for letter in "DE")
+    if s.index:
+        s.refuse("transf_function_enabledD_false", "transf_function_enabledE_false")
+    d = s.measure(first=True, slope=3 if s.on("transf_function_enabledA_false") else 1)
+    d.write("p, q, r = x, y, z")
+    into_octant(d)
+    octahedron(d)
+    if box:
+        d.write(f"a, b, c = {d.point('transf_addition_constant_0555')}")
+        d.write("a, b, c = absolute(p) - a, absolute(q) - b, absolute(r) - c")
+        d.write("t = minimum(maximum(a, maximum(b, c)), 0)")
+        d.write("a, b, c = maximum(a, 0), maximum(b, 0), maximum(c, 0)")
+        both = "maximum" if s.on("transf_function_enabledJ_false") else "minimum"
+        d.write(f"m = {both}(sqrt(a * a + b * b + c * c) + t, m)")
+    if ball:
+        d.write(f"m = minimum(sqrt(p * p + q * q + r * r) - {d.number('transf_scale_08')}, m)")
+    d.write("return m")
+    s.write("x, y, z = w")
+    into_octant(s)
+    s.write("w = (x, y, z)")
+
+
+def into_octant(d: FormulaStep) -> None:
+    """Clip, scale and turn, and take absolute values."""
+    if d.on("transf_function_enabledF_false"):
+        d.write(f"a, b, c = {d.point('transf_offsetF_000')}")
+        for p, a in zip("xyz", "abc", strict=True):
+            d.write(f"{p} = {p} - maximum(minimum({p}, {a}), -{a})")
+    enlarge_by(d, "transf_scaleA_1")
+    if d.on("transf_rotation2_enabled_false") and d.within("C"):
+        turn(d, "transf_rotation")
+    d.write("x, y, z = absolute(x), absolute(y), absolute(z)")
+    if d.on("transf_function_enabledA_false"):
+        move(d, "transf_offset_000", "-")
+
+
+def octahedron(d: FormulaStep) -> None:
+    """Distance m to an octahedron, from a point with coordinates that are not negative."""
+    bent = d.on("transf_function_enabledA_false")
+    d.write(f"k = (x + y + z - {d.number('transf_offset_1')}) / 3")
+    if bent:
+        d.write(f"k = {d.number('transf_scale_1')} * k * k")
+    d.write("t = 0.5 * (minimum(x - k, 0) + minimum(y - k, 0) + minimum(z - k, 0))")
+    most = d.number("transf_offsetA_1" if bent else "transf_offset_1")
+    less = "" if d.on("transf_function_enabledB_false") else " - k"
+    for p, q in zip("xyz", "abc", strict=True):
+        start = f"absolute({p})" if not less else f"{p}{less}"
+        d.write(f"{q} = {p} - minimum(maximum({start} + t, 0), {most})")
+    d.write(f"m = where(k < 0, -1, 1) * sqrt(a * a + b * b + c * c) - {d.number('transf_offset_0005')}")
+    d.write(f"m = m / {d.number('transf_scaleA_1')}")
+
+
+def tube_folds(s: FormulaStep, letter: str, name: str, switches: Sequence[str]) -> None:
+    """Scale, absolute values, an offset and a turn, in the iterations of T."""
+    if not switched(s, "T_false", "T"):
+        return
+    s.scale("transf_scale_1")
+    if s.within(letter):
+        if switches:
+            absolute_of(s, [s.on(f"transf_function_enabled{switch}") for switch in switches])
+        s.add(name, "-")
+    if switched(s, "R_false", "R"):
+        s.turn("transf_rotation")
+
+
+@known(1645, "T>DIFS Tube", IFS, LEFT_OUT, distance=OWN_SOLID)
+def tube(s: FormulaStep) -> None:
+    """A tube along y whose section is a square, a circle or a triangle."""
+    tube_folds(s, "T", "transf_offsetA_000", ("x_false", "y_false", "A_false"))
+    triangle = any(s.on(f"transf_function_enabled{letter}_false") for letter in "EF")
+    d = s.measure(slope=1.5 if triangle else 1)
+    for letter, swap in (("S", "x, y = y, x"), ("M", "x, z = z, x")):
+        if switched(s, f"{letter}_false", letter):
+            d.write(swap)
+    if s.on("transf_function_enabledP_false") and s.during(
+        "transf_start_iterations_P", "transf_stop_iterations_P1"
+    ):
+        s.refuse(*(f"transf_function_enabledA{axis}_false" for axis in "xyz"))
+    d.write(f"a, b, c = {d.point('transf_offsetF_000')}", "t = x")
+    if s.on("transf_function_enabledBx"):
+        d.write("t = absolute(t) - a")
+    if s.on("transf_function_enabledK_false"):
+        d.write("z = absolute(z) - b")
+    section(d)
+    d.write(f"t = t - {d.number('transf_offset_02')}")
+    if not s.on("transf_function_enabledG_false"):
+        d.write(f"t = maximum(absolute(t) - {d.number('transf_offset_p01')}, t)")
+    d.write(f"h = absolute(y) - {d.number('transf_offsetA_1')}", "m = minimum(maximum(t, h), 0)")
+    d.write("t, h = maximum(t, 0), maximum(h, 0)", "return sqrt(t * t + h * h) + m")
+
+
+def section(d: FormulaStep) -> None:
+    """Sections of a tube, one after another."""
+    if d.on("transf_function_enabledCx"):
+        d.write("t = maximum(absolute(t), absolute(z))")
+    if d.on("transf_function_enabledD_false"):
+        d.write("t = sqrt(t * t + z * z)")
+    if d.on("transf_function_enabledE_false"):
+        d.write(f"t = maximum(absolute(t) * {SLOPE} + 0.5 * z, -z)")
+    if d.on("transf_function_enabledF_false"):
+        sides = []
+        for p, letter, name in (("u", "y", "transf_offsetB_0"), ("v", "z", "transf_offsetC_0")):
+            d.write(f"{p} = z")
+            if d.on(f"transf_function_enabledC{letter}"):
+                d.write(f"{p} = absolute({p}) - {d.number(name)}")
+            if d.on(f"transf_function_enabledC{letter}_false"):
+                d.write(f"{p} = {d.number(name)} - {p}")
+            sides.append(p)
+        d.write(f"t = maximum(absolute(t) * {SLOPE} + 0.5 * u, v)")
+
+
+@known(1646, "T>DIFS Torus V4", IFS, LEFT_OUT, distance=OWN_SOLID)
+def torus_4(s: FormulaStep) -> None:
+    """Half a torus, of a square or a round tube, which may be hollow."""
+    folded = s.on("transf_function_enabledG_false")
+    tube_folds(s, "M", "transf_offset_000", ("Ax_false", "Ay_false", "Az_false") if folded else ())
+    angle = s.value("transf_angle_deg_A")
+    if angle:
+        a = s.number("transf_angle_deg_A")
+        s.write(f"w = turn(w, (0, 0, 1), {a})", "x, y, z = w", "w = (absolute(x), y, z)")
+        s.write(f"w = turn(w, (0, 0, 1), {a})")
+    hollow, square = s.on("transf_function_enabledC_false"), s.on("transf_function_enabledJ_false")
+    d = s.measure()
+    d.write(f"m = {ring(d, d.number('transf_radius_1'), d.number('transf_offset_02'), square)}")
+    if hollow:
+        e = d.number("transf_offset_0005")
+        d.write(f"m = absolute(m + {e}) - {e}")
+    d.write("return maximum(m, -y)")
+
+
+@known(610, "DIFS Msltoe Donut", "Msltoe 2011, fractalforums.com: donut", LEFT_OUT, distance=OWN_SOLID)
+def donut(s: FormulaStep) -> None:
+    """Rings along a ring, and so on, measured with the ring."""
+    d = s.measure(first=True)
+    d.write(f"return {ring(d, d.number('donut_ring_radius'), d.number('donut_ring_thickness'), False)}")
+    rings(s)
+
+
+def rings(s: FormulaStep) -> None:
+    """Turn to the nearest of the points at equal distances on a ring, and enlarge about it; within the ring,
+    divide by the distance.
+    """
+    radius, tube, factor = (s.number(f"donut_{name}") for name in ("ring_radius", "ring_thickness", "factor"))
+    s.write("x, y, z = w", f"k = 6.283185307179586 / {s.number('donut_number')}")
+    s.write(f"r = {radius} - sqrt(maximum(x * x + y * y, 1e-30))", f"m = r * r + z * z - {tube} * {tube}")
+    s.write("t = k * floor(atan2(y, x) / k + 0.5)", "u, v = cos(t), sin(t)")
+    s.write(f"a, b, d = u * x + v * y - {radius}, z, u * y - v * x")
+    s.write(f"f = where(m > 0.03, {factor}, 1 / where(absolute(m) < 1e-9, 1e-9, m))")
+    s.write("w = (f * where(m > 0.03, a, x), f * where(m > 0.03, b, y), f * where(m > 0.03, d, z))")
+
+
+@known(82, "Msltoe - Donut", "Msltoe 2011, fractalforums.com: donut", LEFT_OUT)
+def donut_of_escape(s: FormulaStep) -> None:
+    """Rings along a ring, and so on, by escape."""
+    rings(s)

@@ -341,10 +341,14 @@ def abs_sym_3(s: FormulaStep) -> None:
 @known(1155, "T>Spherical Invert V4", MANDELBULBER, LEFT_OUT)
 def spherical_inversion_4(s: FormulaStep) -> None:
     """Multiply by the square of the radius or its inverse, as modes say in a shell."""
-    s.refuse("transf_function_enabledy_false")
+    square = ("x, y, z = w", "s = x * x + y * y + z * z", "k = s")
+    before = s.on("transf_function_enabledy_false")
+    if before:
+        s.write(*square)
     s.add("mandelbox_offset")
     s.scale("transf_scale")
-    s.write("x, y, z = w", "s = x * x + y * y + z * z", "k = s")
+    if not before:
+        s.write(*square)
     if s.on("transf_function_enabledP_false") and s.during(
         "transf_start_iterations_P", "transf_stop_iterations_P1"
     ):
@@ -573,13 +577,32 @@ def sine_or_cosine(s: FormulaStep) -> None:
 
 @known(56, "T>Platonic Solid", "Luca 2011, fractalforums.com", LEFT_OUT)
 def platonic_solid(s: FormulaStep) -> None:
-    """Multiply by a sum of products of sines and cosines, and of the root of the radius."""
-    s.refuse("transf_function_enabled_false")
+    """Multiply by a sum of products of sines and cosines, and of a power of the radius."""
     f, a, b = (s.number(f"platonic_solid_{name}") for name in ("frequency", "amplitude", "rhoMul"))
     s.write(
         "x, y, z = w",
         f"p, q, r = {f} * x, {f} * y, {f} * z",
         "t = cos(p) * sin(q) + cos(q) * sin(r) + cos(r) * sin(p)",
-        "s = sqrt(sqrt(maximum(x * x + y * y + z * z, 1e-30)))",
-        f"w = (t * {a} + s * {b}) * w",
+        "s = sqrt(maximum(x * x + y * y + z * z, 1e-30))",
     )
+    s.write(f"s = {radial(s) if s.on('transf_function_enabled_false') else 'sqrt(s)'}")
+    if s.on("transf_function_enabled_false") and s.on("transf_function_enabledAz_false"):
+        s.write("t = absolute(t)")
+    s.write(f"w = (t * {a} + s * {b}) * w")
+
+
+def radial(s: FormulaStep) -> str:
+    """Root of a radius, the radius and its square: their sum, or a mean of two, without those whose switches
+    are off.
+    """
+    switches = ("x", "y_false", "z_false")
+    root, same, square = (
+        power if s.on(f"transf_function_enabled{switch}") else "0 * s"
+        for power, switch in zip(("sqrt(s)", "s", "s * s"), switches, strict=True)
+    )
+    share = s.number("transf_scale_1")
+    if s.on("transf_function_enabledAx_false"):
+        return f"{root} + ({same} - {root}) * {share}"
+    if s.on("transf_function_enabledAy_false"):
+        return f"{same} + ({square} - {same}) * {share}"
+    return f"{root} + {same} + {square}"
