@@ -207,7 +207,7 @@ class LightLinker:
             return self.linker.functions[FIELD]
         if opaque is None:
             return kernel_function(nothing)
-        return link_tree(self.linker, opaque, FieldDialect(self.linker))
+        return link_tree(self.linker, opaque, FieldDialect())
 
     def light(self, light: Light) -> Lamp | Surroundings | Sky | None:
         """Link a light; None for one that only rays see that continue."""
