@@ -550,7 +550,7 @@ class Node(Operators, Field):
     depth: int = field(init=False, compare=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "depth", 1 + max((child.depth for child in self.children), default=0))
+        object.__setattr__(self, "depth", 1 + max([child.depth for child in self.children], default=0))
 
     def __getitem__(self, parameter: str) -> Any:
         """Value of a parameter."""

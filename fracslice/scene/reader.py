@@ -43,8 +43,10 @@ from .view import Animation, Track, View
 if TYPE_CHECKING:
     from .model import Scene
 
-LARGEST_FILE, MOST_ELEMENTS, MOST_DEFINED = 16 << 20, 1 << 17, 100
-"""Most bytes and elements of a scene, and most definitions, or parameters of one."""
+LARGEST_FILE, MOST_ELEMENTS, MOST_DEFINED = 64 << 20, 1 << 19, 100
+"""Most bytes and elements of a scene, and most definitions, or parameters of one. An element takes about
+1.6 kB when it is read and measured: a scene takes less than a gigabyte before its object takes any.
+"""
 LONGEST_TEXT = 1 << 16
 """Most characters of a definition with its indentation."""
 UNIT = "1mm"
@@ -119,7 +121,7 @@ def _scene(data: bytes, source: str, name: str, files_outside: bool) -> Scene:
         raise SceneError(f"{source}: expected a scene, the file is empty")
     tags = data.replace(b"\0", b"")  # of UTF-16
     if tags.count(b"<") - tags.count(b"</") > MOST_ELEMENTS:
-        raise SceneError(f"{source}: expected a scene of at most {MOST_ELEMENTS} elements")
+        raise SceneError(f"{source}: expected a scene of at most {MOST_ELEMENTS:,} elements")
     builder = _Builder(source, files_outside)
     solid = builder.sections(data)[SOLID.name]
     others = (Print, Animation, Track)
@@ -207,7 +209,8 @@ class _Builder:
             if kind.default is REQUIRED and attribute not in attributes:
                 raise opened.fail(f'needs the attribute {attribute}="...": expected {kind.expects}')
         self.open.append(opened)
-        self.parser.buffer_text = opened.element not in (DEFINE, PARAMETER)
+        if opened.element is DEFINE:
+            self.parser.buffer_text = False
 
     def located(self, value: Any, opened: _Open, attribute: str) -> Any:
         """The value of an attribute; the name of a file is relative to the scene's folder."""
@@ -284,6 +287,7 @@ class _Builder:
 
     def define(self, closed: _Open) -> None:
         """Add the formula of a definition."""
+        self.parser.buffer_text = True
         if sum(isinstance(formula, Defined) for formula in self.formulas.values()) == MOST_DEFINED:
             raise closed.fail(f"expected at most {MOST_DEFINED} definitions in a scene")
         made = _make_definition(closed.values, closed.declared, closed.lines, self.source)
