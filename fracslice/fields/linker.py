@@ -120,6 +120,9 @@ def append_numbers(value: Any, numbers: list[float]) -> Structure:
         numbers.append(value)
         return False
     if isinstance(value, tuple):
+        if set(map(type, value)) == {float}:
+            numbers += value
+            return (False,) * len(value)
         return tuple([append_numbers(part, numbers) for part in value])
     if isinstance(value, OfPoint):
         return Called(formula(value.function))
@@ -172,7 +175,7 @@ def arguments(node: Node) -> Arguments:
     function, values = node.function, node.arguments
     names = function.parameters if isinstance(function, Function) else parameters(function)
     names = names[leading(node) :]
-    if values.keys() != set(names):
+    if values.keys() ^ names:
         wanted, given = (", ".join(s) or "nothing" for s in (values, names))
         code = function.__code__
         raise KernelError(
@@ -354,8 +357,10 @@ class PartNumbers:
         """Append those of another part."""
         start = len(self.values)
         self.values += more.values
-        self.held += [(start + place, memory) for place, memory in more.held]
-        self.unions += [(start + place, union) for place, union in more.unions]
+        if more.held:
+            self.held += [(start + place, memory) for place, memory in more.held]
+        if more.unions:
+            self.unions += [(start + place, union) for place, union in more.unions]
         return self
 
 
@@ -421,9 +426,17 @@ class _Tree:
     linker: Linker
     dialect: Dialect
     is_long: Callable[[Node], bool]  # whether the elements of a union are linked apart
+    known: dict[int, tuple[Subroutine, PartNumbers]] = field(default_factory=dict)
 
     def linked(self, node: Node) -> tuple[Subroutine, PartNumbers]:
-        """Function and numbers of a node with all below it."""
+        """Function and numbers of a node with all below it; of one that stands in many places, once."""
+        found = self.known.get(id(node))
+        if not found:
+            found = self.known[id(node)] = self.linked_now(node)
+        return found
+
+    def linked_now(self, node: Node) -> tuple[Subroutine, PartNumbers]:
+        """See `linked`."""
         node = self.dialect.kept(node)
         given = self.dialect.arguments(node)
         numbers = PartNumbers(given.numbers, [*given.held])
@@ -553,7 +566,7 @@ class FieldDialect:
     def order(self, node: Node, parts: Sequence[Subroutine]) -> Sequence[int]:
         """Group elements of the same structure where their order changes no bit of the result."""
         places = range(len(parts))
-        if not node.is_unordered:
+        if len(parts) == 1 or not node.is_unordered:
             return places
         first = list(dict.fromkeys(part.function for part in parts))
         return sorted(places, key=lambda k: first.index(parts[k].function))

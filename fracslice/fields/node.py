@@ -680,7 +680,7 @@ class Node(Operators, Field):
         box = self._hooked("bounds", EVERYWHERE)
         slope = self._hooked("slope", max([formula.lipschitz, *[b.lipschitz for b in below]]))
         steepening = self._hooked("steepening", max([0.0, *[b.steepening for b in below]]))
-        exterior_only = formula.exterior_only or any(b.exterior_only for b in below)
+        exterior_only = formula.exterior_only or True in [b.exterior_only for b in below]
         is_measured = formula.exterior_only and not self._hooked("proves_slope", False)
         boxless = _names([b.boxless for b in below], formula.name, "bounds" not in formula.hooks)
         measured = _names([b.measured for b in below], formula.name, is_measured)
@@ -837,8 +837,8 @@ EVERYWHERE = Box.everywhere()
 
 def _names(below: Sequence[tuple[str, ...]], own: str, is_one: bool) -> tuple[str, ...]:
     """Names of formulas below a node, and its own if it is one of them, each once."""
-    names = list(chain.from_iterable(below))
-    return tuple(dict.fromkeys([*names, own] if is_one else names))
+    names = dict.fromkeys(chain.from_iterable(below))
+    return tuple(names | {own: None} if is_one else names)
 
 
 @lru_cache(maxsize=512)

@@ -175,8 +175,10 @@ def _refuse_impossible(root: Node) -> None:
     node = root
     with computing(lambda message: node.fail(message)):
         for node in reversed(list(root.solids())):
-            depths: dict[str, Any] = {name: 1 for name, value in node.values.items() if value == AUTO}
-            _ = node.bounds, (node.changed(**depths) if depths else node).arguments
+            known = node
+            if AUTO in node.values.values():
+                known = node.changed(**{name: 1 for name, value in node.values.items() if value == AUTO})
+            _ = node.bounds, known.arguments
     _POSSIBLE.add(root)
 
 
