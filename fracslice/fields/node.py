@@ -593,7 +593,17 @@ class Node(Operators, Field):
         return _joined(self.formula, frozenset(child.formulas for child in self.children))
 
     def has_hook(self, name: str) -> bool:
-        """Return whether a formula of the tree has a hook."""
+        """Return whether a formula of the tree has a hook.
+
+        Parameters
+        ----------
+        name : str
+            Name of the hook's decorator.
+
+        Returns
+        -------
+        bool
+        """
         return any(name in formula.hooks for formula in self.formulas)
 
     @property
