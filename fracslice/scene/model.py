@@ -177,7 +177,8 @@ def _refuse_impossible(root: Node) -> None:
         for node in reversed(list(root.solids())):
             known = node
             if AUTO in node.values.values():
-                known = node.changed(**{name: 1 for name, value in node.values.items() if value == AUTO})
+                depths: dict[str, Any] = {name: 1 for name, value in node.values.items() if value == AUTO}
+                known = node.changed(**depths)
             _ = node.bounds, known.arguments
     _POSSIBLE.add(root)
 
