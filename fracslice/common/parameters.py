@@ -36,7 +36,7 @@ def printable(text: str) -> str:
 
 def finite(value: Any) -> float | None:
     """Convert a real number to a float."""
-    if isinstance(value, bool) or not isinstance(value, Real):
+    if isinstance(value, bool) or not isinstance(value, (float, Real)):  # most are, and Real is slow
         return None
     try:
         number = float(value)
@@ -47,6 +47,8 @@ def finite(value: Any) -> float | None:
 
 def items(value: Any) -> Sequence[Any]:
     """Items of a sequence or an array; any other value is one item."""
+    if isinstance(value, (tuple, list)):
+        return value
     value = value.tolist() if hasattr(value, "tolist") else value
     return value if isinstance(value, Sequence) and not isinstance(value, (str, bytes)) else (value,)
 

@@ -15,7 +15,7 @@ from ..common.parameters import Triple as Triple
 from ..expr.intervals import ARRAYS, Interval
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Box:
     """The box ``lo <= p <= hi``, empty if ``lo > hi`` on any axis.
 
@@ -72,10 +72,32 @@ class Box:
         axes = list(zip(*points, strict=True))
         return cls(_triple(min(a) for a in axes), _triple(max(a) for a in axes))
 
+    @classmethod
+    def enclosing(cls, boxes: Iterable[Box]) -> Box:
+        """Smallest box that encloses some boxes.
+
+        Parameters
+        ----------
+        boxes : iterable of Box
+            At least one box.
+
+        Returns
+        -------
+        Box
+            Empty if all are.
+        """
+        given = list(boxes)
+        held = [box for box in given if not box.empty]
+        if not held:
+            return given[-1]
+        lo, hi = zip(*(box.lo for box in held), strict=True), zip(*(box.hi for box in held), strict=True)
+        return cls(_triple(map(min, lo)), _triple(map(max, hi)))
+
     @property
     def empty(self) -> bool:
         """True if the box holds no points."""
-        return any(a > b for a, b in zip(self.lo, self.hi, strict=True))
+        (a, b, c), (d, e, f) = self.lo, self.hi
+        return a > d or b > e or c > f
 
     @property
     def finite(self) -> bool:
@@ -99,9 +121,7 @@ class Box:
 
     def __or__(self, other: Box) -> Box:
         """Smallest box that encloses both."""
-        if self.empty or other.empty:
-            return other if self.empty else self
-        return Box(_triple(map(min, self.lo, other.lo)), _triple(map(max, self.hi, other.hi)))
+        return Box.enclosing((self, other))
 
     def __and__(self, other: Box) -> Box:
         """Intersection of both."""

@@ -349,6 +349,8 @@ def _locate_error(
 
 def definitions(root: Node) -> list[Definition]:
     """Definitions of a tree's formulas, in the order of the tree."""
+    if not any(isinstance(formula, Defined) for formula in root.formulas):
+        return []
     used = dict.fromkeys(n.formula.definition for n in root.walk() if isinstance(n.formula, Defined))
     named: dict[str, Definition] = {}
     for definition in used:

@@ -74,6 +74,8 @@ def resolve_depths(root: Node, detail: float) -> Node:
     KernelError
         If a formula cannot be compiled.
     """
+    if not may_be_automatic(root):
+        return root
     detail = _within(root, detail)
     children = tuple(resolve_depths(child, detail) for child in root.fields)
     root = root if children == root.fields else _with_fields(root, children)
@@ -81,8 +83,16 @@ def resolve_depths(root: Node, detail: float) -> Node:
     return _at(root, automatic, _depth(root, automatic, detail)) if automatic else root
 
 
+def may_be_automatic(root: Node) -> bool:
+    """Return whether a tree has formulas whose depths may be automatic."""
+    kinds = (kind for formula in root.formulas for kind in formula.parameters.values())
+    return any(isinstance(kind, Count) and AUTO in kind.words for kind in kinds)
+
+
 def with_depths_of(root: Node, known: Node) -> Node:
     """Give automatic depths the values that they have in another scene of the same elements."""
+    if not may_be_automatic(root):
+        return root
     if root.formula is not known.formula or len(root.children) != len(known.children):
         return root
     depths = {name: known[name] for name, value in root.values.items() if value == AUTO}
@@ -93,7 +103,7 @@ def with_depths_of(root: Node, known: Node) -> Node:
 
 def depth_notes(root: Node, known: Node) -> tuple[str, ...]:
     """Describe the automatic depths of a scene, such as "mandelbulb 5"."""
-    pairs = zip(root.walk(), known.walk(), strict=True)
+    pairs = zip(root.walk(), known.walk(), strict=True) if known is not root else ()
     return tuple(f"{a.formula.name} {b[n]}" for a, b in pairs for n in a.values if a[n] != b[n])
 
 
@@ -104,6 +114,8 @@ def visible(root: Node, voxel: float) -> tuple[Node, tuple[str, ...]]:
 
     `voxel` in scene units.
     """
+    if not root.has_hook("visible"):
+        return root, ()
     coarser = root.visible(voxel)
     changed = [
         f"{root.formula.name}: {name} {coarser[name]} of {value}; finer parts are thinner than a voxel"

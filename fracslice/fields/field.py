@@ -17,7 +17,7 @@ Precision = Literal["float32", "float64"]
 Device = Literal["cpu", "cuda"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Bounds:
     """Properties of a field that hold without evaluating it."""
 

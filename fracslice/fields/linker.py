@@ -14,10 +14,10 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from itertools import groupby
-from typing import TYPE_CHECKING, Any, Protocol
+from itertools import count
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from ..common.parameters import AUTO
 from ..errors import KernelError
 from ..expr.frontend import FormulaReader, formula
 from ..expr.graph import Entry, FlowGraph, Function, Program, Value, Width, Writer, identified, written
-from ..expr.language import CHILD, WORDS, Fixed, InMemory, OfPoint, words
+from ..expr.language import CHILD, WORDS, Fixed, InMemory, OfPoint, parameters, words
 from .regions import Region, is_long
 
 if TYPE_CHECKING:
@@ -86,6 +86,11 @@ class Linked:
 Passed = Any
 """Where an argument lies in P, from its beginning: an `Entry`, or a tuple of these; or a `Called`."""
 
+Structure = Any
+"""What is the same of arguments that differ in numbers only: of a number, whether it is whole; a tuple of
+these; or a `Called`.
+"""
+
 
 @dataclass(frozen=True)
 class Called:
@@ -109,26 +114,44 @@ def load(writer: Writer, passed: Passed, origin: Value | None = None) -> Value:
     return writer.entry(passed, origin)
 
 
-def append_numbers(value: Any, numbers: list[float]) -> Passed:
+def append_numbers(value: Any, numbers: list[float]) -> Structure:
     """Append a number or a tuple of numbers to a list; of an argument in memory its hash."""
+    if isinstance(value, float):  # most are
+        numbers.append(value)
+        return False
+    if isinstance(value, tuple):
+        if set(map(type, value)) == {float}:
+            numbers += value
+            return (False,) * len(value)
+        return tuple([append_numbers(part, numbers) for part in value])
     if isinstance(value, OfPoint):
         return Called(formula(value.function))
     if isinstance(value, InMemory):
-        value = words(value.digest)
-    if isinstance(value, tuple):
-        return tuple(append_numbers(part, numbers) for part in value)
+        return append_numbers(words(value.digest), numbers)
     numbers.append(float(value))
-    return Entry(len(numbers) - 1, isinstance(value, int))
+    return isinstance(value, int)
 
 
-@dataclass(frozen=True)
+def passed(structure: Structure, start: int = 0) -> Passed:
+    """Return where the arguments of a structure lie whose numbers begin at an index."""
+    places = count(start)
+
+    def placed(part: Structure) -> Passed:
+        if isinstance(part, tuple):
+            return tuple(map(placed, part))
+        return part if isinstance(part, Called) else Entry(next(places), part)
+
+    return placed(structure)
+
+
+@dataclass(slots=True)
 class Arguments:
     """Function of a node and its arguments."""
 
     function: Callable[..., Any] | Function  # function of the formula
     fixed: tuple[tuple[str, Any], ...]  # arguments that are known when the function is read
-    passed: tuple[Passed, ...]  # places of the other arguments, in the function's order
-    numbers: tuple[float, ...]  # numbers in P
+    structure: tuple[Structure, ...]  # of the other arguments, in the function's order
+    numbers: list[float]  # numbers in P
     held: tuple[tuple[int, InMemory], ...] = ()  # arguments in memory, by the index of their first word
 
     @property
@@ -136,34 +159,42 @@ class Arguments:
         """The function."""
         return formula(self.function, self.fixed)
 
+    @property
+    def passed(self) -> tuple[Passed, ...]:
+        """Places of the arguments that are passed."""
+        places: tuple[Passed, ...] = passed(self.structure)
+        return places
+
     def load(self, writer: Writer) -> list[Value]:
         """Write the values of the arguments that are passed."""
         return [load(writer, place, writer.names["P0"]) for place in self.passed]
 
 
-def arguments(node: Node, leading: int) -> Arguments:
+def arguments(node: Node) -> Arguments:
     """Return the function of a node and its arguments."""
     function, values = node.function, node.arguments
-    whole = formula(function)
-    names = whole.parameters[leading:]
-    if set(names) != set(values):
+    names = function.parameters if isinstance(function, Function) else parameters(function)
+    names = names[leading(node) :]
+    if values.keys() ^ names:
         wanted, given = (", ".join(s) or "nothing" for s in (values, names))
         code = function.__code__
         raise KernelError(
             f"{code.co_filename}:{code.co_firstlineno}: formula {node.formula.name}: expected "
-            f"{whole.name} to take {wanted} after its points, found {given}"
+            f"{function.__name__} to take {wanted} after its points, found {given}"
         )
-    fixed = tuple((name, values[name].value) for name in names if isinstance(values[name], Fixed))
-    numbers: list[float] = []
-    passed, held = [], []
-    for value in (values[name] for name in names if not isinstance(values[name], Fixed)):
+    fixed, structure, held, numbers = [], [], [], list[float]()
+    for name in names:
+        value = values[name]
+        if isinstance(value, Fixed):
+            fixed.append((name, value.value))
+            continue
         if isinstance(value, InMemory):
             held.append((len(numbers), value))
-        passed.append(append_numbers(value, numbers))
-    return Arguments(function, fixed, tuple(passed), tuple(numbers), tuple(held))
+        structure.append(append_numbers(value, numbers))
+    return Arguments(function, tuple(fixed), tuple(structure), numbers, tuple(held))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Subroutine:
     """Function ``name(x, y, z, P, P0)`` of all trees of one structure."""
 
@@ -235,6 +266,11 @@ class Run:
         """Text of its place."""
         return f"{self.count} {self.start} {self.part.size}"
 
+    @property
+    def key(self) -> tuple[Any, ...]:
+        """What a function that calls it depends on."""
+        return self.part.function, self.count, self.start
+
 
 @dataclass(frozen=True)
 class LongRun(Run):
@@ -281,6 +317,10 @@ class LongRun(Run):
     def about(self) -> str:
         return f"long {self.start} {self.part.size}"
 
+    @property
+    def key(self) -> tuple[Any, ...]:
+        return self.part.function, "long", self.start
+
 
 class Dialect(Protocol):
     """Style of the functions of a tree."""
@@ -292,8 +332,11 @@ class Dialect(Protocol):
 
     def arguments(self, node: Node) -> Arguments: ...
 
-    def region(self, node: Node, program: Program, numbers: PartNumbers) -> Region:
-        """Return the region of a long union; `program`: of one element; `numbers`: those of all."""
+    def elements(self, node: Node) -> Elements:
+        """Return the elements of a long union."""
+
+    def region(self, node: Node) -> Region:
+        """Return the region of a long union."""
 
     def order(self, node: Node, parts: Sequence[Subroutine]) -> Sequence[int]:
         """Return an order in which the children may be evaluated."""
@@ -304,25 +347,68 @@ class Dialect(Protocol):
 
 @dataclass
 class PartNumbers:
-    """Numbers of P, and what is in memory; see `Linked`."""
+    """Numbers of P of a part, with what is in memory and long unions, each by the index of its first word."""
 
     values: list[float] = field(default_factory=list)
     held: list[tuple[int, InMemory]] = field(default_factory=list)
+    unions: list[tuple[int, LongUnion]] = field(default_factory=list)
+
+    def __iadd__(self, more: PartNumbers) -> Self:
+        """Append those of another part."""
+        start = len(self.values)
+        self.values += more.values
+        if more.held:
+            self.held += [(start + place, memory) for place, memory in more.held]
+        if more.unions:
+            self.unions += [(start + place, union) for place, union in more.unions]
+        return self
 
 
-@dataclass
+@dataclass(frozen=True, eq=False)
+class Elements:
+    """Elements of a long union, linked apart from all else."""
+
+    part: Subroutine  # function of one of them
+    numbers: np.ndarray  # P of each, float64 [n, size]
+    held: Sequence[tuple[int, InMemory]]  # see `Linked`; places in the flat numbers
+    parts: Sequence[Function]  # functions of all, innermost first
+    called: frozenset[Function]  # those that are called, not inlined
+
+    @property
+    def program(self) -> Program:
+        """Program of one element, whose numbers are P."""
+        return Program({FIELD: function_of(self.part, 0)}, self.parts, self.called)
+
+
+@dataclass(frozen=True)
 class LongUnion:
-    """Elements of a long union, whose numbers come after the other ones of P."""
+    """A long union, whose elements' numbers come after the other ones of P."""
 
-    header: int  # index in P of the first word of its address
+    elements: Elements
     region: Region
-    numbers: PartNumbers
 
 
 def link_tree(linker: Linker, root: Node, dialect: Dialect) -> Function:
     """Link a tree and append its numbers to P; return its function of x, y, z and P."""
     start = len(linker.parameters)
-    return function_of(_Tree(linker, dialect).linked(dialect.kept(root)), start)
+    part, numbers = _Tree(linker, dialect, is_long).linked(root)
+    linker.main += numbers
+    return function_of(part, start)
+
+
+def link_elements(node: Node, dialect: Dialect) -> Elements:
+    """Link the elements of a long union."""
+    tree = _Tree(Linker(), dialect, lambda _: False)
+    linked = [tree.linked(child) for child in node.fields]
+    kinds = [*dict.fromkeys(part for part, _ in linked)]
+    part, numbers = tree.any_of(kinds), PartNumbers()
+    for number, (kind, own) in enumerate(linked, 1):
+        if len(kinds) > 1:
+            numbers.values.append(float(kinds.index(kind)))
+        numbers += own
+        numbers.values += [0.0] * (number * part.size - len(numbers.values))
+    values = np.array(numbers.values).reshape(len(linked), part.size)
+    return Elements(part, values, numbers.held, tree.linker.parts, frozenset(tree.linker.called))
 
 
 def function_of(part: Subroutine, start: int) -> Function:
@@ -335,105 +421,54 @@ def function_of(part: Subroutine, start: int) -> Function:
     return written("tree", (*POINT, "P"), identified("tree", part.function, start), write)
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Tree:
     linker: Linker
     dialect: Dialect
-    parts: dict[int, Subroutine] = field(default_factory=dict)
-    inside: dict[int, list[Node]] = field(default_factory=dict)
-    given: dict[int, Arguments] = field(default_factory=dict)
-    runs: dict[int, list[Run]] = field(default_factory=dict)
-    long: set[int] = field(default_factory=set)  # long unions that are in no other one
+    is_long: Callable[[Node], bool]  # whether the elements of a union are linked apart
+    known: dict[int, tuple[Subroutine, PartNumbers]] = field(default_factory=dict)
 
-    def linked(self, root: Node) -> Subroutine:
-        order, stack = [], [(root, False)]
-        within = set[int]()
-        while stack:
-            node, is_within = stack.pop()
-            order.append(node)
-            inside = self.inside[id(node)] = [self.dialect.kept(child) for child in node.fields]
-            if is_within:
-                within.add(id(node))
-            elif is_long(node):
-                self.long.add(id(node))
-            stack += [(child, is_within or id(node) in self.long) for child in inside]
-        self.long -= within
-        for node in reversed(order):
-            self.parts[id(node)] = self.part(node)
-        self.append(root, self.linker.main)
-        return self.parts[id(root)]
+    def linked(self, node: Node) -> tuple[Subroutine, PartNumbers]:
+        """Function and numbers of a node with all below it; of one that stands in many places, once."""
+        found = self.known.get(id(node))
+        if not found:
+            found = self.known[id(node)] = self.linked_now(node)
+        return found
 
-    def append(self, root: Node, numbers: PartNumbers) -> None:
-        """Append the numbers of a node and of its elements; those of a long union come after all others."""
-        stack = [root]
-        while stack:
-            node = stack.pop()
-            given, start = self.given[id(node)], len(numbers.values)
-            numbers.held += [(start + place, memory) for place, memory in given.held]
-            numbers.values += given.numbers
-            if id(node) in self.long:
-                self.append_long(node, numbers)
-            else:
-                stack += reversed(self.inside[id(node)])
-
-    def append_long(self, node: Node, numbers: PartNumbers) -> None:
-        """Append what stands in P of a long union, and keep the numbers of its elements."""
-        elements, size = self.inside[id(node)], self.runs[id(node)][0].part.size
-        kinds, own = self.kinds(node), PartNumbers()
-        for k, element in enumerate(elements, 1):
-            if len(kinds) > 1:
-                own.values.append(float(kinds.index(self.parts[id(element)])))
-            self.append(element, own)
-            own.values += [0.0] * (k * size - len(own.values))
-        region = self.dialect.region(node, self.alone(node), own)
-        self.linker.unions.append(LongUnion(len(numbers.values), region, own))
-        numbers.values += [*[0.0] * (WORDS + 1), float(len(elements))]
-
-    def kinds(self, node: Node) -> list[Subroutine]:
-        """Functions of the elements of a long union, each once."""
-        return list(dict.fromkeys(self.parts[id(element)] for element in self.inside[id(node)]))
-
-    def alone(self, node: Node) -> Program:
-        """Program of one element of a long union, whose numbers are P."""
-        first = {self.parts[id(element)]: element for element in reversed(self.inside[id(node)])}
-        order, stack = [], [*first.values()]
-        while stack:
-            order.append(self.parts[id(stack[-1])].function)
-            stack += self.inside[id(stack.pop())]
-        element = self.runs[id(node)][0].part
-        parts = tuple(dict.fromkeys([*reversed(order), element.function]))
-        called = self.linker.called.intersection(parts)
-        return Program({FIELD: function_of(element, 0)}, parts, frozenset(called))
-
-    def part(self, node: Node) -> Subroutine:
-        """Function of a node whose children are linked."""
-        given = self.given[id(node)] = self.dialect.arguments(node)
-        runs = self.runs[id(node)] = self.runs_of(node, len(given.numbers))
-        key = (
-            given.function,
-            given.fixed,
-            repr(given.passed),
-            *((run.part.function, run.about) for run in runs),
-        )
+    def linked_now(self, node: Node) -> tuple[Subroutine, PartNumbers]:
+        """See `linked`."""
+        node = self.dialect.kept(node)
+        given = self.dialect.arguments(node)
+        numbers = PartNumbers(given.numbers, [*given.held])
+        runs = self.long_run(node, numbers) if self.is_long(node) else self.runs(node, numbers)
+        key = given.function, given.fixed, given.structure, *[run.key for run in runs]
 
         def make(name: str) -> Subroutine:
-            size = len(given.numbers) + sum(run.taken for run in runs)
-            return Subroutine(self.dialect.write(name, node, given, runs), size, self.weight(runs))
+            function = self.dialect.write(name, node, given, runs)
+            return Subroutine(function, len(numbers.values), self.weight(runs))
 
-        return self.linker.part(self.dialect.prefix, key, make)
+        return self.linker.part(self.dialect.prefix, key, make), numbers
 
-    def runs_of(self, node: Node, start: int) -> list[Run]:
-        """Runs of the elements of a node, whose numbers begin at an offset from P0."""
-        children = self.inside[id(node)]
-        if id(node) in self.long:
-            return [LongRun(self.any_of(self.kinds(node)), len(children), start)]
-        places = self.dialect.order(node, [self.parts[id(child)] for child in children])
-        children = self.inside[id(node)] = [children[k] for k in places]
+    def runs(self, node: Node, numbers: PartNumbers) -> list[Run]:
+        """Runs of the elements of a node, whose numbers are appended to its own."""
+        linked = [self.linked(child) for child in node.fields]
         runs = list[Run]()
-        for part, group in groupby(self.parts[id(child)] for child in children):
-            runs.append(Run(part, len(list(group)), start))
-            start += runs[-1].taken
+        for k in self.dialect.order(node, [part for part, _ in linked]):
+            part, own = linked[k]
+            if runs and runs[-1].part is part:
+                runs[-1] = replace(runs[-1], count=runs[-1].count + 1)
+            else:
+                runs.append(Run(part, 1, len(numbers.values)))
+            numbers += own
         return runs
+
+    def long_run(self, node: Node, numbers: PartNumbers) -> list[Run]:
+        """The elements of a long union; what stands in P of it is appended to its own numbers."""
+        elements, start = self.dialect.elements(node), len(numbers.values)
+        self.linker.include(elements)
+        numbers.unions.append((start, LongUnion(elements, self.dialect.region(node))))
+        numbers.values += [*[0.0] * (WORDS + 1), float(len(elements.numbers))]
+        return [LongRun(elements.part, len(elements.numbers), start)]
 
     def any_of(self, kinds: Sequence[Subroutine]) -> Subroutine:
         """Function of elements of several kinds, of which the first number is the kind."""
@@ -444,7 +479,7 @@ class _Tree:
             size = 1 + max(part.size for part in kinds)
             return Subroutine(one_of(name, kinds), size, self.weight([Run(part, 1, 1) for part in kinds]))
 
-        return self.linker.part(self.dialect.prefix, ("one of", *(part.function for part in kinds)), make)
+        return self.linker.part(self.dialect.prefix, ("one of", *kinds), make)
 
     def weight(self, runs: Sequence[Run]) -> int:
         """Weight of a function with these calls. If it is too large, the heaviest parts are called, not
@@ -504,7 +539,6 @@ def part_function(
 class FieldDialect:
     """Dialect of functions that return the field's value."""
 
-    linker: Linker
     prefix: str = "N"
 
     def kept(self, node: Node) -> Node:
@@ -515,21 +549,24 @@ class FieldDialect:
 
     def arguments(self, node: Node) -> Arguments:
         """Return the function of a node and its arguments. Raises `KernelError` if a depth is "auto"."""
-        if AUTO in [v for v in node.values.values() if isinstance(v, str)]:
+        if AUTO in node.values.values():
             raise KernelError(
                 f"<{node.formula.name}>: the depth is still auto; resolve it for a voxel size first"
             )
-        return arguments(node, leading(node))
+        return arguments(node)
 
-    def region(self, node: Node, program: Program, numbers: PartNumbers) -> Region:
+    def elements(self, node: Node) -> Elements:
+        """Return the elements of a long union, which are linked once; see `Dialect.elements`."""
+        return node.linked_elements
+
+    def region(self, node: Node) -> Region:
         """Return the region of a long union; see `Dialect.region`."""
-        values = np.array(numbers.values).reshape(len(node.children), -1)
-        return Region.of(node, program, values, numbers.held)
+        return Region.of(node)
 
     def order(self, node: Node, parts: Sequence[Subroutine]) -> Sequence[int]:
         """Group elements of the same structure where their order changes no bit of the result."""
         places = range(len(parts))
-        if not node.is_unordered:
+        if len(parts) == 1 or not node.is_unordered:
             return places
         first = list(dict.fromkeys(part.function for part in parts))
         return sorted(places, key=lambda k: first.index(parts[k].function))
@@ -657,25 +694,38 @@ class Linker:
     called: set[Function] = field(default_factory=set)  # those that are called, not inlined
     # arrays that stand behind the numbers in P, each with the index of the number that is its offset
     tables: list[tuple[int, np.ndarray]] = field(default_factory=list)
-    unions: list[LongUnion] = field(default_factory=list)
     _parts: dict[Any, Subroutine] = field(default_factory=dict)
+    _functions: dict[Function, None] = field(default_factory=dict)  # of parts, in order
 
     def field(self, root: Node) -> None:
         """Write the field of a scene tree."""
-        self.functions[FIELD] = link_tree(self, root, FieldDialect(self))
+        self.functions[FIELD] = link_tree(self, root, FieldDialect())
 
     def part(self, prefix: str, key: tuple[Any, ...], make: Callable[[str], Subroutine]) -> Subroutine:
         """Return the function of a structure; make it once."""
-        if (prefix, *key) not in self._parts:
-            self._parts[prefix, *key] = make(f"{prefix}{len(self._parts)}")
-        return self._parts[prefix, *key]
+        known = self._parts.get((prefix, key))
+        if not known:
+            known = self._parts[prefix, key] = make(f"{prefix}{len(self._functions)}")
+            self._functions[known.function] = None
+        return known
+
+    @property
+    def parts(self) -> tuple[Function, ...]:
+        """Functions of the parts, innermost first."""
+        return tuple(self._functions)
+
+    def include(self, elements: Elements) -> None:
+        """Include the functions of the elements of a long union."""
+        self._functions |= dict.fromkeys(elements.parts)
+        self.called |= elements.called
 
     def argument(self, value: Any) -> Any:
         """Append a number, a tuple of numbers or an array to P; return the entries that are read for it."""
         if isinstance(value, np.ndarray):
             self.tables.append((len(self.parameters), value))
             value = 0.0
-        return append_numbers(value, self.parameters)
+        start = len(self.parameters)
+        return passed(append_numbers(value, self.parameters), start)
 
     @property
     def parameters(self) -> list[float]:
@@ -686,16 +736,15 @@ class Linker:
         """Return what is collected: P is the numbers, then each array once, then those of long unions."""
         numbers, held = self._numbers_and_arrays(), [*self.main.held]
         tails, end = [numbers], len(numbers)
-        for union in self.unions:
-            numbers[union.header + WORDS] = end
-            held += [(end + place, memory) for place, memory in union.numbers.held]
-            tails.append(np.array(union.numbers.values))
+        for place, union in self.main.unions:
+            numbers[place + WORDS] = end
+            held += [(end + index, memory) for index, memory in union.elements.held]
+            tails.append(union.elements.numbers.ravel())
             end += len(tails[-1])
         if end > LARGEST:
             raise KernelError(f"a scene of {end:,} numbers: expected at most {LARGEST:,}")
-        parts = tuple(part.function for part in self._parts.values())
-        program = Program(dict(self.functions), parts, frozenset(self.called))
-        regions = tuple((union.header, union.region) for union in self.unions)
+        program = Program(dict(self.functions), self.parts, frozenset(self.called))
+        regions = tuple((place, union.region) for place, union in self.main.unions)
         return Linked(program, np.concatenate(tails), tuple(held), regions)
 
     def _numbers_and_arrays(self) -> np.ndarray:

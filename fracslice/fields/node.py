@@ -5,8 +5,9 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from inspect import Parameter, Signature
+from itertools import chain
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, Protocol, cast, runtime_checkable
 
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from ..common.arrays import Triangles
-    from .linker import Linked
+    from .linker import Elements, Linked
     from .registry import Formula
 
 FORMULAS: dict[str, Formula] = {}
@@ -549,7 +550,7 @@ class Node(Operators, Field):
     depth: int = field(init=False, compare=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "depth", 1 + max((child.depth for child in self.children), default=0))
+        object.__setattr__(self, "depth", 1 + max([child.depth for child in self.children], default=0))
 
     def __getitem__(self, parameter: str) -> Any:
         """Value of a parameter."""
@@ -561,7 +562,8 @@ class Node(Operators, Field):
         return f"{self.formula.name}({', '.join([*map(repr, self.children), *changed])})"
 
     def __hash__(self) -> int:
-        return hash((self.formula.name, tuple(self.values.items()), self.children))
+        # the first of many children tells trees apart well enough
+        return hash((self.formula.name, tuple(self.values.items()), len(self.children), self.children[:1]))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _restore_node, (
@@ -584,6 +586,25 @@ class Node(Operators, Field):
             node = left.pop()
             yield node
             left += reversed(node.children)
+
+    @cached_property
+    def formulas(self) -> frozenset[Formula]:
+        """Formulas of the tree, by which a pass over it knows that there is nothing to do."""
+        return _joined(self.formula, frozenset(child.formulas for child in self.children))
+
+    def has_hook(self, name: str) -> bool:
+        """Return whether a formula of the tree has a hook.
+
+        Parameters
+        ----------
+        name : str
+            Name of the hook's decorator.
+
+        Returns
+        -------
+        bool
+        """
+        return any(name in formula.hooks for formula in self.formulas)
 
     @property
     def fields(self) -> tuple[Node, ...]:
@@ -640,9 +661,13 @@ class Node(Operators, Field):
             Its positive values, divided by its own Lipschitz bound, are lower bounds of the distance to this
             node's surface. Other values bound nothing.
         """
-        return replace(
-            self, is_conservative=True, children=tuple(child.conservative() for child in self.children)
-        )
+        return self._conservative if self.bounds.exterior_only and not self.is_conservative else self
+
+    @cached_property
+    def _conservative(self) -> Node:
+        fields = tuple(child.conservative() for child in self.fields)
+        steps = self.children[: len(self.children) - len(fields)]
+        return replace(self, is_conservative=True, children=(*steps, *fields))
 
     def fail(self, message: str) -> SceneError:
         """Error about this node: file, line and element, then the message.
@@ -661,17 +686,15 @@ class Node(Operators, Field):
     @cached_property
     def bounds(self) -> Bounds:
         """Box, Lipschitz bound and kind of this field."""
-        below = [child.bounds for child in self.fields]
-        box = self._hooked("bounds", Box.everywhere())
-        slope = self._hooked("slope", max([self.formula.lipschitz, *(b.lipschitz for b in below)]))
-        steepening = self._hooked("steepening", max((b.steepening for b in below), default=0.0))
-        own = [] if "bounds" in self.formula.hooks else [self.formula.name]
-        boxless = dict.fromkeys([*(name for b in below for name in b.boxless), *own])
-        exterior_only = self.formula.exterior_only or any(b.exterior_only for b in below)
-        is_measured = self.formula.exterior_only and not self._hooked("proves_slope", False)
-        names = (name for b in below for name in b.measured)
-        measured = dict.fromkeys([*names, *([self.formula.name] if is_measured else [])])
-        return Bounds(box, slope, exterior_only, steepening, tuple(boxless), tuple(measured))
+        formula, below = self.formula, [child.bounds for child in self.fields]
+        box = self._hooked("bounds", EVERYWHERE)
+        slope = self._hooked("slope", max([formula.lipschitz, *[b.lipschitz for b in below]]))
+        steepening = self._hooked("steepening", max([0.0, *[b.steepening for b in below]]))
+        exterior_only = formula.exterior_only or True in [b.exterior_only for b in below]
+        is_measured = formula.exterior_only and not self._hooked("proves_slope", False)
+        boxless = _names([b.boxless for b in below], formula.name, "bounds" not in formula.hooks)
+        measured = _names([b.measured for b in below], formula.name, is_measured)
+        return Bounds(box, slope, exterior_only, steepening, boxless, measured)
 
     @cached_property
     def linked(self) -> Linked:
@@ -679,6 +702,13 @@ class Node(Operators, Field):
         from .linker import link
 
         return link(self)
+
+    @cached_property
+    def linked_elements(self) -> Elements:
+        """Elements of a long union, as all kernels of its field link them; see `regions.is_long`."""
+        from .linker import FieldDialect, link_elements
+
+        return link_elements(self, FieldDialect())
 
     def _hooked(self, name: str, default: Any, *arguments: Any) -> Any:
         """Value of a hook of the formula, or the default of a formula without it."""
@@ -703,7 +733,7 @@ class Node(Operators, Field):
         shapes = (node for node in self.solids() if node.formula.kind == "shape")
         return all(shape._hooked("potential", shape.formula.exterior_only) for shape in shapes)
 
-    @property
+    @cached_property
     def key(self) -> str:
         # all depths must be resolved, as for kernels and loops
         from .devices import key
@@ -733,13 +763,13 @@ class Node(Operators, Field):
             isinstance(value, InMemory) for value in self.arguments.values()
         )
 
-    @property
+    @cached_property
     def arguments(self) -> dict[str, Any]:
         """Arguments of the kernel function by name: numbers, tuples of numbers, or `Fixed`."""
         values: dict[str, Any] = self._hooked("arguments", dict(self.values))
         return values
 
-    @property
+    @cached_property
     def function(self) -> Callable[..., Any]:
         """Function to compile for this node."""
         function: Callable[..., Any] = self._hooked("select", self.formula.function)
@@ -778,6 +808,8 @@ class Node(Operators, Field):
         -------
         Node
         """
+        if not self.has_hook("sign"):
+            return self
         if hooked := self._hooked("sign", None):
             function, values = hooked
             own = {"select": lambda _: function, "arguments": lambda _: values}
@@ -792,11 +824,11 @@ class Node(Operators, Field):
 
     def _boxed(self) -> Node:
         """Tree with proved boxes."""
+        if not self.has_hook("proved_bounds"):
+            return self
         if self.formula.kind != "shape":
             return replace(self, children=tuple(child._boxed() for child in self.children))
         hooks = self.formula.hooks
-        if "proved_bounds" not in hooks:
-            return self
         return replace(self, formula=replace(self.formula, hooks={**hooks, "bounds": hooks["proved_bounds"]}))
 
     @property
@@ -808,6 +840,21 @@ class Node(Operators, Field):
     def is_unordered(self) -> bool:
         """True if the elements but the first may be folded in any order, to the same bits."""
         return bool(self._hooked("unordered", False))
+
+
+EVERYWHERE = Box.everywhere()
+
+
+def _names(below: Sequence[tuple[str, ...]], own: str, is_one: bool) -> tuple[str, ...]:
+    """Names of formulas below a node, and its own if it is one of them, each once."""
+    names = dict.fromkeys(chain.from_iterable(below))
+    return tuple(names | {own: None} if is_one else names)
+
+
+@lru_cache(maxsize=512)
+def _joined(formula: Formula, below: frozenset[frozenset[Formula]]) -> frozenset[Formula]:
+    """Formulas of a tree from those of the trees below it: few sets, however many nodes."""
+    return frozenset({formula}).union(*below)
 
 
 def _restore_node(formula: Formula, values: dict[str, Any], *fields: Any) -> Node:

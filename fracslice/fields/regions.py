@@ -47,14 +47,13 @@ class Region:
     half: float
 
     @classmethod
-    def of(
-        cls, node: Node, program: Program, numbers: np.ndarray, held: Sequence[tuple[int, InMemory]]
-    ) -> Region:
-        """Return the region of a long union whose elements are linked."""
-        bounds = node.bounds
+    def of(cls, node: Node) -> Region:
+        """Return the region of a long union."""
+        bounds, elements = node.bounds, node.linked_elements
         centre = tuple((a + b) / 2 for a, b in zip(bounds.box.lo, bounds.box.hi, strict=True))
-        smooth = 0.0 if node.is_unordered else node["smooth"]
-        return cls(program, numbers, held, smooth, bounds.lipschitz, centre, ROOM * max(bounds.box.size))
+        smooth, half = 0.0 if node.is_unordered else node["smooth"], ROOM * max(bounds.box.size)
+        own = elements.program, elements.numbers, elements.held
+        return cls(*own, smooth, bounds.lipschitz, centre, half)
 
     @cached_property
     def digest(self) -> str:

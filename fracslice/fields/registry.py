@@ -12,7 +12,7 @@ from __future__ import annotations
 import sys
 import traceback
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from importlib.util import module_from_spec, spec_from_file_location
@@ -237,12 +237,45 @@ class Formula(Hooks):
         """
         elements, values = bind_arguments(self, arguments, keywords)
         checked = {name: self._value(name, values.get(name)) for name in self.parameters}
-        checked = self.hooks.get("completed", lambda given: given)(checked)
-        node = Node(self, MappingProxyType(checked), self._grouped(elements), source)
+        return self.of_checked(checked, elements, source)
+
+    def of_checked(
+        self, values: Mapping[str, Any], elements: Sequence[Node] = (), source: str | None = None
+    ) -> Node:
+        """Make a scene node of values that the kinds of its parameters have checked.
+
+        Parameters
+        ----------
+        values : mapping of str to value
+            Parameter values by name; defaults may be left out.
+        elements : sequence of Node
+            The elements inside.
+        source : str, optional
+            "file:line" of the element.
+
+        Returns
+        -------
+        Node
+
+        Raises
+        ------
+        SceneError
+            For values that are invalid together, or a wrong number of elements.
+        """
+        whole = {**self._defaults, **values}
+        if completed := self.hooks.get("completed"):
+            whole = completed(whole)
+        node = Node(self, MappingProxyType(whole), self._grouped(elements), source)
         if node.depth > DEEPEST:
             raise node.fail(TOO_DEEP)
-        self.hooks.get("check", lambda _: None)(node)
+        if check := self.hooks.get("check"):
+            check(node)
         return node
+
+    @cached_property
+    def _defaults(self) -> Mapping[str, Any]:
+        """Default values of the parameters by name."""
+        return {name: kind.default for name, kind in self.parameters.items()}
 
     def _value(self, name: str, value: Any) -> Any:
         kind = self.parameters[name]
@@ -252,7 +285,7 @@ class Formula(Hooks):
             return kind.default
         return validate_value(name, value, kind, lambda message: SceneError(f"<{self.name}> {message}"))
 
-    def _grouped(self, children: tuple[Node, ...]) -> tuple[Node, ...]:
+    def _grouped(self, children: Sequence[Node]) -> tuple[Node, ...]:
         least, most = self.children
         for child in children:
             if not isinstance(child, Node):

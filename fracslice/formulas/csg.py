@@ -155,7 +155,7 @@ for _operator in SHARP:
 
 @union.bounds
 def union_bounds(node: Node) -> Box:
-    sharp, smooth = reduce(Box.__or__, (c.bounds.box for c in node.children)), node["smooth"]
+    sharp, smooth = Box.enclosing(c.bounds.box for c in node.children), node["smooth"]
     seams = len(node.children) - 1
     if not isinstance(smooth, Varying):  # seams end a width below the lowest element, however many
         return sharp.grown(min(seams / 4, 1.0) * smooth)

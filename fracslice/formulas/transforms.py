@@ -47,6 +47,8 @@ def transform_check(node: Node) -> None:
         raise node.fail("rotate: expected an axis that is not zero, then degrees")
     if node["matrix"] and len(node["matrix"]) == 16 and node["matrix"][12:] != (0, 0, 0, 1):
         raise node.fail("matrix: expected the last row 0 0 0 1")
+    if _is_translation(node):
+        return
     stretch = stretches(affine(node.values)[0])
     if not stretch[-1] > max(1e-9 * stretch[0], SMALLEST / 2):
         name = "matrix" if node["matrix"] else "scale"
@@ -54,15 +56,24 @@ def transform_check(node: Node) -> None:
         raise node.fail(f'{name}="{value}": expected a map that does not flatten space')
 
 
+def _is_translation(node: Node) -> bool:
+    """True for the translations that most elements are, which are computed without matrices."""
+    values = node.values
+    return not (values["rotate"] or values["matrix"]) and values["scale"] == (1.0,)
+
+
 @transform.identity
 def transform_identity(node: Node) -> bool:
+    if _is_translation(node):
+        return not any(node["translate"])
     linear, offset = affine(node.values)
     return _is_identity(linear) and not offset.any()
 
 
 @transform.select
 def transform_select(node: Node):  # type: ignore[no-untyped-def]
-    return translate_node if _is_identity(affine(node.values)[0]) else transform.function
+    stays = _is_translation(node) or _is_identity(affine(node.values)[0])
+    return translate_node if stays else transform.function
 
 
 def _is_identity(linear: np.ndarray) -> bool:
@@ -71,6 +82,8 @@ def _is_identity(linear: np.ndarray) -> bool:
 
 @transform.arguments
 def transform_arguments(node: Node) -> dict[str, object]:
+    if _is_translation(node):
+        return {"offset": node["translate"]}
     linear, offset = affine(node.values)
     if node.function is translate_node:
         return {"offset": tuple(offset.tolist())}
@@ -87,6 +100,9 @@ def transform_bounds(node: Node) -> Box:
     box = node.children[0].bounds.box
     if box.empty:
         return box
+    if _is_translation(node):
+        (a, b, c), (d, e, f), (x, y, z) = box.lo, box.hi, node["translate"]
+        return Box((a + x, b + y, c + z), (d + x, e + y, f + z))
     linear, offset = affine(node.values)
     lo, hi = np.array(box.lo), np.array(box.hi)
     with np.errstate(invalid="ignore"):

@@ -24,6 +24,8 @@ from .units.surface import glass, nothing
 
 PATIENCE = 800
 """Maximum steps of a shadow ray."""
+BEYOND = 1e-3
+"""Part of the box's longest side by which shadow rays go beyond it."""
 SHARPER = 16.0
 """Ratio of a pixel to the width over which normals of glass are taken: a wider edge is seen as a hairline."""
 
@@ -191,13 +193,16 @@ class LightLinker:
             return None, None, None
         marched = {"steepness": self.steepness, "patience": PATIENCE}
         self.linker.functions["blocker"] = self.blocker()
-        visible = self.linker.bind(march.visible, {**marched, "glass": Fixed(False)})
+        box = self.root.bounds.box
+        box = box.grown(BEYOND * max(box.size)) if box.finite else box
+        ends = marched | {"lo": box.lo, "hi": box.hi}
+        visible = self.linker.bind(march.visible, {**ends, "glass": Fixed(False)})
         part = transparent_part(self.root) if self.materials.inside else None
         if not part:
             return visible, None, None
         self.linker.functions["traced_glass"] = self.materials.trace(part)
         self.linker.functions["transparent"] = kernel_function(glass, (("look", look),))
-        unobstructed = self.linker.bind(march.visible, {**marched, "glass": Fixed(True)})
+        unobstructed = self.linker.bind(march.visible, {**ends, "glass": Fixed(True)})
         return visible, unobstructed, self.linker.bind(march.tinted_shadow, marched)
 
     def blocker(self) -> Function:
@@ -207,7 +212,7 @@ class LightLinker:
             return self.linker.functions[FIELD]
         if opaque is None:
             return kernel_function(nothing)
-        return link_tree(self.linker, opaque, FieldDialect(self.linker))
+        return link_tree(self.linker, opaque, FieldDialect())
 
     def light(self, light: Light) -> Lamp | Surroundings | Sky | None:
         """Link a light; None for one that only rays see that continue."""

@@ -21,25 +21,24 @@ from numpy.typing import NDArray
 
 from ..common.arrays import from_linear
 from ..expr.frontend import FormulaReader, formula, kernel_function, source_function
-from ..expr.graph import ON_ARRAYS, Entry, Evaluator, FlowGraph, Function, Program, Value, Writer, identified
+from ..expr.graph import ON_ARRAYS, Entry, Evaluator, FlowGraph, Function, Value, Writer, identified
 from ..expr.vocabulary import absolute, atan2, minimum, sqrt, where
 from ..fields.linker import (
     EMPTY,
     Arguments,
     DomainReader,
+    Elements,
     FieldDialect,
     Linker,
-    PartNumbers,
     Run,
     Subroutine,
     append_numbers,
     arguments,
     domain_function,
-    leading,
+    link_elements,
     link_tree,
     part_function,
 )
-from ..fields.regions import Region
 from ..fields.registry import Fixed, Node
 from ..formulas.material import material, stops
 from ..work import Work, chunks
@@ -269,17 +268,16 @@ class TraceDialect(FieldDialect):
         See `Dialect.arguments`.
         """
         if node.formula.name != material.name:
-            given = arguments(node, leading(node))
+            given = arguments(node)
             trap = self.traps.get(id(node), NEAREST)
             return given if trap == NEAREST else replace(given, fixed=(*given.fixed, (TRAP, trap)))
         paint: list[float] = []
-        passed = append_numbers(float(self.materials[id(node)]), paint)
-        return Arguments(node.function, (), (passed,), tuple(paint))
+        structure = append_numbers(float(self.materials[id(node)]), paint)
+        return Arguments(node.function, (), (structure,), paint)
 
-    def region(self, node: Node, program: Program, numbers: PartNumbers) -> Region:
-        """Return the region of a long union, which the field's own tree has; see `Dialect.region`."""
-        ((_, region),) = node.linked.regions
-        return region
+    def elements(self, node: Node) -> Elements:
+        """Return the elements of a long union, with their paints; see `Dialect.elements`."""
+        return link_elements(node, self)
 
     def order(self, node: Node, parts: Sequence[Subroutine]) -> Sequence[int]:
         """Keep the order of the children: at equal distances the first child's paint is taken.
@@ -371,8 +369,15 @@ TEXELS = 1024 * 1024
 """Maximum number of pixels of a texture."""
 
 
+def painted_in(root: Node) -> bool:
+    """Return whether a tree has materials."""
+    return material in root.formulas
+
+
 def opaque_part(node: Node) -> Node | None:
     """Return a scene without the members of its unions that are transparent."""
+    if not painted_in(node):
+        return node
     if node.formula.name == material.name and node["clear"]:
         return None
     parts = tuple(opaque_part(child) for child in node.children)
@@ -386,6 +391,8 @@ def opaque_part(node: Node) -> Node | None:
 
 def transparent_part(node: Node) -> Node | None:
     """Return a scene with those members of its unions alone that are transparent."""
+    if not painted_in(node):
+        return None
     if node.formula.name == material.name and node["clear"]:
         return node
     parts = tuple(transparent_part(child) for child in node.children)
@@ -452,7 +459,7 @@ class Materials:
     paths: bool = False  # true if rays also continue where a surface scatters light
 
     def __post_init__(self) -> None:
-        self.nodes = [n for n in self.root.walk() if n.formula.name == material.name]
+        self.nodes = [n for n in self.root.walk() if n.formula is material] if painted_in(self.root) else []
         covered = bool(self.nodes) and self.root is self.nodes[0] and len(self.nodes) == 1
         plain = material(self.root)
         self.all = self.nodes if covered else [plain, *self.nodes]
@@ -504,7 +511,7 @@ class Materials:
 
     def trace(self, root: Node) -> Function:
         """Return the function of field, material's number and orbit trap of a part of the scene."""
-        dialect = TraceDialect(self.linker, materials=self.paints, traps=traps(self.root))
+        dialect = TraceDialect(materials=self.paints, traps=traps(self.root))
         return link_tree(self.linker, root, dialect)
 
     def colour(self, node: Node) -> Colour:
@@ -607,7 +614,7 @@ def _plain(node: Node) -> Node:
     """The tree without its materials."""
     if node.formula is material:
         return _plain(node.children[0])
-    return node.changed(tuple(map(_plain, node.children))) if node.children else node
+    return node.changed(tuple(map(_plain, node.children))) if painted_in(node) else node
 
 
 def _link_painting(root: Node) -> tuple[Mapping[str, Function], NDArray[np.float64]]:

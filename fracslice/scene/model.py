@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import isfinite
 from typing import TYPE_CHECKING, Any
+from weakref import WeakSet
 
 from ..common.parameters import AUTO, AnyLength, File, Vector, parse_length, short_repr
 from ..errors import SceneError
@@ -165,14 +166,25 @@ def scene(
 
 
 def _refuse_impossible(root: Node) -> None:
-    """Compute bounds and arguments of all nodes, from the leaves up.
+    """Compute bounds and arguments of all nodes, from the leaves up, once for a tree.
 
     Errors of the tree as a whole thus surface at construction.
     """
-    for node in reversed(list(root.solids())):
-        with computing(node.fail):
-            depths: dict[str, Any] = {name: 1 for name, value in node.values.items() if value == AUTO}
-            _ = node.bounds, (node.changed(**depths) if depths else node).arguments
+    if root in _POSSIBLE:
+        return
+    node = root
+    with computing(lambda message: node.fail(message)):
+        for node in reversed(list(root.solids())):
+            known = node
+            if AUTO in node.values.values():
+                depths: dict[str, Any] = {name: 1 for name, value in node.values.items() if value == AUTO}
+                known = node.changed(**depths)
+            _ = node.bounds, known.arguments
+    _POSSIBLE.add(root)
+
+
+_POSSIBLE = WeakSet[Node]()
+"""Trees that were computed."""
 
 
 @contextmanager
@@ -184,7 +196,10 @@ def computing(fail: Callable[[str], SceneError]) -> Iterator[None]:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
             yield
     except (ArithmeticError, ValueError):
-        raise fail("has numbers too large or too small to compute with") from None
+        raise fail(TOO_LARGE) from None
+
+
+TOO_LARGE = "has numbers too large or too small to compute with"
 
 
 def to_xml(scene: Scene) -> str:
@@ -217,6 +232,8 @@ def identity(scene: Scene) -> str:
 
 def _unnamed(node: Node) -> Node:
     """The tree without the names of files whose hash it holds."""
+    if not any(kind.implied for formula in node.formulas for kind in formula.parameters.values()):
+        return node
     kinds, values = node.formula.parameters, node.values
     if any(kind.implied for kind in kinds.values()):
         values = {name: value for name, value in values.items() if not isinstance(kinds[name], File)}
@@ -225,7 +242,7 @@ def _unnamed(node: Node) -> Node:
 
 def element_to_xml(node: Node) -> str:
     """Return a shape as the XML elements of a scene file, indented by two spaces per level."""
-    return "\n".join(_element(node, ""))
+    return "\n".join(_elements(node, ""))
 
 
 def part_to_xml(part: Part | Print) -> str:
@@ -240,7 +257,7 @@ def _lines(scene: Scene, root: Node) -> Iterator[str]:
     for definition in definitions(root):
         yield from _definition(definition)
     yield f"  <{SOLID.name}{_attributes(SOLID, {'size': scene.size_mm, 'unit': scene.unit_mm})}>"
-    yield from _element(root, "    ")
+    yield from _elements(root, "    ")
     yield f"  </{SOLID.name}>"
     printing = () if scene.printing == Print() else (scene.printing,)
     film = () if scene.animation is None else (scene.animation, *scene.tracks)
@@ -249,15 +266,22 @@ def _lines(scene: Scene, root: Node) -> Iterator[str]:
     yield f"</{SCENE.name}>"
 
 
-def _element(node: Node, indent: str) -> Iterator[str]:
-    start = f"{indent}<{node.formula.name}{_attributes(node.formula, node.values)}"
-    if not node.children:
-        yield start + "/>"
-        return
-    yield start + ">"
-    for child in node.children:
-        yield from _element(child, indent + "  ")
-    yield f"{indent}</{node.formula.name}>"
+def _elements(root: Node, indent: str) -> list[str]:
+    """Lines of a tree."""
+    lines = list[str]()
+
+    def write(node: Node, indent: str) -> None:
+        start = f"{indent}<{node.formula.name}{_attributes(node.formula, node.values)}"
+        if not node.children:
+            lines.append(start + "/>")
+            return
+        lines.append(start + ">")
+        for child in node.children:
+            write(child, indent + "  ")
+        lines.append(f"{indent}</{node.formula.name}>")
+
+    write(root, indent)
+    return lines
 
 
 def _definition(definition: Definition) -> Iterator[str]:
@@ -278,8 +302,12 @@ def _definition(definition: Definition) -> Iterator[str]:
 
 def _attributes(element: Element, values: Mapping[str, Any]) -> str:
     """Attributes that differ from their defaults, as XML."""
+    kinds = element.parameters
+    changed = [
+        (name, kinds[name].text(value)) for name, value in values.items() if value != kinds[name].default
+    ]
+    if not changed:
+        return ""
     from html import escape
 
-    kinds = element.parameters
-    changed = {name: value for name, value in values.items() if value != kinds[name].default}
-    return "".join(f' {name}="{escape(kinds[name].text(value))}"' for name, value in changed.items())
+    return "".join([f' {name}="{escape(text)}"' for name, text in changed])

@@ -14,9 +14,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.parsers import expat
 
+import numpy as np
+
 from ..common.files import open_regular
 from ..common.messages import hint
-from ..common.parameters import REQUIRED, File, Number, Parameter, Vector, printable
+from ..common.parameters import REQUIRED, File, Number, Parameter, Vector, printable, validate_value
 from ..errors import SceneError
 from ..fields.definitions import Defined, Definition, formula
 from ..fields.registry import DEEPEST, TOO_DEEP, get
@@ -35,14 +37,16 @@ from .layout import (
     formulas,
     registered_formulas,
 )
-from .model import Scene, computing, scene
+from .model import TOO_LARGE, Scene, scene
 from .view import Animation, Track, View
 
 if TYPE_CHECKING:
     from .model import Scene
 
-LARGEST_FILE, MOST_ELEMENTS, MOST_DEFINED = 16 << 20, 1 << 17, 100
-"""Most bytes and elements of a scene, and most definitions, or parameters of one."""
+LARGEST_FILE, MOST_ELEMENTS, MOST_DEFINED = 64 << 20, 1 << 19, 100
+"""Most bytes and elements of a scene, and most definitions, or parameters of one. An element takes about
+1.6 kB when it is read and measured: a scene takes less than a gigabyte before its object takes any.
+"""
 LONGEST_TEXT = 1 << 16
 """Most characters of a definition with its indentation."""
 UNIT = "1mm"
@@ -117,7 +121,7 @@ def _scene(data: bytes, source: str, name: str, files_outside: bool) -> Scene:
         raise SceneError(f"{source}: expected a scene, the file is empty")
     tags = data.replace(b"\0", b"")  # of UTF-16
     if tags.count(b"<") - tags.count(b"</") > MOST_ELEMENTS:
-        raise SceneError(f"{source}: expected a scene of at most {MOST_ELEMENTS} elements")
+        raise SceneError(f"{source}: expected a scene of at most {MOST_ELEMENTS:,} elements")
     builder = _Builder(source, files_outside)
     solid = builder.sections(data)[SOLID.name]
     others = (Print, Animation, Track)
@@ -128,9 +132,8 @@ def _scene(data: bytes, source: str, name: str, files_outside: bool) -> Scene:
     size = solid.values or {"unit": UNIT}
     made = scene(*solid.children, **size, name=name, view=view, printing=printing)
     animation = next((part for part in builder.parts if isinstance(part, Animation)), None)
-    return replace(
-        made, animation=animation, tracks=tuple(part for part in builder.parts if isinstance(part, Track))
-    )
+    tracks = tuple(part for part in builder.parts if isinstance(part, Track))
+    return replace(made, animation=animation, tracks=tracks) if animation or tracks else made
 
 
 @dataclass
@@ -180,7 +183,8 @@ class _Builder:
     def sections(self, data: bytes) -> dict[str, _Open]:
         """Parse the file; return the elements under `<scene>` by name."""
         try:
-            self.parser.Parse(data, True)
+            with np.errstate(over="raise", divide="raise", invalid="raise"):
+                self.parser.Parse(data, True)
         except expat.ExpatError as error:
             place = f"{self.source}:{error.lineno}"
             raise SceneError(f"{place}: not well-formed XML: {expat.ErrorString(error.code)}") from None
@@ -205,7 +209,8 @@ class _Builder:
             if kind.default is REQUIRED and attribute not in attributes:
                 raise opened.fail(f'needs the attribute {attribute}="...": expected {kind.expects}')
         self.open.append(opened)
-        self.parser.buffer_text = opened.element not in (DEFINE, PARAMETER)
+        if opened.element is DEFINE:
+            self.parser.buffer_text = False
 
     def located(self, value: Any, opened: _Open, attribute: str) -> Any:
         """The value of an attribute; the name of a file is relative to the scene's folder."""
@@ -217,7 +222,7 @@ class _Builder:
         if kind.inside and not self.files_outside and not path.resolve().is_relative_to(folder.resolve()):
             expected = "expected a file in the folder of the scene, or --allow-files-outside"
             raise opened.fail(f"{attribute}={_quote(value)}: {expected}")
-        return str(path)
+        return validate_value(attribute, str(path), kind, opened.fail)
 
     def element(self, name: str) -> Element:
         """The element of this name, if it is allowed here."""
@@ -252,11 +257,12 @@ class _Builder:
             self.close_section(closed)
             return
         try:
-            with computing(closed.fail):
-                node = closed.element(*closed.children, source=closed.place, **closed.values)
+            node = closed.element.of_checked(closed.values, closed.children, closed.place)
         except SceneError as error:
             placed = str(error).startswith(f"{self.source}:")
             raise error if placed else SceneError(f"{closed.place}: {error}") from None
+        except (ArithmeticError, ValueError):
+            raise closed.fail(TOO_LARGE) from None
         self.open[-1].children.append(node)
 
     def close_section(self, closed: _Open) -> None:
@@ -281,6 +287,7 @@ class _Builder:
 
     def define(self, closed: _Open) -> None:
         """Add the formula of a definition."""
+        self.parser.buffer_text = True
         if sum(isinstance(formula, Defined) for formula in self.formulas.values()) == MOST_DEFINED:
             raise closed.fail(f"expected at most {MOST_DEFINED} definitions in a scene")
         made = _make_definition(closed.values, closed.declared, closed.lines, self.source)

@@ -28,7 +28,7 @@ def test_nodes_pickle(name: str) -> None:
     node = EXAMPLES[name].conservative()
     again = pickle.loads(pickle.dumps(node))
     assert again == node and again.place == node.place and again.bounds == node.bounds
-    assert again.formula is node.formula and again.is_conservative
+    assert again.formula is node.formula and again.is_conservative == node.is_conservative
 
 
 def test_every_formula_is_among_the_pickled() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -128,3 +130,18 @@ def test_which_unions_are_looked_at_by_region() -> None:
 def test_scenes_of_other_numbers_of_elements_are_one_program() -> None:
     few, many = (union(*elements(count, sphere())).linked.program for count in (40, 300))
     assert few == many
+
+
+def resident_pages() -> int:
+    return int(Path("/proc/self/statm").read_text().split()[1])
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="needs /proc")
+def test_cells_of_a_dense_union_take_bounded_memory() -> None:
+    """Points at random ask for a smaller cell each, in which as many elements matter as in a larger one."""
+    places, rng = np.random.default_rng(6).uniform(-1, 1, (600, 3)), np.random.default_rng(7)
+    root = union(*(transform(sphere(radius=0.1), translate=tuple(p)) for p in places), smooth=0.1)
+    points, before = rng.uniform(-1, 1, (3, 200_000)), resident_pages()
+    near = compile_scene(root).points(*points)
+    assert resident_pages() - before < 10_000
+    np.testing.assert_array_equal(near, CpuKernel(link_whole(root)).points(*points))

@@ -24,6 +24,7 @@ from fracslice.formulas import (
 )
 from fracslice.rendering import Renderer
 from fracslice.rendering import setup as optics
+from fracslice.rendering.units import march
 from fracslice.scene import library, read
 from fracslice.scene.view import Camera, Film, Light, Shading, View
 from fracslice.work import Work
@@ -176,6 +177,25 @@ def test_surfaces_near_which_the_field_grows_slowly_are_lit(root: Node) -> None:
     view = View(camera=Camera(eye=(0, -5, 0)), lights=(Light(position=(0.1, -1, 0.1)),))
     *_, last = Renderer(root, view, (32, 24), Work(1), "cpu").passes(1)
     assert (last.image.sum(2) < 0.02)[last.alpha == 1].mean() < 0.1
+
+
+def test_shadow_rays_end_at_the_box(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beyond it a long union would be asked for all of its elements."""
+    asked = []
+
+    def ball(x, y, z, _):  # type: ignore[no-untyped-def]
+        asked.append(np.stack([x, y, z]))
+        return np.sqrt(x * x + y * y + z * z) - 1
+
+    monkeypatch.setattr(march, "blocker", ball)
+    rng = np.random.default_rng(4)
+    start, towards = (v / np.linalg.norm(v, axis=0) for v in rng.normal(size=(2, 3, 500)))
+    box = (-1.01,) * 3, (1.01,) * 3
+    seen = march.visible(*(1.001 * start), *towards, 100.0, 1e-4, None, 1.0, 800, False, *box)
+    away = (start * towards).sum(0)
+    clear = abs(away) > 0.1  # of rays that graze
+    np.testing.assert_array_equal(seen[clear] > 0.5, away[clear] > 0)
+    assert len(asked) > 10 and np.max(np.abs(asked)) < 1.02
 
 
 def test_glass_casts_no_opaque_shadow() -> None:

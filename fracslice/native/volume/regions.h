@@ -132,9 +132,13 @@ class Regions {
     }
 
   private:
-    static constexpr size_t kFew = 16;   // elements of a leaf
+    static constexpr size_t kFew = 16;   // elements of a leaf, while few cells are divided
     static constexpr int kDeepest = 10;  // levels of cells
     static constexpr int kStuck = 5;     // levels without use, after which a cell is not divided
+    // Width of a seam, in twice the radii of a cell, from which on it is not divided: smaller cells would list about as many.
+    static constexpr double kSeam = 4;
+    // Cells that are divided at most, and more for each element: a division takes about two kilobytes.
+    static constexpr size_t kDivided = 1 << 14, kEach = 2;
     static constexpr double kWide = 32;  // extent of a brick, in half sides of a leaf, up to which it is asked for as a whole
     // Of a brick, in its extents: beyond its corners, as its points are rounded; cells that need not be divided.
     static constexpr double kMargin = 0.02, kFine = 0.5;
@@ -150,7 +154,6 @@ class Regions {
         bool holds(const Point& p) const {
             return std::abs(p[0] - centre[0]) < half && std::abs(p[1] - centre[1]) < half && std::abs(p[2] - centre[2]) < half;
         }
-        bool is_leaf() const { return level == kDeepest || list.size() <= kFew + 1 || stuck == kStuck; }
     };
 
     // A box; at first of nothing.
@@ -230,21 +233,21 @@ class Regions {
             if (!cell->above) return cell;
             cell = cell->above;
         }
-        while (!cell->is_leaf()) {
+        while (const Cell* eight = children(*cell)) {
             size_t k = 0;
             for (int axis = 0; axis < 3; ++axis) k |= size_t(p[axis] >= cell->centre[axis]) << axis;
-            cell = children(*cell) + k;
+            cell = eight + k;
         }
         return cell;
     }
 
     // Cells that cover a box: leaves, or those of a side `enough` at most.
     void gather(const Cell& cell, const Point& lo, const Point& hi, double enough, std::vector<const Cell*>& found) const {
-        if (cell.is_leaf() || 2 * cell.half <= enough) {
+        const Cell* eight = 2 * cell.half <= enough ? nullptr : children(cell);
+        if (!eight) {
             found.push_back(&cell);
             return;
         }
-        const Cell* eight = children(cell);
         for (size_t k = 0; k < 8; ++k) {
             bool apart = false;
             for (int axis = 0; axis < 3; ++axis) {
@@ -254,8 +257,10 @@ class Regions {
         }
     }
 
+    // The eight parts of a cell; none of a leaf.
     const Cell* children(const Cell& cell) const {
         if (const Cell* made = cell.children.load(std::memory_order_acquire)) return made;
+        if (cell.level == kDeepest || cell.stuck == kStuck || cell.list.size() <= most_of_leaf() + 1) return nullptr;
         std::lock_guard guard(locks_[size_t(&cell) / sizeof(Cell) % locks_.size()]);
         if (const Cell* made = cell.children.load(std::memory_order_relaxed)) return made;
         const Cell* made = divide(cell);
@@ -263,14 +268,22 @@ class Regions {
         return made;
     }
 
+    // Elements of a leaf. The more cells are divided, the more: what is asked of a dense smooth union would take any memory.
+    size_t most_of_leaf() const {
+        const size_t quarter = 4 * divided_.load(std::memory_order_relaxed) / (kDivided + kEach * elements_.count);
+        return quarter < 4 ? kFew << quarter : elements_.count;
+    }
+
     const Cell* divide(const Cell& cell) const {
         const double half = cell.half / 2;
+        const bool is_fine = elements_.smooth > kSeam * across(half);
         const std::vector<double> values = values_at_centres(cell);
         std::array<Cell, 8>* eight;
         {
             std::lock_guard guard(store_);
             eight = &cells_.emplace_back();
         }
+        divided_.fetch_add(1, std::memory_order_relaxed);
         for (size_t k = 0; k < 8; ++k) {
             Cell& part = (*eight)[k];
             part.level = cell.level + 1;
@@ -278,10 +291,13 @@ class Regions {
             part.half = half;
             for (int axis = 0; axis < 3; ++axis) part.centre[axis] = cell.centre[axis] + (k >> axis & 1 ? half : -half);
             choose(cell.list, &values[k], part);
-            part.stuck = part.list.size() * 4 > cell.list.size() * 3 ? cell.stuck + 1 : 0;
+            part.stuck = is_fine ? kStuck : part.list.size() * 4 > cell.list.size() * 3 ? cell.stuck + 1 : 0;
         }
         return eight->data();
     }
+
+    // What values of the union differ by in a cell, at most.
+    double across(double half) const { return 2 * elements_.lipschitz * std::sqrt(3.0) * half; }
 
     // Values of each element of a cell alone at the centres of its eight parts.
     std::vector<double> values_at_centres(const Cell& cell) const {
@@ -309,7 +325,7 @@ class Regions {
         for (int axis = 0; axis < 3; ++axis) size = std::max(size, std::abs(cell.centre[axis]));
         // Beyond the corners of the cell, as points on its faces are rounded; then what values are rounded by, in float32 at most.
         const double rounding = 4096.0 * std::numeric_limits<float>::epsilon() * (size * lipschitz + std::abs(least) + seam);
-        const double apart = seam + 2 * lipschitz * std::sqrt(3.0) * cell.half * 1.001 + rounding;
+        const double apart = seam + across(cell.half) * 1.001 + rounding;
         double f = seam > 0 ? std::numeric_limits<double>::infinity() : least;
         cell.list.assign(1, 0);
         for (size_t i = 0; i < count; ++i) {
@@ -331,6 +347,7 @@ class Regions {
     uint64_t number_ = ++made_;  // another one for each of the process
     Cell root_;
     mutable std::deque<std::array<Cell, 8>> cells_;
+    mutable std::atomic<size_t> divided_{0};
     mutable std::mutex store_;
     mutable std::array<std::mutex, 64> locks_;
 };

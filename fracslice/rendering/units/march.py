@@ -249,11 +249,13 @@ def widen(ox, oy, oz, dx, dy, dz, t, before, stride, side, path, P, steepness):
     return where(gap < 0.0, t, t + step), before, stride, gap
 
 
-def visible(x, y, z, dx, dy, dz, far, least, P, steepness, patience, glass):
-    """Trace a shadow ray.
+def visible(x, y, z, dx, dy, dz, far, least, P, steepness, patience, glass, lo, hi):
+    """Trace a shadow ray, up to where it leaves a box that holds all bodies.
 
     `x`, `y`, `z`: start of the ray; `dx`, `dy`, `dz`: unit direction to the light.
     """
+    _, leave = span(x, y, z, dx, dy, dz, lo, hi)
+    far = minimum(far, leave)
     t = 0.0 * x
     blocked = 0.0 * x
     going = t < far
@@ -265,7 +267,7 @@ def visible(x, y, z, dx, dy, dz, far, least, P, steepness, patience, glass):
         else:
             radius = blocker(x + t * dx, y + t * dy, z + t * dz, P) * steepness
         blocked = where(going & (radius < 0.0), 1.0, blocked)
-        t = t + maximum(radius, least)
+        t = where(going, minimum(t + maximum(radius, least), far), t)
         going = going & (t < far) & (blocked < 0.5)
     return 1.0 - blocked
 
