@@ -36,8 +36,8 @@ def quantile(values: np.ndarray, share: float) -> float:
 def distinct(numbers: np.ndarray) -> np.ndarray:
     """Sort integers and remove duplicates.
 
-    `numpy.unique` takes five to 25 times as long: it hashes before it sorts; so do its `union1d`,
-    `intersect1d` and `setdiff1d`. Returns [m], of the same type.
+    `numpy.unique` takes five to 25 times as long: it hashes before it sorts. So do NumPy's unions,
+    intersections and differences of sets. Returns [m], of the same type.
     """
     ordered = np.sort(numbers, axis=None)
     fresh = np.ones(len(ordered), bool)
