@@ -31,11 +31,9 @@ demo: setup
 	@ls -l out/mandelbulb.*
 
 test: setup
-	$(MAKE) --jobs 2 --no-print-directory lint native-tests
-	$(MAKE) --no-print-directory suite
+	$(MAKE) --jobs 2 --no-print-directory native-tests lint suite
 
 suite: setup
-	$(BIN)/python -m tests.structure
 	$(BIN)/python -m pytest -n 2 $(SELECT)
 
 native-tests: packages
