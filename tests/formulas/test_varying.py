@@ -17,6 +17,7 @@ from fracslice.fields.devices import reference
 from fracslice.fields.varying import Variable, Varying
 from fracslice.formulas import Node, box, displace, gyroid, infill, mandelbulb, shell, sphere, struts, union
 from fracslice.scene import scene, to_xml
+from tests.examples import stamped
 
 pytestmark = pytest.mark.once
 
@@ -71,15 +72,20 @@ def test_the_slope_is_proved_and_not_far_off(text: str, steepest: float) -> None
     "root",
     [
         gyroid(period=0.7, thickness="0.1+0.05*z"),
-        struts(period=0.7, thickness="0.2+0.1*sin(3*x)"),
         shell(sphere(), thickness="max(0.1, 0.3*x)"),
-        infill(sphere(), gyroid(period=0.5), shell="0.1+0.05*sqrt(x*x+y*y)"),
-        union(*BALLS, smooth="0.2+0.2*z"),
-        union(*BALLS, box(), smooth="0.1*abs(x)"),
-        BALLS[0].intersection(BALLS[1], smooth="0.2*x"),
         box().difference(*BALLS, smooth="0.3-0.2*y"),
         displace(sphere(0.8), by="0.1*sin(5*x)*cos(4*y)"),
-        displace(box().scale((0.5, 0.5, 2)), by="0.1+0.05*z"),
+        *stamped(
+            [
+                struts(period=0.7, thickness="0.2+0.1*sin(3*x)"),
+                infill(sphere(), gyroid(period=0.5), shell="0.1+0.05*sqrt(x*x+y*y)"),
+                union(*BALLS, smooth="0.2+0.2*z"),
+                union(*BALLS, box(), smooth="0.1*abs(x)"),
+                BALLS[0].intersection(BALLS[1], smooth="0.2*x"),
+                displace(box().scale((0.5, 0.5, 2)), by="0.1+0.05*z"),
+            ],
+            [],
+        ),
     ],
 )
 def test_fields_keep_their_bounds(root: Node) -> None:

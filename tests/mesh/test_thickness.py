@@ -69,7 +69,7 @@ SHEET = intersection(gyroid(period=1.5, thickness=0.02), sphere())
     [
         pytest.param(PLATE, 7, 0.25, id="plate"),
         pytest.param(PLATE, 7, 0.5, id="coarse plate", marks=pytest.mark.nightly),
-        pytest.param(ROD, 6, 0.2, id="rod"),
+        pytest.param(ROD, 6, 0.2, id="rod", marks=pytest.mark.nightly),
         pytest.param(ROD, 6, 0.5, id="coarse rod", marks=pytest.mark.nightly),
         pytest.param(SHEET, 6, 0.4, id="sheet", marks=pytest.mark.nightly),
     ],

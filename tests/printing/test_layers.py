@@ -25,8 +25,12 @@ def checked(root: Node, **printing: float | str) -> PrintReport:
 
 @pytest.mark.parametrize(
     ("root", "full", "left"),
-    [(box(), 8000, 16**3), (sphere(), 4 / 3 * math.pi * 1000, 4 / 3 * math.pi * 512)],
-    ids=["cube", "ball"],
+    [
+        pytest.param(box(), 8000, 16**3, id="cube"),
+        pytest.param(
+            sphere(), 4 / 3 * math.pi * 1000, 4 / 3 * math.pi * 512, id="ball", marks=pytest.mark.nightly
+        ),
+    ],
 )
 def test_hollow(root: Node, full: float, left: float) -> None:
     report = checked(root, hollow=2.0, drain=0.0)

@@ -94,12 +94,14 @@ def test_the_stated_lipschitz_constant_holds(solid: tuple[Node, Distance, float]
 @pytest.mark.parametrize(
     "placed",
     [
-        lambda root: root,
-        lambda root: (
-            root.rotate(90, "z").scale((2, 1, -1)).translate((3, 0, 0)) | root.material(colour=(1, 0, 0))
+        pytest.param(lambda root: root, id="alone", marks=pytest.mark.nightly),
+        pytest.param(
+            lambda root: (
+                root.rotate(90, "z").scale((2, 1, -1)).translate((3, 0, 0)) | root.material(colour=(1, 0, 0))
+            ),
+            id="placed twice",
         ),
     ],
-    ids=["alone", "placed twice"],
 )
 def test_outermost_points_are_those_of_the_grid(placed: Callable[[Node], Node]) -> None:
     """The field is zero there, and nothing is inside beyond."""
@@ -192,8 +194,8 @@ PLATE = difference(box((10, 8, 6)), cylinder(2, 10))
 @pytest.mark.parametrize(
     ("kind", "half"),
     [
-        ("density", False),
         ("surface", True),
+        pytest.param("density", False, marks=pytest.mark.nightly),
         pytest.param("surface", False, marks=pytest.mark.nightly),
         pytest.param("density", True, marks=pytest.mark.nightly),
     ],
