@@ -6,7 +6,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -55,6 +55,7 @@ def served(
     """Serve a scene, seen in a window of a size, pixels."""
     with running(source, folder, *options) as (address, process):
         page = browser.new_page(viewport={"width": size[0], "height": size[1]})
-        page.goto(address)
-        page.get_by_role("list", name="Elements").wait_for()
-        yield Served(page, address, folder, process)
+        with closing(page):  # an open one would ask for its server until the browser ends
+            page.goto(address)
+            page.get_by_role("list", name="Elements").wait_for()
+            yield Served(page, address, folder, process)
