@@ -14,6 +14,7 @@ from .folds import (
     differences,
     mandalay,
     polygon,
+    switched,
 )
 from .step_text import CYLINDER, LEFT_OUT, ORDERS, SQUARE, SWAPPED, FormulaStep, UnknownError, known
 
@@ -185,7 +186,7 @@ def amazing_surf_mod_2(s: FormulaStep) -> None:
         s.add_constant(
             "mandelbulbMulti_order_of_xyz", "transf_constant_multiplier_111", "transf_alternate_enabled_false"
         )
-    if s.on("transf_function_enabledCx_false") and s.within("F"):
+    if switched(s, "Cx_false", "F"):
         add_inverse(s, "transf_function_enabledCy_false")
     switches = (
         "transf_function_enabledAx",
@@ -200,16 +201,16 @@ def amazing_surf_mod_2(s: FormulaStep) -> None:
         x, y, z = s.vector("transf_addition_constant_111")
         s.write(f"w = fold_to(w, (1e6, 1e6, {s.parameter('transf_addition_constant_111_z', z)}))")
     swap(s, "transf_function_enabledSw_false", "(y, x, z)")
-    if s.on("transf_function_enabledBz_false") and s.within("X"):
+    if switched(s, "Bz_false", "X"):
         soft_offset(s)
     else:
         s.add("transf_addition_constant")
-    if s.on("transf_function_enabledAy") and s.within("M"):
+    if switched(s, "Ay", "M"):
         weight = f"(1 - {s.number('transf_scaleB_1')})" if s.on("transf_function_enabled_false") else "1"
         square = SQUARE if weight == "1" else f"{CYLINDER} + {weight} * z * z"
         s.ball(s.value("transf_minR2_p25"), s.value("transf_maxR2_1"), "mandelbox_offset", square=square)
     resets = s.on("transf_function_enabledM_false")
-    vary = s.on("transf_function_enabledF_false") and s.within("Y")
+    vary = switched(s, "F_false", "Y")
     scaled = s.within("S")
     scale = add_vary(s, "mandelbox_scale", "transf_scaleC_1", vary, resets)
     if scaled:
@@ -333,7 +334,7 @@ def abox_mod_15(s: FormulaStep) -> None:
         s.add("transf_addition_constantA_000")
     if s.within("R"):
         s.turn("transf_rotation2")
-    if s.on("transf_function_enabledN_false") and s.within("N"):
+    if switched(s, "N_false", "N"):
         crossed(s)
 
 
@@ -402,16 +403,16 @@ def box_fold_bulb_3(s: FormulaStep) -> None:
         "transf_start_iterationsTM", "transf_stop_iterationsTM_1"
     ):
         diagonal_scale(s, "transf_scale3D_333", "transf_addition_constantA_111")
-    if s.on("transf_function_enabledD_false") and s.within("D"):
+    if switched(s, "D_false", "D"):
         s.write("w = mirror(w, (1, 1, 0))", "w = mirror(w, (1, 0, 1))")
         s.write(
             "w = mirror(w, (1, -1, 0))", "w = mirror(w, (1, 0, -1))", "x, y, z = w", "w = (absolute(x), y, z)"
         )
         a, o = s.number("transf_scaleA_2"), s.point("transf_offset_100")
         s.write(f"w = {a} * w - ({a} - 1) * {o}")
-    if s.on("transf_function_enabledR_false") and s.within("R"):
+    if switched(s, "R_false", "R"):
         s.turn("transf_rotation")
-    if s.on("transf_function_enabledF_false") and s.within("M"):
+    if switched(s, "F_false", "M"):
         s.add("transf_addition_constantA_000")
         s.write("w = positive(w)")
         if s.on("transf_function_enabled"):
@@ -489,7 +490,7 @@ def abox_mod_1(s: FormulaStep) -> None:
         parts[2] = "z"
     s.write("x, y, z = w", f"w = ({', '.join(parts)})")
     square = SQUARE
-    if s.on("transf_function_enabled_false") and s.within("K"):
+    if switched(s, "_false", "K"):
         square = f"exp({s.number('mandelbox_vary_rpower')} * log(maximum({SQUARE}, 1e-30)))"
     s.ball(s.value("transf_minimum_radius_0"), s.value("transf_maxR2_1"), square=square)
     scale_by(s, scale)
@@ -538,7 +539,7 @@ def abox_icen(s: FormulaStep) -> None:
 @known(127, "Abox - Mod 13", "Sandercoe after Lowe 2010, fractalforums.org")
 def abox_mod_13(s: FormulaStep) -> None:
     """A Mandelbox with a box of three sizes, and a vector that is added in some iterations."""
-    if s.on("transf_function_enabledAz_false") and s.within("E"):
+    if switched(s, "Az_false", "E"):
         add_inverse(s, "transf_function_enabledAy_false")
     if s.within("A"):
         if s.on("transf_function_enabled"):
@@ -549,7 +550,7 @@ def abox_mod_13(s: FormulaStep) -> None:
     swap(s, "transf_function_enabledSw_false", "(z, y, x)")
     if s.within("S"):
         fold_ball(s, "mandelbox_offset")
-    vary = s.on("transf_function_enabledX_false") and s.within("X")
+    vary = switched(s, "X_false", "X")
     added = s.state.get("added", 0.0)
     scale = add_vary(s, "mandelbox_scale", "transf_scaleB_1", vary, s.on("transf_function_enabledM_false"))
     scale_by(s, scale if vary else scale - added)
@@ -572,7 +573,7 @@ def fold_box_mod_1(s: FormulaStep) -> None:
     if s.within(""):
         vectors = [f"transf_{name}_111" for name in ("addition_constant", "addition_constantA", "scale3D")]
         differences(s, vectors, "transf_function_enabled", "transf_function_enabledA")
-    if s.on("transf_function_enabled_false") and s.within("A"):
+    if switched(s, "_false", "A"):
         fold_with_height(s)
     if s.within("B"):
         mandelbox_ball(s, None)
@@ -597,7 +598,7 @@ def mandelbox_menger(s: FormulaStep) -> None:
         s.turn("mandelbox_rotation_main")
     if s.within("S"):
         s.scale("mandelbox_scale")
-    if s.on("transf_function_enabled") and s.within("M"):
+    if switched(s, "", "M"):
         for _ in range(min(s.values.whole("transf_int_1"), 4)):
             s.write("w = positive(w)")
             s.menger("transf_scale_3", "transf_constant_multiplierA_111")
@@ -666,7 +667,7 @@ def abox_klein(s: FormulaStep) -> None:
 @known(199, "Mandalay Box V2", "Knighty and DarkBeam 2015, fractalforums.com")
 def mandalay_box_2(s: FormulaStep) -> None:
     """A box, a Mandalay fold, a ball and a scale, in their iterations."""
-    if s.on("transf_function_enabledA_false") and s.within("A"):
+    if switched(s, "A_false", "A"):
         if s.on("transf_function_enabled"):
             s.fold("transf_addition_constant_111")
         else:
@@ -676,7 +677,7 @@ def mandalay_box_2(s: FormulaStep) -> None:
     mandalay(s, s.on("transf_function_enabledSw_false"))
     if s.within("S"):
         fold_ball(s, None)
-    vary = s.on("transf_function_enabledK_false") and s.within("K")
+    vary = switched(s, "K_false", "K")
     scale_by(s, add_vary(s, "transf_scale_2", "transf_scaleC_1", vary, False))
     if s.on("transf_rotation_enabled") and s.within("R"):
         s.turn("transf_rotation")
@@ -698,14 +699,14 @@ def amazing_surf_klein_2(s: FormulaStep) -> None:
     s.fold_flat("transf_addition_constant_111")
     if s.within("I"):
         swap(s, "transf_function_enabledI_false", "(y, x, z)")
-    if s.on("transf_function_enabledJ_false") and s.within("J"):
+    if switched(s, "J_false", "J"):
         z = s.parameter("transf_addition_constant_111_z", s.vector("transf_addition_constant_111")[2])
         s.write(f"w = fold_to(w, (1e6, 1e6, {z}))")
     else:
         s.write("x, y, z = w", "w = (x, z, y)")
     if s.within("H"):
         swap(s, "transf_function_enabledSw_false", "(y, x, z)")
-    klein_ball(s, s.on("transf_function_enabledK_false") and s.within("K"))
+    klein_ball(s, switched(s, "K_false", "K"))
     if s.within("O"):
         s.add("transf_addition_constantA_000")
 

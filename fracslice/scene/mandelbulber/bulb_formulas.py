@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .folds import PI, absolute, sector, symmetric
+from .folds import PI, absolute, sector, switched, symmetric
 from .step_text import FOUR, LEFT_OUT, OWN, FormulaStep, known
 
 NYLANDER = "White and Nylander 2009, fractalforums.com"
@@ -103,20 +103,20 @@ def mandelbulb_abs_2(s: FormulaStep) -> None:
     """The square with absolute values before and after, and turns."""
     if s.on("transf_rotation_enabled") and s.within("R"):
         s.turn("transf_rotation")
-    if s.on("transf_function_enabledD_false") and s.within("D"):
+    if switched(s, "D_false", "D"):
         s.add("transf_offsetA_000")
     absolute(s, *(f"buffalo_preabs_{axis}" for axis in "xyz"))
     s.square()
     if s.on("buffalo_pos_z"):
         s.write("x, y, z = w", "w = (x, y, -z)")
     absolute(s, *(f"buffalo_abs_{axis}" for axis in "xyz"))
-    if s.on("transf_function_enabledM") and s.within("M"):
+    if switched(s, "M", "M"):
         s.add("transf_offset_000")
-    if s.on("transf_function_enabled") and s.within("S"):
+    if switched(s, "", "S"):
         s.turn("mandelbox_rotation_main")
     if s.within("E"):
         s.refuse("transf_addCpixel_enabled_false")
-    if s.on("transf_function_enabledP_false") and s.within("H"):
+    if switched(s, "P_false", "H"):
         absolute(s, *(f"transf_function_enabledC{axis}_false" for axis in "xyz"))
 
 
@@ -142,7 +142,7 @@ def msltoe_sym_4(s: FormulaStep) -> None:
     if s.within("K"):
         symmetric(s)
     n = s.values.whole("transf_int8_Y")
-    if s.on("transf_function_enabledB_false") and s.within("B"):
+    if switched(s, "B_false", "B"):
         n += s.values.whole("transf_int_1")
     sector(s, "yz", s.parameter("transf_int8_Y", max(n, 1)), PI)
     flattened_square(s, s.number("transf_scaleB_1"))
@@ -179,16 +179,16 @@ def julia_bulb_4(s: FormulaStep) -> None:
     if s.on("transf_addCpixel_enabled_false"):
         add_away(s)
     move_along(s)
-    if s.on("transf_function_enabled_false") and s.within("A"):
+    if switched(s, "_false", "A"):
         s.write("x, y, z = w", "w = (x * x - y * y - z * z, 2 * x * y, 2 * x * z)")
 
 
 @known(219, "Msltoe - Julia Bulb Mod5", JULIA_BULB, LEFT_OUT)
 def julia_bulb_5(s: FormulaStep) -> None:
     """As the fourth, with more sides in some iterations, and less z after a quaternion's square."""
-    if s.on("transf_function_enabledC_false") and s.within("D"):
+    if switched(s, "C_false", "D"):
         s.fold("transf_addition_constant")
-    more = s.on("transf_function_enabledB_false") and s.within("B")
+    more = switched(s, "B_false", "B")
     sides = s.values.whole("transf_int8_Y") + (s.values.whole("transf_int_1") if more else 0)
     sector(s, "yz", s.parameter("transf_int8_Y", max(sides, 1)), PI)
     flattened_square(s, s.number("transf_scaleB_1"))
@@ -196,7 +196,7 @@ def julia_bulb_5(s: FormulaStep) -> None:
     if s.on("transf_addCpixel_enabled_false") and s.within("C"):
         add_away(s)
     move_along(s)
-    if s.on("transf_function_enabled_false") and s.within("A"):
+    if switched(s, "_false", "A"):
         f, o = s.number("transf_scaleF_1"), s.number("transf_offset_0")
         s.write("x, y, z = w", "cx, cy, cz = c")
         s.write(f"w = (x * x - y * y - z * z, 2 * x * y, 2 * x * z - {f} * cz - {o})")
@@ -248,7 +248,7 @@ def riemann_sphere_2(s: FormulaStep) -> None:
 def pupuku(s: FormulaStep) -> None:
     """The Mandelbulb with factors of its angles and of their sines and cosines."""
     s.refuse("transf_function_enabledBz_false")
-    if s.on("transf_function_enabledP_false") and s.within("P"):
+    if switched(s, "P_false", "P"):
         absolute(s, *(f"transf_function_enabledC{axis}_false" for axis in "xyz"))
         s.add("transf_offsetA_000")
     n, a, b = s.number("power"), s.number("transf_scaleA_1"), s.number("transf_scaleB_1")
@@ -256,7 +256,7 @@ def pupuku(s: FormulaStep) -> None:
     s.write("x, y, z = w", "s = maximum(x * x + y * y, 1e-30)")
     s.write(f"t = {n} * {a} * (atan2({own}){offset(s, 'beta_angle_offset')})")
     s.write(f"p = {n} * {b} * (atan2(y, x){offset(s, 'alpha_angle_offset')})")
-    if s.on("transf_function_enabledX_false") and s.within("X"):
+    if switched(s, "X_false", "X"):
         s.write(f"p = p + where(cos(t) < 0, {PI}, 0)")
     sine, cosine = ("cos(t)", "sin(t)") if s.on("transf_function_enabledD_false") else ("sin(t)", "cos(t)")
     s.write(f"u = {cosine}", f"r = exp(0.5 * ({n} - {s.number('transf_offset_1')} + 1) * log(s + z * z))")
@@ -367,7 +367,7 @@ def mandelbulb_pow2_3(s: FormulaStep) -> None:
         ]
         if limits != ["1e6"] * 3:
             s.write(f"w = fold_to(w, ({', '.join(limits)}))")
-    if s.on("transf_function_enabledA_false") and s.within("A"):
+    if switched(s, "A_false", "A"):
         absolute(s, *(f"transf_function_enabledA{axis}_false" for axis in "xyz"))
     s.scale("transf_scaleA_1")
     angle = f"t + 1.5 * {PI}"
@@ -384,13 +384,13 @@ def mandelbulb_pow2_3(s: FormulaStep) -> None:
 @known(262, "Mandelbulb - Pow2 V1", NYLANDER)
 def mandelbulb_pow2_1(s: FormulaStep) -> None:
     """Squares about y and about z, each in its iterations."""
-    if s.on("transf_function_enabledAx_false") and s.within("A"):
+    if switched(s, "Ax_false", "A"):
         absolute(s, *(f"transf_function_enabledC{axis}_false" for axis in "xyz"))
-    if s.on("transf_function_enabledAy") and s.within("B"):
+    if switched(s, "Ay", "B"):
         sign = "-" if s.on("transf_function_enabledB_false") else ""
         s.write("x, y, z = w", "s = maximum(x * x + z * z, 1e-30)", "m = y * y / s - 1")
         s.write(f"w = ({sign}2 * x * z * m, {alternate(s, 'D', 'C')}2 * sqrt(s) * y, (z * z - x * x) * m)")
-    if s.on("transf_function_enabledAz_false") and s.within("C"):
+    if switched(s, "Az_false", "C"):
         sign = "-" if s.on("transf_function_enabledA_false") else ""
         s.write("x, y, z = w", "s = maximum(x * x + y * y, 1e-30)", "m = 1 - z * z / s")
         s.write(f"w = ({sign}2 * x * y * m, (y * y - x * x) * m, {alternate(s, 'F', 'E')}2 * sqrt(s) * z)")

@@ -151,16 +151,16 @@ def crossed(s: FormulaStep) -> None:
     sides = "y, x" if s.on("transf_function_enabledA_false") else "x, y"
     s.write("x, y, z = w", f"{sides} = absolute(x), absolute(y)")
     s.write(f"x, y = x + y - {a}, x - y - {b}")
-    if s.on("transf_function_enabledBx_false") and s.within("O"):
+    if switched(s, "Bx_false", "O"):
         s.write("x = -absolute(x)")
-    if s.on("transf_function_enabledBx") and s.within("P"):
+    if switched(s, "Bx", "P"):
         s.write("y = -absolute(y)")
     s.write("x, y = 0.5 * (x + y), 0.5 * (x - y)")
     for switch, letter, axis, name in (
         ("Ax", "R", "x", "transf_offset_1"),
         ("Ax_false", "RV", "y", "transf_offsetA_1"),
     ):
-        if s.on(f"transf_function_enabled{switch}") and s.within(letter):
+        if switched(s, switch, letter):
             o = s.number(name)
             s.write(f"{axis} = {o} - absolute({axis} + {o})")
     for axis in "xyz":

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .box_formulas import fold_with_height
-from .folds import PI, absolute, alternating, bulge, crossed, diagonal_scale, differences, polygon
+from .folds import PI, absolute, alternating, bulge, crossed, diagonal_scale, differences, polygon, switched
 from .step_text import JOS, KLEINIAN, LEFT_OUT, OWN_SOLID, SQUARE, FormulaStep, known
 
 KNIGHTY = "Knighty 2011, fractalforums.com: pseudo-Kleinian"
@@ -52,7 +52,7 @@ def prism(s: FormulaStep) -> None:
 
 def turned(s: FormulaStep) -> None:
     """Turn in the iterations of R."""
-    if s.on("transf_function_enabledR_false") and s.within("R"):
+    if switched(s, "R_false", "R"):
         s.turn("transf_rotation")
 
 
@@ -61,10 +61,10 @@ def pseudo_kleinian(s: FormulaStep) -> None:
     """Folds into a box and out of a ball."""
     inverted_first(s, "transf_maxR2_1", "transf_addition_constantA_000")
     prism(s)
-    if s.on("transf_function_enabledBy_false") and s.within("E"):
+    if switched(s, "By_false", "E"):
         fold = s.fold if s.on("transf_function_enabledBy") else s.fold_flat
         fold("transf_addition_constant_111")
-    if s.on("transf_function_enabledBx_false") and s.within("A"):
+    if switched(s, "Bx_false", "A"):
         fold_with_height(s)
     if s.within("C"):
         fold_into_box(s)
@@ -77,7 +77,7 @@ def pseudo_kleinian(s: FormulaStep) -> None:
 @known(117, "Pseudo Kleinian - Mod 2", KNIGHTY, LEFT_OUT, distance=KLEINIAN)
 def pseudo_kleinian_2(s: FormulaStep) -> None:
     """More folds before and behind those of the group."""
-    if s.on("transf_function_enabledS_false") and s.within("S"):
+    if switched(s, "S_false", "S"):
         s.refuse("transf_function_enabledy_false")
         s.ball(s.value("transf_minR2_p25"), s.value("transf_maxR2_1"), "mandelbox_offset")
         s.scale("transf_scale_1")
@@ -86,9 +86,9 @@ def pseudo_kleinian_2(s: FormulaStep) -> None:
     benesi(s, "transf_start_iterations_T")
     box_and_balls(s, "transf_function_enabledAy")
     s.add("transf_addition_constant")
-    if s.on("transf_function_enabledF_false") and s.within("F"):
+    if switched(s, "F_false", "F"):
         s.fold("transf_offsetA_000")
-        if s.on("transf_function_enabled_false") and s.within("A"):
+        if switched(s, "_false", "A"):
             bulge(s, "transf_offsetA_000", "transf_scale3D_000")
     s.refuse("transf_addCpixel_enabled_false")
 
@@ -108,7 +108,7 @@ def box_and_balls(s: FormulaStep, first: str) -> None:
     """The folds of the group, of which there may be two in a row."""
     if s.on(first) and s.within("C"):
         fold_into_box(s)
-    if s.on("transf_function_enabledAy_false") and s.within("B"):
+    if switched(s, "Ay_false", "B"):
         fold_into_box(s)
 
 
@@ -116,13 +116,13 @@ def box_and_balls(s: FormulaStep, first: str) -> None:
 def pseudo_kleinian_std(s: FormulaStep) -> None:
     """The group measured with the z axis, and a sponge's folds before it."""
     before_folds(s)
-    if s.on("transf_function_enabled") and s.within("M"):
+    if switched(s, "", "M"):
         s.write("w = positive(w)")
         s.menger("transf_scale_3", "transf_constant_multiplierA_111")
         s.add("transf_addition_constantA_000")
     if s.on("transf_function_enabledN_false"):
         s.write("x, y, z = w", "w = (x, y, -z)")
-    if s.on("transf_function_enabledAw") and s.within("C"):
+    if switched(s, "Aw", "C"):
         s.scale("transf_scaleB_1")
     box_and_balls(s, "transf_function_enabledAw")
     s.add("transf_addition_constant")
@@ -134,7 +134,7 @@ def before_folds(s: FormulaStep) -> None:
     prism(s)
     turned(s)
     benesi(s, "transf_start_iterations")
-    if s.on("transf_function_enabledF_false") and s.within("F"):
+    if switched(s, "F_false", "F"):
         shifted_differences(s)
 
 
@@ -154,11 +154,11 @@ def pseudo_kleinian_4(s: FormulaStep) -> None:
         s.write("w = (x - where(x < 0, -a, a), y - where(y < 0, -b, b), z - where(z < 0, -d, d))")
     fold_into_box(s)
     s.add("transf_addition_constant")
-    if s.on("transf_function_enabledG_false") and s.within("G"):
+    if switched(s, "G_false", "G"):
         alternating(s, "transf_addition_constantA_000", "transf_scale_neg1")
-    if s.on("transf_function_enabledF_false") and s.within("F"):
+    if switched(s, "F_false", "F"):
         s.fold("transf_offsetA_000")
-    if s.on("transf_function_enabledN_false") and s.within("N"):
+    if switched(s, "N_false", "N"):
         crossed(s)
 
 
@@ -183,7 +183,7 @@ def jos_kleinian(s: FormulaStep) -> None:
 def pseudo_kleinian_1(s: FormulaStep) -> None:
     """Two folds of the group in a row, with other folds before and a sponge's behind."""
     before_folds(s)
-    if s.on("transf_function_enabledAw") and s.within("C"):
+    if switched(s, "Aw", "C"):
         if s.value("transf_scaleB_1") == 1:
             s.fold("transf_addition_constant_0777")
         else:
@@ -193,12 +193,12 @@ def pseudo_kleinian_1(s: FormulaStep) -> None:
         spread(s)
         if s.on("transf_function_enabledN_false"):
             s.write("x, y, z = w", "w = (x, y, -z)")
-    if s.on("transf_function_enabledAy_false") and s.within("B"):
+    if switched(s, "Ay_false", "B"):
         fold_into_box(s)
         if s.on("transf_function_enabledK_false"):
             s.write("x, y, z = w", "w = (-x, y, z)")
     s.add("transf_addition_constant")
-    if s.on("transf_function_enabledM_false") and s.within("M"):
+    if switched(s, "M_false", "M"):
         s.write("w = positive(w)")
         s.menger("transf_scale_3", "transf_constant_multiplierA_111")
         s.add("transf_addition_constantA_000")
@@ -265,11 +265,11 @@ def jos_step(s: FormulaStep, wave: str, tiled: bool) -> None:
 
 def jos_end(s: FormulaStep, doubled: bool) -> None:
     """Turn y about, and measure with a plane or the space between two."""
-    if s.on("transf_function_enabledE_false") and s.within("E"):
+    if switched(s, "E_false", "E"):
         a, b = s.number("transf_offset_1"), s.number("transf_scale_0")
         s.write("x, y, z = w", f"t = {a} + ({b} - 1) * absolute(y)", "w = (x, where(y < 0, -t, t), z)")
     a = s.number("transf_folding_value")
-    kept = s.on("transf_function_enabledT_false") and s.within("T")
+    kept = switched(s, "T_false", "T")
     if kept and doubled:
         s.write("x, y, z = w", f"w = (x, y, minimum(z, {a} - z))")
     if s.index >= s.values.whole("transf_start_iterations_G"):
@@ -295,7 +295,7 @@ def jos_kleinian_3(s: FormulaStep) -> None:
 def jos_kleinian_4(s: FormulaStep) -> None:
     """As the third, with translations before the polygons and a wave of another height."""
     jos_inversion(s, False)
-    if s.on("transf_function_enabledN_false") and s.within("O"):
+    if switched(s, "N_false", "O"):
         s.write("x, y, z = w")
         for axis, switch, name in (("x", "Aw_false", "transf_offset_2"), ("y", "Aw", "transf_offsetA_2")):
             if s.on(f"transf_function_enabled{switch}"):

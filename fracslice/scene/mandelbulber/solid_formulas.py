@@ -489,7 +489,7 @@ def koch_5(s: FormulaStep) -> None:
     if not s.on("transf_function_enabled"):
         return
     s.refuse_values("transf_scaleA_0")
-    slab, box = switched(s, "S_false", "S"), s.on("transf_function_enabledM") and s.within("O")
+    slab, box = switched(s, "S_false", "S"), switched(s, "M", "O")
     name = "transf_offsetA_0" if box else "transf_offset_0"
     d = s.measure(last=not s.within("Z"), thin=not slab and not (box and s.value(name) > 0))
     falls = s.on("transf_function_enabledF_false")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from .folds import absolute, absolute_of, polygon
+from .folds import absolute, absolute_of, polygon, switched
 from .step_text import LEFT_OUT, FormulaStep, known
 
 MENGER = "Menger 1926; folds by Knighty 2010, fractalforums.com"
@@ -42,7 +42,7 @@ def menger_mod_1(s: FormulaStep) -> None:
     if s.on("transf_rotation_enabled") and s.within(""):
         s.turn("transf_rotation")
     s.add("transf_addition_constant")
-    if s.on("transf_function_enabledx_false") and s.within("A"):
+    if switched(s, "x_false", "A"):
         box_offset(s, "transf_addition_constantA_000")
     weigh(s, "transf_function_enabled_false", "transf_offset", "transf_offset_0")
 
@@ -152,7 +152,7 @@ def sierpinski(s: FormulaStep) -> None:
     s.scale("transf_scaleA_2")
     if s.within("C"):
         s.add("transf_offset_111", "-")
-    if s.on("transf_function_enabledR_false") and s.within("R"):
+    if switched(s, "R_false", "R"):
         s.turn("transf_rotation")
 
 
@@ -163,12 +163,12 @@ def ifs(s: FormulaStep) -> None:
     s.add("transf_offset_111", "-")
     added = s.state.get("added", 0.0)
     s.write(f"w = {s.parameter('transf_scale_2', s.value('transf_scale_2') - added)} * w")
-    if s.on("transf_function_enabledK_false") and s.within("K"):
+    if switched(s, "K_false", "K"):
         s.state["added"] = s.value("transf_scale_vary_0") * (abs(added) - s.value("transf_offsetA_1"))
     s.turn("transf_rotation")
     if s.within("O"):
         s.add("transf_offset_000")
-    if s.on("transf_function_enabledS_false") and s.within("S"):
+    if switched(s, "S_false", "S"):
         s.ball(s.value("transf_minR2_p25"), s.value("transf_maxR2_1"))
     if s.within("R"):
         s.turn("transf_rotation2")
@@ -177,17 +177,17 @@ def ifs(s: FormulaStep) -> None:
 def koch(s: FormulaStep) -> None:
     """The snowflake's folds, in space: two reflections of x and z about thirds, a scale and an offset."""
     names = (("Ax", "Cx"), ("Ay", "Cy"), ("Az_false", "Cz"))
-    switches = [s.on(f"transf_function_enabled{switch}") and s.within(letter) for switch, letter in names]
+    switches = [switched(s, switch, letter) for switch, letter in names]
     absolute_of(s, switches)
-    if s.on("transf_function_enabledCx") and s.within("D"):
+    if switched(s, "Cx", "D"):
         s.write("w = mirror(w, (1, -1, 0))")
-    if s.on("transf_function_enabledC_false") and s.within("C"):
+    if switched(s, "C_false", "C"):
         s.add("transf_offsetA_000", "-")
     if s.on("transf_function_enabled_false") and s.during(
         "transf_start_iterations", "transf_stop_iterations"
     ):
         koch_options(s)
-    if s.on("transf_function_enabledG_false") and s.within("G"):
+    if switched(s, "G_false", "G"):
         s.ball(s.value("transf_minimum_radius_0"), s.value("transf_maxR2_1"), "mandelbox_offset")
     y = s.parameter("third", s.value("transf_scale_1") / 3)
     s.write("x, y, z = w", f"w = (x, {y} - absolute(y - {y}), z)")
@@ -208,9 +208,9 @@ def koch(s: FormulaStep) -> None:
         scale += added
         s.state["added"] = -s.value("transf_scale_vary_0") * (abs(added) - s.value("transf_scaleC_1"))
     s.write(f"w = {s.parameter('transf_scale_2', scale)} * (w - {o})")
-    if s.on("transf_function_enabledH_false") and s.within("H"):
+    if switched(s, "H_false", "H"):
         s.write("x, y, z = w", "w = (x, y, -z)")
-    if s.on("transf_function_enabledR_false") and s.within("R"):
+    if switched(s, "R_false", "R"):
         s.turn("transf_rotation")
     s.write(f"w = w + {o}")
 
@@ -263,7 +263,7 @@ def menger_smooth_mod_1(s: FormulaStep) -> None:
     s.write(f"w = ({scale} * x - {a}, {scale} * y - {b}, {scale} * z)")
     if s.on("transf_rotation_enabled") and s.within("R"):
         s.turn("transf_rotation")
-    if s.on("transf_function_enabledx_false") and s.within("A"):
+    if switched(s, "x_false", "A"):
         box_offset(s, "transf_addition_constantA_000")
     weigh(s, "transf_function_enabledz_false", "transf_offsetA_0", "transf_offsetB_0")
 
@@ -277,7 +277,7 @@ def menger_cross(s: FormulaStep) -> None:
     """Reflections of a prism's cross, a scale and an offset."""
     if s.during("transf_start_iterations", "transf_stop_iterations_1"):
         s.refuse("transf_function_enabled_false")
-    if not (s.on("transf_function_enabled") and s.within("A")):
+    if not (switched(s, "", "A")):
         return
     absolute_of(s, [s.on("transf_function_enabledz_false"), True, True])
     s.write(f"w = mirror(w, ({SLOPE}, -0.5, 0))", "w = mirror(w, (0, 1, 0))", "w = mirror(w, (0, -1, 1))")
@@ -290,7 +290,7 @@ def menger_cross(s: FormulaStep) -> None:
     if s.on("transf_function_enabledP_false"):
         a, b = s.number("transf_offset"), s.number("transf_offset_0")
         s.write("x, y, z = w", f"w = (absolute(x + {a}) + {b}, y, z)")
-    if s.on("transf_function_enabledR_false") and s.within("R"):
+    if switched(s, "R_false", "R"):
         s.turn("transf_rotation2")
 
 

@@ -6,7 +6,18 @@ import math
 from collections.abc import Sequence
 
 from .box_formulas import turned_folds
-from .folds import PI, absolute, absolute_of, bulge, diagonals, differences, mandalay, polygon, symmetric
+from .folds import (
+    PI,
+    absolute,
+    absolute_of,
+    bulge,
+    diagonals,
+    differences,
+    mandalay,
+    polygon,
+    switched,
+    symmetric,
+)
 from .sponge_formulas import box_offset
 from .step_text import LEFT_OUT, ORDERS, FormulaStep, known
 
@@ -136,7 +147,7 @@ def abs_add_constant_2(s: FormulaStep) -> None:
 def tglad_fold(s: FormulaStep) -> None:
     """Fold into a box, and push the coordinates towards its middle."""
     s.fold("transf_addition_constant")
-    if s.on("transf_function_enabled_false") and s.within("A"):
+    if switched(s, "_false", "A"):
         bulge(s, "transf_addition_constant", "transf_offset_000")
 
 
@@ -322,15 +333,15 @@ def add_inverted(s: FormulaStep) -> None:
 @known(1158, "T>Abs Sym3", MANDELBULBER, LEFT_OUT)
 def abs_sym_3(s: FormulaStep) -> None:
     """Absolute values, and reflections in three diagonal planes, in part."""
-    if s.on("transf_function_enabledA_false") and s.within("A"):
+    if switched(s, "A_false", "A"):
         absolute(s, *(f"transf_function_enabled{axis}" for axis in "xyz"))
         s.add("transf_offset_000")
     if s.within("K"):
         symmetric(s)
-    if s.on("transf_function_enabledB_false") and s.within("B"):
+    if switched(s, "B_false", "B"):
         absolute(s, *(f"transf_function_enabledC{axis}" for axis in "xyz"))
         s.add("transf_offsetF_000")
-    if s.on("transf_function_enabledR_false") and s.within("R"):
+    if switched(s, "R_false", "R"):
         s.turn("transf_rotation")
     if s.within("E"):
         s.scale("transf_scale_1")
@@ -503,7 +514,7 @@ def menger_fold_2(s: FormulaStep) -> None:
     if s.on("transf_function_enabled_false"):
         s.turn("transf_rotation2")
     scale = s.value("transf_scale_3")
-    if s.on("transf_function_enabledX_false") and s.within("X"):
+    if switched(s, "X_false", "X"):
         added = s.state.get("added", 0.0)
         scale += added
         s.state["added"] = -s.value("transf_scale_vary_0") * (abs(added) - s.value("transf_scaleB_1"))
