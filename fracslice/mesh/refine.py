@@ -191,8 +191,13 @@ def edges_of(triangles: NDArray[np.int32]) -> Edges:
 
 def with_neighbours(mesh: Mesh, some: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Some triangles of a mesh, bool (m,), and those that share a vertex with them."""
+    return _at(mesh, mesh.triangles[some])
+
+
+def _at(mesh: Mesh, vertices: NDArray[np.integer]) -> NDArray[np.bool_]:
+    """Whether triangles of a mesh are at some vertices, bool (m,)."""
     near = np.zeros(len(mesh.vertices), bool)
-    near[mesh.triangles[some]] = True
+    near[vertices] = True
     return np.asarray(np.logical_or.reduce([near[corner] for corner in mesh.triangles.T]))
 
 
@@ -337,7 +342,7 @@ def _shrinking(
 
     The triangles around it, but for thin ones, face one way, and all do then, and are not thin.
     """
-    mesh = _at(mesh, ways)
+    mesh = Mesh(mesh.vertices, mesh.triangles[_at(mesh, ways)])
     edges, (keep, vanish) = edges_of(mesh.triangles), ways.T
     there = edges.has(keep, vanish) & np.isin(vanish, uncrowded(mesh.triangles, vanish))
     ways, keep, vanish = ways[there], keep[there], vanish[there]
@@ -355,13 +360,6 @@ def _shrinking(
     good = wide.any(axis=1) & (even[0] | ~wide).all(axis=1) & ((even[1] & wider) | both).all(axis=1)
     good &= ((both & once).sum(axis=1) == 2) & (common.sum(axis=(1, 2)) == 4)
     return ways[good], corners.reshape(len(good), 3 * star.shape[1])[good]
-
-
-def _at(mesh: Mesh, some: NDArray[np.int64]) -> Mesh:
-    """The triangles of a mesh at some vertices."""
-    near = np.zeros(len(mesh.vertices), bool)
-    near[some] = True
-    return Mesh(mesh.vertices, mesh.triangles[near[mesh.triangles].any(axis=1)])
 
 
 def measures(corners: NDArray[np.float64], thin: float) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:

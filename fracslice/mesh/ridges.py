@@ -149,7 +149,7 @@ def with_ridges(
     own = numbers[crumb < 0]
     caps = [Cap(own[cap.old], cap.fan) for cap in made.caps()]
     crumbs = np.flatnonzero(crumb >= 0)
-    parts = _parted(crumbs, np.unique(crumb[crumbs], return_inverse=True)[1]) if len(crumbs) else []
+    parts = _parted(crumbs, np.unique(crumb[crumbs], return_inverse=True)[1])
     _take_in(caps, [Cap(numbers[part], mesh.vertices[mesh.triangles[part]]) for part in parts], planned.voxel)
     points = np.concatenate([tips, made.marks()])
     result, near = pieces.anew(), planned.voxel / 2
@@ -483,7 +483,7 @@ class _Sharpened:
     def _replaced(self) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.int32]]:
         """Old triangles that are replaced, their connected parts, and those of the new triangles."""
         new = self.mesh.triangles[self.parents < 0]
-        gone = _without(len(self.old.triangles), self.parents[self.parents >= 0])
+        gone = _without(len(self.old.triangles), self.parents)
         both = np.concatenate([new, self.old.triangles[gone]])
         labels, _ = connected_components(both, len(self.mesh.vertices))
         return gone, labels[self.old.triangles[gone, 0]], labels[new[:, 0]]
@@ -842,9 +842,9 @@ def _bent(mesh: Mesh, edges: Edges) -> NDArray[np.int64]:
 
 
 def _without(count: int, some: NDArray[np.integer]) -> NDArray[np.int64]:
-    """Numbers below a count but for some."""
+    """Numbers below a count but for some; negative ones are none."""
     left = np.ones(count, bool)
-    left[some] = False
+    left[some[some >= 0]] = False
     return np.flatnonzero(left)
 
 
@@ -860,8 +860,7 @@ def _alone(
     placed = mesh.vertices.copy()
     placed[some] = points
     pairs = rank[used[cKDTree(placed[used]).query_pairs(least, output_type="ndarray")]]
-    last = pairs.max(axis=1, initial=-1)
-    return _without(len(some), last[last >= 0])
+    return _without(len(some), pairs.max(axis=1, initial=-1))
 
 
 def _rings(mesh: Mesh, some: NDArray[np.int64]) -> NDArray[np.int64]:
