@@ -413,7 +413,7 @@ def _search(steps: Round, given: tuple[Given, ...], iterations: int) -> Growth |
     bound = escapes(steps, given)
     if bound is None:
         return None
-    whole, points = whole_round(steps, given)
+    whole, points = compose_steps(images(steps, given)), ray_points()
     reach, thick = (
         sampled_radius(whole, points, n, bound.escape) for n in (iterations, min(iterations, THICK))
     )
@@ -422,34 +422,36 @@ def _search(steps: Round, given: tuple[Given, ...], iterations: int) -> Growth |
     return replace(bound, half=_half(steps, bound, given, iterations)) if bound.fits else bound
 
 
-def whole_round(steps: Round, given: Sequence[Given]) -> tuple[Image, np.ndarray]:
-    """Image of a round, and points [3, n] along rays."""
-    points = (directions()[:, :, None] * RADII).reshape(3, -1)
-    return compose_steps([image(steps, place, given) for place in range(len(steps))]), points
+def images(steps: Round, given: Sequence[Given]) -> list[Image]:
+    """Steps on arrays; see `image`."""
+    return [image(steps, place, given) for place in range(len(steps))]
+
+
+def ray_points() -> np.ndarray:
+    """Points along rays, [3, n]."""
+    return np.asarray((directions()[:, :, None] * RADII).reshape(3, -1))
 
 
 @lru_cache(maxsize=64)
 def escapes(steps: Round, given: tuple[Given, ...]) -> Growth | None:
     """Growth of all numbers of rounds, without a box; None if orbits do not escape."""
-    images = [image(steps, place, given) for place in range(len(steps))]
-    whole, points = whole_round(steps, given)
+    own = images(steps, given)
+    whole, points = compose_steps(own), ray_points()
     rays, origin = directions(), np.zeros(3)
     if not norm(whole(rays * 1e4, origin)).min() > 1.02e4:
         return None
-    rates = [step_power(step, rays, origin) for step in images]
+    rates = [step_power(step, rays, origin) for step in own]
     fixed = all(stage.is_fixed for stage in stages(steps))
     radius = bounded = sampled_radius(whole, points, ROUNDS, FARTHEST)
     for _ in range(2):  # thin tips of the solid fall between samples; that of a few rounds has thicker ones
         radius = max(sampled_escape(whole, points, 0.0 if fixed else bounded), 0.0 if fixed else bounded)
         bounded = max(bounded, sampled_radius(whole, points, FEW, radius))
     size = 0.0 if fixed else bounded
-    radii = [
-        sampled_escape(compose_steps([*images[k:], *images[:k]]), points, size) for k in range(1, len(steps))
-    ]
+    radii = [sampled_escape(compose_steps([*own[k:], *own[:k]]), points, size) for k in range(1, len(steps))]
     powers, factors = zip(*rates, strict=True)
     bound = Growth(powers, factors, (*radii, radius), stretch=constant_stretch(steps, given))
     bound = _prove_growth(steps, bound, given, size)
-    if not bound.proved and (wider := widened_escapes(images, bound.escapes, size)) != bound.escapes:
+    if not bound.proved and (wider := widened_escapes(own, bound.escapes, size)) != bound.escapes:
         bound = _prove_growth(steps, replace(bound, escapes=wider), given, size)
     return bound
 

@@ -439,7 +439,7 @@ class _Tree:
         """See `linked`."""
         node = self.dialect.kept(node)
         given = self.dialect.arguments(node)
-        numbers = PartNumbers(given.numbers, [*given.held])
+        numbers = PartNumbers([*given.numbers], [*given.held])
         runs = self.long_run(node, numbers) if self.is_long(node) else self.runs(node, numbers)
         key = given.function, given.fixed, given.structure, *[run.key for run in runs]
 
