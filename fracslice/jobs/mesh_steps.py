@@ -164,10 +164,9 @@ def has_thin_walls(signs: SignBricks) -> bool:
     """True if walls thinner than a voxel hold too much of the material for the samples to distinguish
     bodies.
     """
-    from ..printing.walls import thin_share
-    from ..records import PIECES
+    from ..printing.walls import components_of, sign_samples
 
-    return thin_share(signs) >= PIECES
+    return not components_of(sign_samples(signs)).tells_bodies
 
 
 def refuse_what_does_not_fit(signs: SignBricks, voxel: float) -> None:

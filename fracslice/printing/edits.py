@@ -17,7 +17,6 @@ from ..fields.devices import ArrayField
 from ..fields.field import Bounds, Cells, Device, Field, Kernel, Precision
 from ..formulas import Node, cylinder, difference, intersection, transform, union
 from ..formulas import box as box_node
-from ..records import PIECES
 from ..volume import Bricks, Drain, Plan, extent
 from ..volume.amount import Sizing, box_of_the_rest
 from ..volume.bricks import from_grid, to_grid
@@ -226,7 +225,7 @@ def _resolve_components(planned: Plan, work: Work) -> SolidComponents:
     for samples in SAMPLES:
         bricks = sampled_object(root, outer, longest, samples, work)
         components = components_of(bricks)
-        if components.thin_share < PIECES:
+        if components.tells_bodies:
             return components
     return components_of(resolve_connectivity(root, bricks, 0.0, True, work))
 

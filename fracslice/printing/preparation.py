@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import VolumeError
 from ..fields.field import Field
 from ..formulas import Box, box, plane, transform
-from ..records import DUST, PIECES
+from ..records import DUST
 from ..scene import Print
 from ..volume import Bricks, Plan, extent, sample_scene
 from ..volume.amount import Sizing
@@ -118,7 +118,7 @@ class Preparation:
 
     def told(self, components: SolidComponents) -> bool:
         """True if a mesh of these samples would choose its bodies by them: so does a coarser one."""
-        return not self.measured and self.how.whole and components.thin_share < PIECES
+        return not self.measured and self.how.whole and components.tells_bodies
 
     def resolved(self, coarse: Bricks, components: SolidComponents) -> Bricks:
         """Samples that resolve what these may miss."""
@@ -298,7 +298,7 @@ class _Edits(Preparation):
         for _ in range(REPEATS if known or self.how.bridge else 0):
             self.meshed = sample_scene(replace(self.planned, voxel=voxel), self.work)
             meshed = components_of(self.meshed)
-            if meshed.thin_share >= PIECES:  # crumbs of walls; `thickness` is for them
+            if not meshed.tells_bodies:  # crumbs of walls; `thickness` is for them
                 break
             tips, others, (start, end) = fragments(meshed, None if self.how.bridge else known)
             if len(tips):

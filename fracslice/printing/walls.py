@@ -27,7 +27,7 @@ from ..common.messages import format_count, place
 from ..fields.box import Box
 from ..fields.devices import ArrayField
 from ..fields.field import Bounds, Device, Field, Kernel, Precision
-from ..records import Print
+from ..records import PIECES, Print
 from ..volume import Bricks, SignBricks
 from ..volume.bricks import BRICK, INSIDE, OUTSIDE, values_at
 from ..work import Work, chunks
@@ -178,6 +178,11 @@ class SolidComponents:
         thin = self.inside & (self.crossings > 3 * self.count)
         return float(self.count[thin].sum() / self.count[self.inside].sum())
 
+    @property
+    def tells_bodies(self) -> bool:
+        """Whether thin walls hold too little of the material to hide which bodies there are."""
+        return self.thin_share < PIECES
+
     def box(self, numbers: np.ndarray) -> Box:
         """Bounding box of the samples of some components.
 
@@ -262,13 +267,6 @@ class SolidComponents:
         samples, tiles = self.masks(numbers)
         values = np.where(samples, np.float32(sign * self.solid.voxel), self.solid.values)
         return replace(self.solid, values=values, index=np.where(tiles, np.int32(side), self.solid.index))
-
-
-def thin_share(signs: SignBricks) -> float:
-    """Share of the material in bodies whose mean thickness is below a voxel:
-    `SolidComponents.thin_share`.
-    """
-    return components_of(sign_samples(signs)).thin_share
 
 
 def sign_samples(signs: SignBricks) -> Bricks:

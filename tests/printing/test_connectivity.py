@@ -14,7 +14,7 @@ from fracslice.printing import thin_features as connectivity
 from fracslice.printing.edits import EditedField
 from fracslice.printing.preparation import COARSE
 from fracslice.printing.thin_features import resolve_connectivity, thin_features
-from fracslice.printing.walls import SolidComponents, components_of, thin_share
+from fracslice.printing.walls import SolidComponents, components_of, sign_samples
 from fracslice.scene import Print, scene
 from fracslice.volume import Lattice, Plan, plan, sample, sample_scene_signs
 from fracslice.volume.amount import Sizing
@@ -194,7 +194,7 @@ def test_a_mesh_in_pieces_does_not_tell_which_body_is_the_largest(contoured: lis
 def test_the_share_of_thin_walls_is_that_of_the_thickness(thickness: float) -> None:
     """Of a shell in voxels and a thick ball of a twentieth of its area."""
     planned = plan(union(shell(sphere(), thickness=thickness / 24), at(sphere(radius=0.25), 1.4, 0, 0)), 64)
-    share = thin_share(sample_scene_signs(planned))
+    share = components_of(sign_samples(sample_scene_signs(planned))).thin_share
     assert share > 0.5 if thickness < 1 else share == 0
 
 

@@ -22,7 +22,7 @@ from fracslice.printing.walls import (
     components_of,
     edge_crossings,
     project_faces,
-    thin_share,
+    sign_samples,
     together,
     walls_of,
 )
@@ -208,7 +208,7 @@ def test_components_are_those_of_all_samples(solid: Bricks) -> None:
 
 def test_signs_alone_tell_the_same_components() -> None:
     for solid in SOLIDS[1:]:
-        assert thin_share(solid.signs) == components_of(solid).thin_share
+        assert components_of(sign_samples(solid.signs)).thin_share == components_of(solid).thin_share
 
 
 def test_components_of_a_graph() -> None:
